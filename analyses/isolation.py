@@ -92,11 +92,9 @@ def caught(part: str, work: Callable[[], T]) -> tuple[T | None, Missing | None]:
 
 def reason(error: BaseException) -> str:
     """What went wrong in one line."""
-    words = " ".join(str(error).split())[:400]
-    words = "".join(c if c.isprintable() else "?" for c in words)
-    if isinstance(error, FORESEEN):
-        return f"numerical failure: {words}"
-    return f"unforeseen {type(error).__name__}: {words}" if words else f"unforeseen {type(error).__name__}"
+    words = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split())[:400])
+    kind = "numerical failure" if isinstance(error, FORESEEN) else f"unforeseen {type(error).__name__}"
+    return f"{kind}: {words}" if words or isinstance(error, FORESEEN) else kind
 
 
 def traceback_of(error: BaseException) -> str:

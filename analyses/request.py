@@ -50,10 +50,14 @@ def options(request: type) -> dict[str, tuple[Any, Option]]:
     return result
 
 
+def key_of(name: str) -> str:
+    """The key of a field in a file: its name without the unit."""
+    return name.removesuffix(next((unit for unit in UNITS if name.endswith(unit)), ""))
+
+
 def flag(name: str) -> str:
-    """The flag of a field: its name without the unit."""
-    ending = next((unit for unit in UNITS if name.endswith(unit)), "")
-    return name.removesuffix(ending).replace("_", "-")
+    """The flag of a field: its key, with hyphens."""
+    return key_of(name).replace("_", "-")
 
 
 def given(*layers: Mapping[str, Any]) -> dict[str, Any]:
@@ -62,17 +66,13 @@ def given(*layers: Mapping[str, Any]) -> dict[str, Any]:
 
 
 LOAD = Option(
-    'Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.',
-    "LOAD",
-    kind="load",
+    'Load torque at the output, such as "4 N*m" or 4 (N m; linear axis: N); 0.', "LOAD", kind="load"
 )
 POINT = Option(
     "Friction: sliding, rest or describing-function; behind a coupling also driving and driven (the "
     "load's share of the friction) and gap (in the play); sliding.",
     "POINT",
 )
-
-
 FORCE = Option("Overwrite files that exist.")
 
 

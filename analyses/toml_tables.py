@@ -17,7 +17,7 @@ from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_t
 
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
-from analyses.request import UNITS
+from analyses.request import key_of
 
 T = TypeVar("T")
 WANTED: Mapping[frozenset[type], str] = {
@@ -28,11 +28,6 @@ WANTED: Mapping[frozenset[type], str] = {
     frozenset({float}): "a number is wanted",
     frozenset({str, int}): "a column name, or a number from 1",
 }
-
-
-def key_of(name: str) -> str:
-    """The key of a field: its name without the unit."""
-    return name.removesuffix(next((unit for unit in UNITS if name.endswith(unit)), ""))
 
 
 @cache

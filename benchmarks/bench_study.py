@@ -188,7 +188,7 @@ def _dask(quick: bool) -> Iterator[Row]:
 
     from actuator_lti import load_design
     from analyses.monte_carlo import SampleTask
-    from analyses.monte_carlo.store import Store
+    from analyses.monte_carlo.task import Store
     from analyses.studies.engine import Engine
     from analyses.studies.sampling import sampler_of
 

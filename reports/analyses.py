@@ -26,7 +26,7 @@ from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.settings import Asked as ValidationAsked
 from reports.design_files.keys import Asked as KeysAsked
 from reports.design_files.start import Asked as StartAsked
-from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear
+from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.nightly.asked import Asked as NightlyAsked
 
 if TYPE_CHECKING:
@@ -80,7 +80,6 @@ class Analysis:
         return (made(design, **values) if made else self.request(**values),)
 
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
-        """Ask."""
         package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
         of = () if self.alone else (design,)
         return getattr(import_module(package), name)(*of, *asked, **more)
@@ -89,6 +88,10 @@ class Analysis:
         """Show: ``section(result)`` of the section's module, one or several."""
         made = self.shows("section")(result)
         return made if isinstance(made, list) else [made]
+
+    def of_report(self, design: Design) -> list[Section]:
+        """The sections of a report of a design, as asked for by default."""
+        return self.sections(self.run(design, *self.asked(design, {})))
 
     def shows(self, name: str, otherwise: Callable[..., Any] | None = None) -> Any:
         """A function of the section's module.
@@ -187,6 +190,7 @@ ANALYSES = (
         study=True,
         keeps=True,
         out="out/compare",
+        example="analyses.studies.study",
     ),
     Analysis(
         "montecarlo",
@@ -208,17 +212,17 @@ ANALYSES = (
         shown="nightly",
         doing="building",
     ),
-    Analysis("export c", EXPORTS, AskedC, page=False, function="reports.exports.run.export_c"),
+    Analysis("export c", EXPORTS, AskedC, page=False, function="reports.exports.export_c"),
     Analysis(
         "export controller",
         EXPORTS,
         AskedController,
         page=False,
-        function="reports.exports.run.export_controller",
+        function="reports.exports.export_controller",
         shown="listing",
     ),
-    Analysis("export fmu", EXPORTS, AskedFmu, page=False, function="reports.exports.run.export_fmu"),
-    Analysis("export linear", EXPORTS, AskedLinear, page=False, function="reports.exports.run.export_linear"),
+    Analysis("export fmu", EXPORTS, AskedFmu, page=False, function="reports.exports.export_fmu"),
+    Analysis("export linear", EXPORTS, AskedLinear, page=False, function="reports.exports.export_linear"),
 )
 COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, controller for firmware, linear models."}
 """Words of a name that stands before others."""

@@ -67,6 +67,11 @@ def _fields(of: Any, *names: str) -> Tree:
 def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
     m, peaks = figures.margins, figures.peaks
+    others: tuple[tuple[str, Tree, LoopFigures | None], ...] = (
+        ("judged", {"how": HELD.get(figures.loop.name)}, figures.held),
+        ("rotor_locked", {}, figures.locked),
+        ("to_reference", {}, figures.reference),
+    )
     return {
         **_fields(m, *_OF_MARGINS),
         "disk_margin": m.disk_margin.alpha if m.disk_margin else None,
@@ -80,15 +85,7 @@ def loop_json(figures: LoopFigures) -> Tree:
         "band_rad_s": list(m.band_rad_s),
         "notes": [*m.notes, *figures.notes],
         **({"rotor": figures.loop.rotor} if figures.loop.name == "current" else {}),
-        **{
-            key: more | loop_json(other)
-            for key, more, other in (
-                ("judged", {"how": HELD.get(figures.loop.name)}, figures.held),
-                ("rotor_locked", {}, figures.locked),
-                ("to_reference", {}, figures.reference),
-            )
-            if other is not None
-        },
+        **{key: more | loop_json(other) for key, more, other in others if other is not None},
     }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from os import PathLike
@@ -16,15 +16,14 @@ from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
 from analyses.corners.run import Corners, corners
 from analyses.isolation import attempt, isolated
-from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import LoopSurvey, survey_loops
-from analyses.margins.measured import measured_if_asked
+from analyses.margins.run import measured_if_asked
 from analyses.specification.mending import mending
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
-from analyses.specification.weakest import Spread, WeakPoint, spread, weakest
+from analyses.specification.weakest import WeakPoint, spread, weakest
 from analyses.validation import validate
 from reports import document as doc
-from reports.analyses import BY_NAME, FURTHER, Analysis
+from reports.analyses import BY_NAME, FURTHER
 from reports.document_schema import Document
 from reports.html import write_report
 from reports.live import live_model
@@ -49,10 +48,6 @@ Progress = Callable[[int, int], None]
 Step = Callable[[str], AbstractContextManager[Progress | None]]
 
 
-def _unseen(_words: str) -> AbstractContextManager[None]:
-    return nullcontext()
-
-
 def report(
     design: Design | str | PathLike[str],
     out: str | PathLike[str] | None = None,
@@ -64,7 +59,7 @@ def report(
     response_of: str = "",
     averages: int | None = None,
     source: str | None = None,
-    step: Step = _unseen,
+    step: Step = lambda _words: nullcontext(),
 ) -> Document:
     """Compute the whole report of a design, as the command of the same name does.
 
@@ -81,7 +76,7 @@ def report(
         Sections of other documents, put before the further ones.
     response : path or control.FrequencyResponseData, optional
         A measured response, laid over the model; of what, and with how many averages behind its coherence, as
-        `analyses.margins.measured.measured_over` has it.
+        `analyses.margins.run.measured_over` has it.
     response_of : str
     averages : int, optional
     source : str, optional
@@ -109,7 +104,9 @@ def report(
     if source is None and not isinstance(design, Design):
         source = design_text(design)
     with step(f"further sections of {drive.name}"):
-        parts = [*_measured(drive, response, response_of, averages), *added, *further_sections(drive, also)]
+        laid = measured_if_asked(assemble_loops(drive), response, response_of, averages)
+        parts = [] if laid is None else [measured.section(laid)]
+        parts += [*added, *further_sections(drive, also)]
     if validation:
         with step(f"validating {drive.name}") as validating:
             parts = [*validation_sections(drive, validating), *parts]
@@ -119,11 +116,6 @@ def report(
         with step("drawing figures") as drawing:
             write_report(made, folder, progress=drawing)
     return made
-
-
-def _measured(design: Design, response: Any, place: str, averages: int | None) -> list[doc.Section]:
-    laid = measured_if_asked(assemble_loops(design), response, place, averages)
-    return [] if laid is None else [measured.section(laid)]
 
 
 def design_report(
@@ -146,8 +138,13 @@ def design_report(
     """
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
-        figures, loops, survey = _loops(design, progress)
-        point, ranges, bounds = _views(design, survey)
+        survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
+        figures, loops, bounds, point = {} if survey is None else survey.figures, [], None, None
+        if survey is not None:
+            verdicts = attempt("requirements", lambda: evaluate_requirements(design, figures), ())
+            loops = loop_sections(survey, verdicts)
+            bounds = attempt("corners", lambda: corners(design), None)
+            point = attempt("weakest point", lambda: weakest(survey, bounds), None)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
         *loops[:1],
@@ -160,15 +157,14 @@ def design_report(
     doc.waived(sections, design)
     with isolated() as unanswered:
         items = doc.judged(doc.walk(loops[0])) if loops else []
-        answered = attempt(
-            "first screen",
-            lambda: answer.section(
-                figures, items, sections, point, ranges, bounds=bounds, mend=_mend(point, survey, bounds)
-            ),
-            None,
-        )
-    first_screen = [answered] if answered and figures else []
-    sections[:0] = [*first_screen, *notices([*missing, *unanswered], "linear")]
+        ranges = {} if survey is None else spread(survey.operating_points)
+
+        def first_screen() -> list[doc.Section]:
+            mend = _mend(point, survey, bounds)
+            return [answer.section(figures, items, sections, point, ranges, bounds=bounds, mend=mend)]
+
+        answered = attempt("first screen", first_screen, [])
+    sections[:0] = [*(answered if figures else []), *notices([*missing, *unanswered], "linear")]
     made = doc.document(
         title=design.title or design.name,
         subtitle=design.description,
@@ -183,34 +179,12 @@ def design_report(
     return made
 
 
-def _views(
-    design: Design, survey: LoopSurvey | None
-) -> tuple[WeakPoint | None, Mapping[str, Mapping[str, Spread]], Corners | None]:
-    """The weakest point of all views, the spread over the operating points, and the corners."""
-    if survey is None:
-        return None, {}, None
-    bounds = attempt("corners", lambda: corners(design), None)
-    point = attempt("weakest point", lambda: weakest(survey, bounds), None)
-    return point, spread(survey.operating_points), bounds
-
-
 def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | None) -> str:
     """Say which move mends the weakest point, where it is beyond its limit."""
     if point is None or survey is None or point.reserve >= 0.0:
         return ""
     move = attempt("move that mends the weakest point", lambda: mending(point, survey, bounds), None)
     return answer.NO_MOVE if move is None else answer.move_words(survey.design, move)
-
-
-def _loops(
-    design: Design, progress: Progress | None
-) -> tuple[Mapping[str, LoopFigures], list[doc.Section], LoopSurvey | None]:
-    """Compute the linear loops and make their sections; none where the loops themselves fail."""
-    survey = attempt("linear loops", lambda: survey_loops(design, progress), None)
-    if survey is None:
-        return {}, [], None
-    verdicts = attempt("requirements", lambda: evaluate_requirements(design, survey.figures), ())
-    return survey.figures, loop_sections(survey, verdicts), survey
 
 
 def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
@@ -228,15 +202,11 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     with isolated() as missing:
         for name in dict.fromkeys(names):
             try:
-                made += attempt(f"section {name}", partial(_further, BY_NAME[name], design), [])
+                made += attempt(f"section {name}", partial(BY_NAME[name].of_report, design), [])
             except InputError as error:
                 why = f"Not for this drive: {error.message.removeprefix(f'{name}: ')}."
                 made.append(doc.section(name, name.capitalize(), [], result=why))
     return [*made, *notices(missing, "further")]
-
-
-def _further(one: Analysis, design: Design) -> list[doc.Section]:
-    return one.sections(one.run(design, *one.asked(design, {})))
 
 
 def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:

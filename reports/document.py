@@ -65,10 +65,7 @@ __all__ = [
 def plain(value: Any) -> Any:
     """Turn numpy values, tuples and mappings into what JSON knows; NaN and infinity become ``None``.
 
-    Raises
-    ------
-    TypeError
-        For anything else (a complex number, an object): say which part of it is meant.
+    A TypeError for anything else (a complex number, an object): say which part of it is meant.
 
     Examples
     --------
@@ -249,22 +246,19 @@ def verdict(
     """
     if distance is None and value is not None and limit is not None and comparison in COMPARISONS:
         distance = value - limit if comparison == ">=" else limit - value
-    item: VerdictItem = plain(
-        {
-            "id": id,
-            "label": label,
-            "value": value,
-            "limit": limit,
-            "comparison": COMPARISONS.get(comparison, comparison),
-            "unit": unit,
-            "distance": distance,
-            "verdict": str(Verdict.of(passed)),
-            "waiver": waiver,
-            "source": source,
-            "reason": prose(reason),
-        }
-    )
-    return item
+    return {
+        "id": id,
+        "label": label,
+        "value": plain(value),
+        "limit": plain(limit),
+        "comparison": COMPARISONS.get(comparison, comparison),
+        "unit": unit,
+        "distance": plain(distance),
+        "verdict": Verdict.of(passed).value,
+        "waiver": waiver,
+        "source": source,
+        "reason": prose(reason),
+    }
 
 
 def waived(sections: Iterable[Section], design: Design) -> None:
@@ -305,17 +299,15 @@ def section(
     where the first screen says it; ``findings``: what else that has to say. Where ``verdict`` is not proven,
     a report is not proven by this section, whatever its verdicts.
     """
-    result, intro = prose(result), prose(intro)
     first = [Finding(severity=told, text=result, where=id)] if told and result else []
-    more = [Finding(**{**one, "text": prose(one["text"])}) for one in findings]
     made: Section = {
         "id": id,
         "title": title,
-        "result": result,
-        "intro": intro,
+        "result": prose(result),
+        "intro": prose(intro),
         "status": status,
         "blocks": list(blocks),
-        "findings": [*first, *more],
+        "findings": [{**one, "text": prose(one["text"])} for one in (*first, *findings)],
     }
     return made if verdict is None else {**made, "verdict": verdict.value}
 
@@ -355,9 +347,7 @@ def _seen(value: Any) -> Any:
         return visible(value)
     if isinstance(value, Mapping):
         return {visible(key): _seen(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_seen(item) if isinstance(item, str | Mapping | list | tuple) else item for item in value]
-    return value
+    return [_seen(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def figures(made: Mapping[str, Any]) -> list[Block]:
@@ -372,13 +362,7 @@ def dumps(made: Mapping[str, Any]) -> str:
 
 
 def loads(content: str, origin: str = "report.json") -> Tree:
-    """Read a document.
-
-    Raises
-    ------
-    InputError
-        If it is no JSON, of another schema or version, or malformed.
-    """
+    """Read a document; an InputError if it is no JSON, of another schema or version, or malformed."""
     made = parse_json(content, origin)
     check(made, origin)
     return dict(made)
@@ -387,10 +371,7 @@ def loads(content: str, origin: str = "report.json") -> Tree:
 def load(path: str | Path) -> Tree:
     """Read a document from a file of somebody; see `loads`.
 
-    Raises
-    ------
-    InputError
-        Also where its verdict is not that of its sections, or a figure cannot be drawn.
+    Refused is also one whose verdict is not that of its sections, or of which a figure cannot be drawn.
     """
     from reports.drawing import refuse_undrawable
 
@@ -404,13 +385,7 @@ def load(path: str | Path) -> Tree:
 
 
 def check(made: Any, origin: str | None = None) -> None:
-    """Refuse a document that a page could not be made of.
-
-    Raises
-    ------
-    InputError
-        Naming the place, and what is wrong with it.
-    """
+    """Refuse a document that a page could not be made of: the place, and what is wrong with it."""
     validate(made, origin)
     for id, count in Counter(part["id"] for part in made["sections"]).items():
         if count > 1:

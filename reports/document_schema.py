@@ -271,13 +271,7 @@ _DOCUMENT: TypeAdapter[Document] = TypeAdapter(Document)
 
 
 def validate(made: Any, origin: str | None = None) -> None:
-    """Refuse what is no document.
-
-    Raises
-    ------
-    InputError
-        One line: the place, what stands there, what is allowed.
-    """
+    """Refuse what is no document, in one line: the place, what stands there, what is allowed."""
     if not isinstance(made, dict) or made.get("schema") != SCHEMA:
         raise InputError(f"schema must be {SCHEMA!r}", where=origin)
     if made.get("version") != VERSION:
@@ -286,16 +280,13 @@ def validate(made: Any, origin: str | None = None) -> None:
         )
     try:
         _DOCUMENT.validate_python(made)
-    except (ValidationError, RecursionError) as error:
-        raise InputError(_line(error), where=origin) from None
-
-
-def _line(error: ValidationError | RecursionError) -> str:
-    if isinstance(error, RecursionError):
-        return "details within details: nested too deeply"
-    first = error.errors(include_url=False, include_context=False)[0]
-    result = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
-    return f"{_place(first['loc'])}{result}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+    except RecursionError:
+        raise InputError("details within details: nested too deeply", where=origin) from None
+    except ValidationError as error:
+        first = error.errors(include_url=False, include_context=False)[0]
+        found = "" if first["type"] == "missing" else f" = {shown(first['input'])}"
+        words = f"{_place(first['loc'])}{found}: {first['msg'][:1].lower()}{first['msg'][1:]}"
+        raise InputError(words, where=origin) from None
 
 
 def _place(steps: tuple[int | str, ...]) -> str:

@@ -28,14 +28,12 @@ def draw_all(
     list. Otherwise one picture with plain colours.
     """
     drawn: list[str] = []
-    for k, block in enumerate(blocks):
-        svg, missing = caught(
-            f"figure {k + 1} ({block['figure']})", partial(draw_svg, block, f"f{k + 1}", page)
-        )
+    for k, block in enumerate(blocks, 1):
+        svg, missing = caught(f"figure {k} ({block['figure']})", partial(draw_svg, block, f"f{k}", page))
         drawn.append(svg or PLACEHOLDER)
         note([missing] if missing else [])
         if progress is not None:
-            progress(len(drawn), len(blocks))
+            progress(k, len(blocks))
     return drawn
 
 
@@ -46,13 +44,7 @@ def draw_svg(block: Mapping[str, Any], prefix: str = "f", page: bool = True) -> 
 
 
 def refuse_undrawable(blocks: Sequence[Mapping[str, Any]], origin: str) -> None:
-    """Refuse a document of somebody in which a figure's chart cannot be drawn.
-
-    Raises
-    ------
-    InputError
-        Naming the figure's number, its name, and what is wrong with it.
-    """
+    """Refuse a document of somebody in which a figure's chart cannot be drawn: which, and what is wrong."""
     for k, block in enumerate(blocks, 1):
         try:
             _, missing = caught(block["figure"], partial(draw_svg, block, "f", False))

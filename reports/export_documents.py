@@ -14,11 +14,7 @@ from reports.sections.validation import loop_name, quantity_name
 
 
 def export_documents(design: Design, check: CodeCheck | None = None) -> dict[str, bytes]:
-    """Files of the documentation folder by name.
-
-    index.html (the margin report), compiled_code.md (margins measured on the code), the design as TOML, the
-    licence.
-    """
+    """Files by name: the margin report, the margins measured on the code, the design as TOML, the licence."""
     from reports.build import design_report
 
     return {
@@ -78,16 +74,11 @@ def summary(check: CodeCheck) -> str:
     """One sentence: how many predictions are met, and the largest differences of the margins."""
     if check.reason:
         return f"margins of the compiled code: not measured ({check.reason})"
-    words = []
-    for name, unit, quantities in GROUPS:
-        worst = check.largest(*quantities)
-        if worst is not None:
-            words.append(f"{name} {worst.error:.2g} {unit} ({loop_name(worst.loop)})")
-    met = len(check.entries) - len(check.failed)
+    worst = [(name, unit, check.largest(*quantities)) for name, unit, quantities in GROUPS]
+    words = [f"{name} {of.error:.2g} {unit} ({loop_name(of.loop)})" for name, unit, of in worst if of]
     ends = f"; largest difference: {', '.join(words)}" if words else ""
-    return (
-        f"{met} of {len(check.entries)} predictions of the linear loops are met by the compiled code{ends}."
-    )
+    met = f"{len(check.entries) - len(check.failed)} of {len(check.entries)}"
+    return f"{met} predictions of the linear loops are met by the compiled code{ends}."
 
 
 def _row(row: Row) -> str:

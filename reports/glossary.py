@@ -70,7 +70,5 @@ def meaning(heading: str) -> str:
 
 @cache
 def _by_heading() -> dict[str, str]:
-    headings = {
-        quantity.heading: quantity.description for quantity in QUANTITIES.values() if quantity.heading
-    }
+    headings = {of.heading: of.description for of in QUANTITIES.values() if of.heading}
     return {term.lower(): line for term, line in {**headings, **glossary()}.items()}

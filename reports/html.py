@@ -40,13 +40,7 @@ def write_report(
     *,
     progress: Progress | None = None,
 ) -> tuple[Path, Path]:
-    """Write a document as ``<stem>.html`` and ``<stem>.json``; both or neither.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
-    """
+    """Write a document as ``<stem>.html`` and ``<stem>.json``; both or neither."""
     content = dumps(made)
     html = page(loads(content), progress=progress)
     paths = (Path(folder) / f"{stem}.html", Path(folder) / f"{stem}.json")
@@ -120,8 +114,7 @@ def environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters["show"] = show
-    made.filters["show_signed"] = show_signed
+    made.filters |= {"show": show, "show_signed": show_signed}
     made.globals["term"] = _term
     return made
 
@@ -145,10 +138,10 @@ def script(*, live: bool = False) -> str:
 
 def security_policy(*scripts: str, wasm: bool = False) -> str:
     """Give the page's content security policy: no request at all, and only these scripts run."""
-    hashes = " ".join(f"'sha256-{_sha256(script)}'" for script in scripts)
-    hashes += " 'wasm-unsafe-eval'" if wasm else ""
+    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
+    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) + " 'wasm-unsafe-eval'" * wasm
     return (
-        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {hashes}; base-uri 'none'"
+        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}; base-uri 'none'"
     )
 
 
@@ -156,7 +149,3 @@ def show_signed(value: float | None, digits: int = 3) -> str:
     if value is None:
         return MISSING
     return ("+" if value > 0 else "") + significant(value, digits)
-
-
-def _sha256(text: str) -> str:
-    return base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

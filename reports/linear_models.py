@@ -95,13 +95,10 @@ def _loop(loop: Loop, loops: Loops) -> Tree:
         margins = {name: value for name, value in exact.items() if value is not None and isfinite(value)}
     else:
         margins = margins_tree(loop.plain_open)
-    return {
-        "open_loop": _system(loop.plain_open, loop.unit_in, loop.unit_out),
-        "closed_loop": _system(loop.plain_closed, loop.unit_in, loop.unit_out),
-        "sensitivity": _system(loop.plain_sensitivity, loop.unit_in, loop.unit_out),
-        "periodic": loop.periodic,
-        "margins": margins,
-    }
+    systems = {"open_loop": loop.plain_open, "closed_loop": loop.plain_closed}
+    systems["sensitivity"] = loop.plain_sensitivity
+    made = {name: _system(system, loop.unit_in, loop.unit_out) for name, system in systems.items()}
+    return {**made, "periodic": loop.periodic, "margins": margins}
 
 
 def margins_tree(system: Any) -> Tree:
@@ -125,28 +122,14 @@ def margins_tree(system: Any) -> Tree:
 
 
 def _system(system: Any, unit_in: str, unit_out: str) -> Tree:
-    """Matrices and names."""
     parts = _DELAYED if hasattr(system, "delays_s") else _MATRICES
-    return {
-        "name": system.name,
-        "input": system.source,
-        "input_unit": unit_in,
-        "output": system.signal,
-        "output_unit": unit_out,
-        "states": list(system.states),
-        "dt": float(system.dt),
-        **{part: np.asarray(getattr(system, part), dtype=float).tolist() for part in parts},
-    }
+    ends = {"input": system.source, "input_unit": unit_in, "output": system.signal, "output_unit": unit_out}
+    about = {"name": system.name, **ends, "states": list(system.states), "dt": float(system.dt)}
+    return about | {part: np.asarray(getattr(system, part), dtype=float).tolist() for part in parts}
 
 
 def written_models(tree: Tree, to: str) -> bytes:
-    """The file of a tree.
-
-    Raises
-    ------
-    InputError
-        For an unknown format.
-    """
+    """The file of a tree; an InputError for an unknown format."""
     if to == "json":
         return (json.dumps(tree, indent=1, allow_nan=False) + "\n").encode()
     if to == "python":

@@ -88,7 +88,6 @@ def train_boxes(design: Design) -> list[Box]:
 
 
 def _row(boxes: Sequence[Box], top: float, colour: str) -> list[str]:
-    """Boxes from left to right with arrows between them."""
     width = (WIDTH - 2 * LEFT - GAP * (len(boxes) - 1)) / len(boxes)
     parts = []
     for n, (title, value) in enumerate(boxes):
@@ -101,35 +100,31 @@ def _row(boxes: Sequence[Box], top: float, colour: str) -> list[str]:
         parts.append(_words(x + width / 2, middle - 4, title, 11, bold=True, most=most))
         parts.append(_words(x + width / 2, middle + 14, value, 9.5, most=int(width / 5.8)))
         if n:
-            parts.append(_line([(x - GAP, middle), (x - 1.5, middle)], arrow=True))
+            parts.append(_arrow([(x - GAP, middle), (x - 1.5, middle)]))
     return parts
 
 
 def _returns(design: Design) -> list[str]:
     """Voltage down to the motor, measured values back up to the controller."""
     right, low, high = WIDTH - LEFT - 28.0, TOP + ROW, TOP + BOX_HEIGHT
-    middle = 0.5 * (low + high)
+    middle, bottom = 0.5 * (low + high), low + BOX_HEIGHT
     down = [(right, high), (right, middle - 10), (LEFT + 28.0, middle - 10), (LEFT + 28.0, low - 1.5)]
-    bottom = low + BOX_HEIGHT
-    words = ["encoder"] if design.output_encoder.counts_per_rev is None else ["encoder", "output encoder"]
+    has_output = design.output_encoder.counts_per_rev is not None
+    words = "measured: current, encoder" + ", output encoder" * has_output
     return [
-        _line(down, arrow=True),
+        _arrow(down),
         _words(WIDTH / 2, middle - 15, "voltage", 9.5, colour="muted"),
-        _words(
-            WIDTH / 2, bottom + 24, f"measured: current, {', '.join(words)}", 9.5, colour="muted", most=80
-        ),
+        _words(WIDTH / 2, bottom + 24, words, 9.5, colour="muted", most=80),
     ]
 
 
-def _line(points: Sequence[tuple[float, float]], *, arrow: bool) -> str:
-    path = "M" + "L".join(f"{x:.1f} {y:.1f}" for x, y in points)
+def _arrow(points: Sequence[tuple[float, float]]) -> str:
     (x0, y0), (x, y) = points[-2], points[-1]
-    head = ""
-    if arrow:
-        dx, dy = (5.0, 0.0) if y == y0 and x > x0 else (0.0, 5.0)
-        sides = [(x - dx + way * dy / 1.6, y - dy + way * dx / 1.6) for way in (-1, 1)]
-        head = "M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in (sides[0], (x, y), sides[1]))
-    return f'<path d="{path}{head}" fill="none" stroke="{COLOURS["ink"]}" stroke-width="1.2"/>'
+    dx, dy = (5.0, 0.0) if y == y0 and x > x0 else (0.0, 5.0)
+    sides = [(x - dx + way * dy / 1.6, y - dy + way * dx / 1.6) for way in (-1, 1)]
+    lines = (points, (sides[0], (x, y), sides[1]))
+    path = "".join("M" + "L".join(f"{a:.1f} {b:.1f}" for a, b in line) for line in lines)
+    return f'<path d="{path}" fill="none" stroke="{COLOURS["ink"]}" stroke-width="1.2"/>'
 
 
 def _words(

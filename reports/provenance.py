@@ -32,12 +32,7 @@ def provenance(design_hash: str | None = None) -> Tree:
     """Collect what is needed to build the same report again.
 
     The time is that of ``SOURCE_DATE_EPOCH`` where it is set (seconds since 1970, UTC), so that the same
-    input gives the same bytes.
-
-    Raises
-    ------
-    InputError
-        If ``SOURCE_DATE_EPOCH`` is no number.
+    input gives the same bytes; an InputError where it is no number.
     """
     return {
         "version": package_version(),
@@ -51,7 +46,6 @@ def provenance(design_hash: str | None = None) -> Tree:
 
 
 def build_time() -> str:
-    """Give the time of the build in UTC, ISO 8601, whole seconds."""
     text = os.environ.get("SOURCE_DATE_EPOCH")
     if text is None:
         return datetime.now(UTC).isoformat(timespec="seconds")

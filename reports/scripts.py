@@ -35,7 +35,6 @@ def bundled(*entries: str) -> str:
 
 
 def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
-    """Add a module behind those that it imports."""
     if name in above:
         raise ValueError(f"scripts import each other: {' -> '.join([*above, name])}")
     if name in made:
@@ -45,9 +44,8 @@ def _take(name: str, made: dict[str, str], above: tuple[str, ...]) -> None:
     for _, other in wanted:
         _take(other, made, (*above, name))
     taken = "".join(f"const {{ {names} }} = {other}$;\n" for names, other in wanted)
+    given = ", ".join(own for _, own in EXPORT.findall(text))
     if library := GIVEN.search(text):
         given = re.sub(r"([\w$]+) as (\w+)", r"\2: \1", library[1])
-    else:
-        given = ", ".join(name for _, name in EXPORT.findall(text))
     body = ASIDE.sub("", GIVEN.sub("", EXPORT.sub(r"\1 \2", IMPORT.sub("", text))))
     made[name] = f"const {name}$ = (() => {{\n{taken}{body}return {{ {given} }};\n}})();\n"

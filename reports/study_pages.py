@@ -17,7 +17,6 @@ from reports.sections import parameters
 def study_document(
     design: Design, sections: Sequence[doc.Section], *, title: str, subtitle: str, kind: str
 ) -> Document:
-    """Put a document of a study of a design together."""
     head, origin = design_head(design), provenance(design_hash(design))
     parts = [*sections, parameters.provenance(head, origin)]
     return doc.document(

@@ -45,7 +45,6 @@ class Brief:
 
 
 def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
-    """Print the tables and verdicts among the blocks; figures are for pages."""
     out = console()
     for block in blocks:
         if isinstance(block, SideBySide):
@@ -92,7 +91,10 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
     elif block["kind"] == "facts":
-        out.print(fact_table(block))
+        facts = Table.grid(padding=(0, 2))
+        for item in block["items"]:
+            facts.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
+        out.print(facts)
     elif block["kind"] == "text":
         out.print(Text(block["text"]))
     elif block["kind"] == "details":
@@ -114,13 +116,6 @@ def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Ta
         made.add_column(Text(label), justify=column["align"], min_width=least)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
-    return made
-
-
-def fact_table(block: Mapping[str, Any]) -> Table:
-    made = Table.grid(padding=(0, 2))
-    for item in block["items"]:
-        made.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
     return made
 
 
@@ -150,24 +145,17 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
 
-def _names(side: SideBySide) -> list[str]:
-    """The rows of the blocks: each becomes a column."""
-    rows = {str(row[block["columns"][0]["key"]]): None for block in side.blocks for row in block["rows"]}
-    return list(rows)
-
-
 def _one_by_one(side: SideBySide) -> Text:
     """Write the columns of a side by side table one below the other, a figure after the other."""
+    cells: dict[str, list[tuple[Mapping[str, Any], Any]]] = {}
+    for block in side.blocks:
+        first, *others = block["columns"]
+        for row in block["rows"]:
+            cells.setdefault(str(row[first["key"]]), []).extend((one, row.get(one["key"])) for one in others)
     text = Text().append(side.title, style="bold")
-    for name in _names(side):
+    for name, said in cells.items():
         text.append(f"\n{name}: ")
-        rows = [
-            (block["columns"][1:], row)
-            for block in side.blocks
-            for row in block["rows"]
-            if str(row[block["columns"][0]["key"]]) == name
-        ]
-        _list(text, ((column, row.get(column["key"])) for columns, row in rows for column in columns))
+        _list(text, said)
     return text.append("\n")
 
 
@@ -175,7 +163,8 @@ def _side_by_side(side: SideBySide) -> Table:
     """Lay tables of the same rows out as one: a line a figure, a column a row of the blocks."""
     made = _empty(side.title)
     made.add_column("")
-    for name in _names(side):
+    rows = (str(row[block["columns"][0]["key"]]) for block in side.blocks for row in block["rows"])
+    for name in dict.fromkeys(rows):
         made.add_column(Text(name), justify="right")
     for block in side.blocks:
         for column in block["columns"][1:]:
@@ -196,16 +185,10 @@ def verdict_table(block: Mapping[str, Any]) -> Mapping[str, Any]:
     rows = []
     for item in block["items"]:
         colour, because = role(item), f" ({why(item)})" if why(item) else ""
-        rows.append(
-            {
-                "label": item["label"],
-                "word": {"text": f"{SIGNS[colour]} {item['verdict']}{because}", "status": colour},
-                "found": show(item["value"]),
-                "limit": f"{item['comparison']} {show(item['limit'])}",
-                "distance": show_signed(item["distance"]),
-                "unit": item["unit"],
-            }
-        )
+        word = {"text": f"{SIGNS[colour]} {item['verdict']}{because}", "status": colour}
+        limit = f"{item['comparison']} {show(item['limit'])}"
+        found, distance = show(item["value"]), show_signed(item["distance"])
+        rows.append((item["label"], word, found, limit, distance, item["unit"]))
     caption = block.get("what", "requirements").capitalize()
     return doc.table(caption, [*columns, doc.column("unit", "Unit")], rows)
 

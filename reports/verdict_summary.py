@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any, cast
 
 from actuator_lti.asked.verdict import Role, Tally, Verdict
-from reports.document_schema import Block, Counts, Finding, VerdictItem
+from reports.document_schema import Block, Counts, Finding
 from reports.document_schema import Verdict as Overall
 
 WORDS = {
@@ -45,11 +45,12 @@ def why(item: Mapping[str, Any]) -> str:
 
 def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
     """Count the verdicts of some blocks, each kind by itself."""
-    kinds: dict[str, list[VerdictItem]] = {}
+    kinds: dict[str, Tally] = {}
     for block in blocks:
-        if block["kind"] == "verdicts":
-            kinds.setdefault(block.get("what", "requirements"), []).extend(block["items"])
-    return {what: tally(items) for what, items in kinds.items() if items}
+        if block["kind"] == "verdicts" and block["items"]:
+            what = block.get("what", "requirements")
+            kinds[what] = kinds.get(what, Tally()) + tally(block["items"])
+    return kinds
 
 
 def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
@@ -66,10 +67,9 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
     parts |= counted(block for part in sections for block in walk(part))
     whole = sum(parts.values(), Tally())
     silent = [part for part in sections if report and part["status"] == "fail" and not missed(part)]
-    first = [part["title"] for part in silent if part["id"] == "answer"]  # it gathers what the others say
-    failed = [part["title"] for part in silent if part["id"] != "answer"]
+    failed = [part["title"] for part in silent if part["id"] != "answer"]  # which gathers what they say
     if not failed and not whole.not_met:
-        failed = first
+        failed = [part["title"] for part in silent]
     open_ones = [part["title"] for part in sections if report and part.get("verdict") == Verdict.NOT_PROVEN]
     sections_too = Tally(not_met=len(failed), not_proven=len(open_ones))
     made: Overall = {
@@ -88,15 +88,28 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
         yield from walk(block)
 
 
+def open_items(sections: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Name what is not met, or not proven and not waived, with the reason or with value and limit."""
+    blocks = [block for part in sections for block in walk(part) if block["kind"] == "verdicts"]
+    items = [item for block in blocks for item in block["items"] if role(item) in ("fail", "warn")]
+    items.sort(key=lambda item: role(item) != "fail")
+    return list(dict.fromkeys(f"{item['verdict']}: {item['label']}{_found(item)}" for item in items))
+
+
+def _found(item: Mapping[str, Any]) -> str:
+    if item["value"] is None or item["limit"] is None:
+        return f": {item['reason']}" if item["reason"] else ""
+    return f": {item['value']:.4g}, limit {item['comparison']} {item['limit']:g} {item['unit']}".rstrip()
+
+
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
     """Collect the findings that sections carry, each once: the gravest first, of every section in turn."""
     every = [item for part in sections for item in part.get("findings", ())]
-    apart = {(item["severity"], item["text"], item["where"]): item for item in every}
     before: Counter[tuple[str, str]] = Counter()
     turns: list[tuple[int, int, Finding]] = []
-    for (severity, _, where), item in apart.items():
-        turns.append((SEVERITIES.index(severity), before[severity, where], item))
-        before[severity, where] += 1
+    for item in {(one["severity"], one["text"], one["where"]): one for one in every}.values():
+        turns.append((SEVERITIES.index(item["severity"]), before[item["severity"], item["where"]], item))
+        before[item["severity"], item["where"]] += 1
     return [item for *_, item in sorted(turns, key=lambda one: one[:2])]
 
 

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES
 from actuator_lti.drive.facts import capability
 from actuator_lti.errors import InputError
-from actuator_lti.loops.stiffness import stiffness_figures
+from actuator_lti.loops.stiffness import StiffnessFigures
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
 
-_SOURCES = {"capability": capability, "stiffness": stiffness_figures}
+_SOURCES = {"capability": capability, "stiffness": StiffnessFigures}
 
 
 def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import cmath
 import math
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import flint
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.bandwidth.exact_gain import exact_gain
 from actuator_lti.bandwidth.measured import measured_bandwidth
+from actuator_lti.bandwidth.rational_response import RationalResponse
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
 from actuator_lti.errors import InputError
 from actuator_lti.margins.along import Along
@@ -25,13 +27,12 @@ from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
 from actuator_lti.systems.delay_response import DelayResponse
-from actuator_lti.systems.exact_fraction import Fraction, dc_noise, double, exact_fraction, shown
+from actuator_lti.systems.exact_fraction import Fraction, dc_noise, exact_fraction, shown
 from actuator_lti.systems.measured_response import is_measured
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
 
 _FLOOR = 1e-6  # of the gain at zero frequency: the phase is followed down to it
-_PEAKS = (MODULUS, COMPLEMENTARY)
 _TAKEN = flint.fmpq(1, 1000)
 _AT_NYQUIST = 1e8  # of the largest root: next to nothing is left of the half circle
 _NEAR = 1e-4  # relative: a crossing of the factors and one of the loop
@@ -71,28 +72,22 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
             return _of_delays(system, delay_s, level)
         system = system.to_state_space()
     system = _without_rest_mode(system)
-    loop = rational_loop(system)
-    fraction = exact_fraction(system)
+    loop, fraction = rational_loop(system), exact_fraction(system)
     seen = shown(fraction, loop)
-    gain = exact_gain(seen, loop.in_z)
-    if gain is None:
+    response = RationalResponse.of(seen, loop.in_z)
+    if response is None:
         raise InputError(_POLE)
     if seen is not fraction:
         at = 1 if loop.in_z else 0
-        if _taken(fraction, gain.dc, at):
+        if _taken(fraction, response.dc, at):
             raise InputError(_NO_GAIN)
-        if _told(given_of(system), gain.dc, at):
-            gain = exact_gain(fraction, loop.in_z) or gain
-    if abs(double(gain.dc)) <= dc_noise(loop):
+        if _told(given_of(system), response.dc, at):
+            response = RationalResponse.of(fraction, loop.in_z) or response
+    if abs(response.lead) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
-    peak, place = gain.largest()
-    turned = gain.first_turn(_FLOOR**2)
-    turn = None if turned is None else unwarped(turned, loop.period_s)
-    if delay_s:
-        turn = first_turn(loop, delay_s, _FLOOR * abs(double(gain.dc)))
-    crossings = [unwarped(w, loop.period_s) for w in gain.crossings(SQUARES[level])]
-    return _bandwidth(crossings, turn, 20.0 * math.log10(peak) if peak < math.inf else peak,
-                      unwarped(place, loop.period_s), double(gain.dc), level)  # fmt: skip
+    floor = _FLOOR * abs(response.lead)
+    turn = first_turn(loop, delay_s, floor) if delay_s else response.first_turn(floor)
+    return _bandwidth(response, turn, level, loop.period_s)
 
 
 def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
@@ -120,31 +115,29 @@ def _without_rest_mode(system: Any) -> Any:
     return system if kept.all() else PlainSystem(A, B, C, system.D, system.dt)
 
 
+def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
+    response = DelayResponse.of(delay_form(system, delay_s))
+    if response.order:
+        raise InputError(_POLE if response.order > 0 else _NO_GAIN)
+    return _bandwidth(response, response.first_turn(_FLOOR * abs(response.lead)), level, None)
+
+
 def _bandwidth(
-    crossings: list[float], turn: float | None, resonance_db: float, place: float, dc: float, level: Level
+    response: RationalResponse | DelayResponse, turn_w: float | None, level: Level, period_s: float | None
 ) -> Bandwidth:
+    dc = abs(response.lead)
+    crossings = [unwarped(w, period_s) for w in response.crossings(dc * math.sqrt(SQUARES[level]))]
+    least, place = response.smallest(INVERSE)
+    peak_db = _db(least * dc)
     return Bandwidth(
         minus3db_rad_s=crossings[0] if crossings else None,
-        minus90deg_rad_s=turn,
-        resonance_peak_db=resonance_db if resonance_db > 1e-9 else 0.0,
-        resonance_rad_s=place if resonance_db > 1e-9 else 0.0,
-        dc_gain=dc,
+        minus90deg_rad_s=None if turn_w is None else unwarped(turn_w, period_s),
+        resonance_peak_db=peak_db if peak_db > 1e-9 else 0.0,
+        resonance_rad_s=unwarped(place, period_s) if peak_db > 1e-9 else 0.0,
+        dc_gain=response.lead,
         definition=level,
         crossings_rad_s=tuple(crossings),
     )
-
-
-def _of_delays(system: Any, delay_s: float, level: Level) -> Bandwidth:
-    response = DelayResponse.of(delay_form(system, delay_s))
-    if response.order > 0:
-        raise InputError(_POLE)
-    if response.order:
-        raise InputError(_NO_GAIN)
-    dc = response.lead
-    falls = response.crossings(abs(dc) * math.sqrt(SQUARES[level]))
-    least, place = response.smallest(INVERSE)
-    peak_db = -20.0 * math.log10(least * abs(dc)) if least > 0.0 else math.inf
-    return _bandwidth(falls, response.first_turn(_FLOOR * abs(dc)), peak_db, place, dc, level)
 
 
 def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
@@ -161,40 +154,35 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
         raise InputError(
             "measured data: the peak of S is 1 over stability_margins(L).modulus_margin, in its range"
         )
-    inner = hasattr(system, "delays_s") and system.delays_s.size > 0
-    given = None if inner else given_of(system.to_state_space() if hasattr(system, "delays_s") else system)
-    whole = whole_samples(delay_s / given.period_s) if given is not None and given.period_s else 0
-    if given is None or (delay_s and given.period_s is None):
-        form = delay_form(system, delay_s) if given is None else in_series(loop_of(given), delay_s)
-        response = DelayResponse.of(form)
-        result = [response.smallest(distance) for distance in _PEAKS]
-    elif whole is None:
-        result = nearest_behind_delay(loop_of(given, warp=True), delay_s, _PEAKS)
-        result = [(value, unwarped(w, given.period_s)) for value, w in result]
-    else:
-        loop = exact_loop(replace(given, samples=whole))
-        result = [smallest(loop, distance) for distance in _PEAKS]
-        result = [(value, unwarped(w, given.period_s)) for value, w in result]
-    (s_value, s_place), (t_value, t_place) = result
-    return Peaks(_db(s_value), s_place, _db(t_value), t_place)
+    if hasattr(system, "delays_s") and not system.delays_s.size:
+        system = system.to_state_space()
+    if hasattr(system, "delays_s"):
+        return _peaks(DelayResponse.of(delay_form(system, delay_s)).smallest, None)
+    given = given_of(system)
+    period_s = given.period_s
+    if delay_s and period_s is None:
+        return _peaks(DelayResponse.of(in_series(loop_of(given), delay_s)).smallest, None)
+    whole = whole_samples(delay_s / period_s) if period_s else 0
+    if whole is None:
+        late = loop_of(given, warp=True).behind(delay_s)
+        with np.errstate(all="ignore"):
+            along = Along(factored(late), late, None)
+        return _peaks(lambda distance: along.nearest((distance,))[0], period_s)
+    loop = exact_loop(replace(given, samples=whole))
+    return _peaks(partial(smallest, loop.N, loop.D), period_s)
+
+
+def _peaks(smallest_of: Callable[[Distance], tuple[float, float]], period_s: float | None) -> Peaks:
+    (s_value, s_w), (t_value, t_w) = smallest_of(MODULUS), smallest_of(COMPLEMENTARY)
+    return Peaks(_db(s_value), unwarped(s_w, period_s), _db(t_value), unwarped(t_w, period_s))
 
 
 def _db(inverse: float) -> float:
     return 0.0 - 20.0 * math.log10(inverse) if inverse > 0.0 else math.inf
 
 
-def nearest_behind_delay(
-    loop: RationalLoop, delay_s: float, distances: tuple[Distance, ...]
-) -> list[tuple[float, float]]:
-    """Smallest values of distances, each with its w; `Doubtful` where they could not be checked."""
-    late = loop.behind(delay_s)
-    factors = factored(late)
-    with np.errstate(all="ignore"):
-        return Along(factors, late, None).nearest(distances)
-
-
 def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None:
-    """Where the phase first falls to 90 deg below that at zero frequency; ``None``: not above the floor."""
+    """The w at which the phase first falls to 90 deg below that at rest; ``None``: not above the floor."""
     late = loop.behind(delay_s)
     factors = factored(late)
     with np.errstate(all="ignore"):
@@ -214,4 +202,4 @@ def first_turn(loop: RationalLoop, delay_s: float, floor: float) -> float | None
 
         near = float(turns[0])
         w = brentq(beyond, near * (1.0 - _NEAR), near * (1.0 + _NEAR), xtol=1e-300, rtol=1e-14)
-        return late.frequency(float(w))
+        return float(w)

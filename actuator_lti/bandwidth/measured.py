@@ -13,7 +13,6 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
 from actuator_lti.margins.measured.margins import (
-    Group,
     between,
     measured_points,
     passed,
@@ -34,15 +33,6 @@ class _Rest:
     note: str
 
 
-@dataclass(frozen=True)
-class _Passage:
-    """Where a level is first passed for sure, and from where on it may have been."""
-
-    at: float | None
-    within: Range | None
-    all: tuple[float, ...]
-
-
 def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     """Bandwidths from `control.FrequencyResponseData` or `MeasuredResponse` of a closed loop T.
 
@@ -60,22 +50,22 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     refuse_coarse(omega, T, result)
     rest = _at_rest(response, omega, T, result)
     gain = _relative(result.log_gain, rest)
-    falls = _first_fall(omega, gain, 0.5 * math.log(SQUARES[level]))
+    falls, fall_range = _falls(omega, gain, 0.5 * math.log(SQUARES[level]))
     start = 0.0 if rest.sign > 0.0 else math.copysign(math.pi, float(np.angle(T[0])))
-    turns = _first_fall(omega, result.phase, start - 0.5 * math.pi)
+    turns, turn_range = _falls(omega, result.phase, start - 0.5 * math.pi)
     k = int(gain.middle.argmax())
     peak = max(float(gain.middle[k]), 0.0)
     largest = float(np.log(np.maximum(np.abs(T) - at_once(radius), 1e-300)).max()) - rest.log_gain - rest.up
     return Bandwidth(
-        minus3db_rad_s=falls.at,
-        minus90deg_rad_s=turns.at,
+        minus3db_rad_s=falls[0] if falls else None,
+        minus90deg_rad_s=turns[0] if turns else None,
         resonance_peak_db=_db(peak),
         resonance_rad_s=float(omega[k]) if peak else 0.0,
         dc_gain=rest.sign * math.exp(rest.log_gain),
         definition=level,
-        crossings_rad_s=falls.all,
-        minus3db_range_rad_s=falls.within,
-        minus90deg_range_rad_s=turns.within,
+        crossings_rad_s=falls,
+        minus3db_range_rad_s=fall_range,
+        minus90deg_range_rad_s=turn_range,
         resonance_range_db=(_db(max(largest, 0.0)), _db(max(float(gain.high.max()), 0.0))),
         notes=(rest.note, *_coarse(omega, result), f"noise: {response.source or 'none'}"),
     )
@@ -117,20 +107,15 @@ def _relative(strip: Strip, rest: _Rest) -> Strip:
     )
 
 
-def _first_fall(omega: Real, strip: Strip, level: float) -> _Passage:
+def _falls(omega: Real, strip: Strip, level: float) -> tuple[tuple[float, ...], Range | None]:
+    """Where a level is passed for sure, and the range of the first: from where on it may have been."""
     groups = single_passages(strip, level)
     sure = [(group, at) for group in groups if (at := passed(strip, level, group)) is not None]
     if not sure:
-        return _Passage(None, None, ())
-    low, high = _frequency(omega, groups[0], 0), _frequency(omega, sure[0][0], -1)
-    crossings = tuple(between(omega, k, t) for _, (k, t) in sure)
-    return _Passage(crossings[0], (low, high), crossings)
-
-
-def _frequency(omega: Real, group: Group, end: int) -> float:
-    """Where a group begins (0) or ends (-1)."""
-    k, t = (group.last, group.t1[-1]) if end else (group.first, group.t0[0])
-    return between(omega, k, float(t))
+        return (), None
+    first, last = groups[0], sure[0][0]
+    low, high = between(omega, first.first, float(first.t0[0])), between(omega, last.last, float(last.t1[-1]))
+    return tuple(between(omega, k, t) for _, (k, t) in sure), (low, high)
 
 
 def _coarse(omega: Real, result: Bounds) -> tuple[str, ...]:

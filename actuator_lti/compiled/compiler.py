@@ -68,10 +68,9 @@ def compiler_for(target: str) -> list[str]:
     InputError
         Where this machine has none; says which package brings one.
     """
-    native = target == "linux64" and HERE == "linux-x86_64"
-    wanted = "gcc or clang, or " if target == "linux64" else ""
-    allowed = f"{wanted}pip install 'actuator-lti[export]'"
-    own = native and (zig_command() is None or bool(os.environ.get("CC")))
+    allowed = f"{'gcc or clang, or ' if target == 'linux64' else ''}pip install 'actuator-lti[export]'"
+    own = target == "linux64" and HERE == "linux-x86_64"
+    own = own and (zig_command() is None or bool(os.environ.get("CC")))
     return _chosen(target, ["-target", ZIG_TARGETS[target]], allowed, own=own)
 
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from actuator_lti.compiled.kinds import Function, named, stored
+from actuator_lti.compiled.kinds import named, stored
 
 _COMPARE: dict[type, Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
@@ -33,67 +33,109 @@ class Form:
         """Whether a row holds the known numbers, in C."""
         return " && ".join(f"{self.row}[{place}] == {value!r}" for place, value in self.known.items())
 
+    def look(self, row: str, place: int) -> float | None:
+        """The known number at a place of a row."""
+        return self.known.get(place) if row == self.row else None
+
 
 class Known(ast.NodeTransformer):
-    """Puts the known numbers of a form into a function, and takes out what they decide."""
+    """Puts known numbers into a function, and takes out what they decide.
 
-    def __init__(self, form: Form, function: Function) -> None:
-        self.form, self.function = form, function
-        names = stored(function.tree)
-        self.once = {name for name in names if names.count(name) == 1}
-        self.told: dict[str, bool] = {}  # variables that are a known test
+    ``look`` gives the number at a place of a row, or None.
+    """
+
+    kept: tuple[type, ...] = (bool,)  # of a variable assigned once, a known value of this kind is followed
+
+    def __init__(
+        self, tree: ast.FunctionDef, scope: Mapping[str, Any], look: Callable[[str, int], float | None]
+    ) -> None:
+        names, self.scope, self.look = stored(tree), scope, look
+        arguments = {argument.arg for argument in tree.args.args}
+        self.local = {*names, *arguments}
+        self.once = {name for name in names if names.count(name) == 1} - arguments
+        self.known: dict[str, Any] = {}
+
+    def block(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
+        """Statements that are left; none behind a return."""
+        result: list[ast.stmt] = []
+        for node in nodes:
+            left = self.visit(node)
+            result += left if isinstance(left, list) else [] if left is None else [left]
+            if result and isinstance(result[-1], ast.Return):
+                break
+        return [ast.fix_missing_locations(each) for each in result]
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
-        return ast.copy_location(ast.Constant(self.told[node.id]), node) if node.id in self.told else node
+        there = isinstance(node.ctx, ast.Load) and node.id in self.known
+        return ast.Constant(self.known[node.id]) if there else node
 
-    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        place = named(node.slice, self.function.scope)
-        row = isinstance(node.value, ast.Name) and node.value.id == self.form.row
-        if row and type(place) is int and place in self.form.known:
-            return ast.copy_location(ast.Constant(self.form.known[place]), node)
-        return self.generic_visit(node)
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        place = self.visit(node.slice)
+        row = node.value.id if isinstance(node.value, ast.Name) else ""
+        at = place.value if isinstance(place, ast.Constant) else named(place, self.scope)
+        if isinstance(node.ctx, ast.Load) and type(at) is int and ast.unparse(place) not in self.local:
+            value = self.look(row, at)
+            if value is not None:
+                return ast.Constant(value)
+        return ast.copy_location(ast.Subscript(node.value, place, node.ctx), node)
 
-    def visit_Assign(self, node: ast.Assign) -> ast.stmt | None:
+    def visit_Assign(self, node: ast.Assign) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)
-        target, value = node.targets[0], value_of(node.value, self._number)
-        if isinstance(target, ast.Name) and target.id in self.once and isinstance(value, bool):
-            self.told[target.id] = value
-            return None
-        return node
+        return None if self.told(node.targets[0], node.value) else node
 
-    def visit_If(self, node: ast.If) -> ast.AST | list[ast.stmt]:
-        node.test = self.visit(node.test)
-        value = value_of(node.test, self._number)
-        if value is None:
-            return self.generic_visit(node)
-        kept = ast.Module(node.body if value else node.orelse, [])
-        return list(self.generic_visit(kept).body)  # type: ignore[attr-defined]
+    def told(self, target: ast.expr, value: ast.expr) -> bool:
+        """Note a variable that is assigned here alone, and known."""
+        if not (isinstance(target, ast.Name) and target.id in self.once and isinstance(value, ast.Constant)):
+            return False
+        if isinstance(value.value, self.kept):
+            self.known[target.id] = value.value
+        return target.id in self.known
 
-    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
-        self.generic_visit(node)
-        value = value_of(node.test, self._number)
-        return node if value is None else node.body if value else node.orelse
+    def visit_If(self, node: ast.If) -> list[ast.stmt]:
+        test = self.visit(node.test)
+        if isinstance(test, ast.Constant):
+            return self.block(node.body if test.value else node.orelse)
+        body, orelse = self.block(node.body), self.block(node.orelse)
+        if not body and not orelse:
+            return []
+        if not body:
+            test, body, orelse = self.visit(ast.UnaryOp(ast.Not(), test)), orelse, []
+        return [ast.copy_location(ast.If(test, body, orelse), node)]
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
+        test = self.visit(node.test)
+        if isinstance(test, ast.Constant):
+            chosen: ast.expr = self.visit(node.body if test.value else node.orelse)
+            return chosen
+        return ast.copy_location(ast.IfExp(test, self.visit(node.body), self.visit(node.orelse)), node)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
+        inner = self.visit(node.operand)
+        if isinstance(inner, ast.Constant):
+            return ast.Constant(not inner.value if isinstance(node.op, ast.Not) else -number(inner))
+        return ast.copy_location(ast.UnaryOp(node.op, inner), node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        ends = isinstance(node.op, ast.Or)
+        values = [self.visit(each) for each in node.values]
+        if any(isinstance(each, ast.Constant) and bool(each.value) is ends for each in values):
+            return ast.Constant(ends)
+        rest = [each for each in values if not isinstance(each, ast.Constant)]
+        return ast.BoolOp(node.op, rest) if len(rest) > 1 else rest[0] if rest else ast.Constant(not ends)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.expr:
+        sides = [self.visit(each) for each in (node.left, *node.comparators)]
+        worth = [each.value if isinstance(each, ast.Constant) else self._number(each) for each in sides]
+        if len(sides) == 2 and None not in worth and type(node.ops[0]) in _COMPARE:
+            return ast.Constant(_COMPARE[type(node.ops[0])](*worth))
+        return ast.copy_location(ast.Compare(sides[0], node.ops, sides[1:]), node)
 
     def _number(self, node: ast.expr) -> Any:
-        """A named number of another module."""
-        value = named(node, self.function.scope) if isinstance(node, ast.Attribute) else None
+        """A named number of another module; None for anything else."""
+        value = named(node, self.scope) if isinstance(node, ast.Attribute) else None
         return value if type(value) in (int, float) else None
 
 
-def value_of(node: ast.expr, look: Callable[[ast.expr], Any]) -> Any:
-    """What an expression is worth as far as ``look`` knows its parts; None where it does not."""
-    if isinstance(node, ast.Constant):
-        return node.value
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
-        inner = value_of(node.operand, look)
-        return None if inner is None else not inner
-    if isinstance(node, ast.BoolOp):
-        values = [value_of(each, look) for each in node.values]
-        decides = isinstance(node.op, ast.Or)
-        if any(value is not None and bool(value) is decides for value in values):
-            return decides
-        return None if None in values else not decides
-    if isinstance(node, ast.Compare) and len(node.ops) == 1 and type(node.ops[0]) in _COMPARE:
-        left, right = value_of(node.left, look), value_of(node.comparators[0], look)
-        return None if left is None or right is None else _COMPARE[type(node.ops[0])](left, right)
-    return look(node)
+def number(node: ast.Constant) -> Any:
+    """The number that a constant is."""
+    return node.value

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import inspect
+import textwrap
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -66,6 +68,13 @@ class Function:
         """Refuse a place in the source where something does not hold."""
         if not holds:
             raise self.error(node, text)
+
+
+def tree_of(python: Any) -> ast.FunctionDef:
+    """A function's text as a tree."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(python))).body[0]
+    assert isinstance(tree, ast.FunctionDef)
+    return tree
 
 
 def named(node: ast.AST, scope: Mapping[str, Any]) -> Any:

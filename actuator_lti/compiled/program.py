@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 from actuator_lti.compiled.expressions import Constant, Expressions
 from actuator_lti.compiled.form import Form, Known
 from actuator_lti.compiled.kernel import is_seldom
-from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name
+from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name, tree_of
 from actuator_lti.compiled.statements import INDENT, Statements, result_type
 
 _INCLUDES = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
@@ -139,9 +138,7 @@ class Collector:
 
     def parsed(self, python: Any, kinds: list[Kind]) -> Function:
         """A function with its text."""
-        lines, first = inspect.getsourcelines(python)
-        tree = ast.parse(textwrap.dedent("".join(lines))).body[0]
-        assert isinstance(tree, ast.FunctionDef)
+        tree, first = tree_of(python), inspect.getsourcelines(python)[1]
         names = [argument.arg for argument in tree.args.args]
         file, scope = Path(inspect.getsourcefile(python) or "?").name, python.__globals__
         given, own = dict(zip(names, kinds, strict=False)), (python.__name__, python.__module__)
@@ -196,7 +193,7 @@ class _Formed(Collector):
 
     def parsed(self, python: Any, kinds: list[Kind]) -> Function:
         function = super().parsed(python, kinds)
-        Known(self.form, function).visit(function.tree)
+        function.tree.body = Known(function.tree, function.scope, self.form.look).block(function.tree.body)
         return function
 
     def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:

@@ -10,16 +10,15 @@ import ast
 import inspect
 import math
 import operator
-import textwrap
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any
 
-from actuator_lti.compiled.form import value_of
+from actuator_lti.compiled.form import Known
 from actuator_lti.compiled.kernel import is_kernel
-from actuator_lti.compiled.kinds import named, stored
+from actuator_lti.compiled.kinds import named, stored, tree_of
 from actuator_lti.compiled.statements import overlap, without_docstring
 
 SHORT = 16  # rounds of a loop that is written out
@@ -61,7 +60,7 @@ class Residual:
         known = dict(known or {})
         key = (python, *((name, repr(value)) for name, value in sorted(known.items())))
         if key not in self._done:
-            tree = _tree(python)
+            tree = tree_of(python)
             names = [argument.arg for argument in tree.args.args]
             left = Leftover(python.__name__, python, tree, tuple(names), known)
             body = _Body(self, left).block(without_docstring(tree.body))
@@ -83,32 +82,16 @@ class Residual:
         return left
 
 
-def _tree(python: Any) -> ast.FunctionDef:
-    tree = ast.parse(textwrap.dedent(inspect.getsource(python))).body[0]
-    assert isinstance(tree, ast.FunctionDef)
-    return tree
-
-
-class _Body(ast.NodeTransformer):
+class _Body(Known):
     """The statements of one function, with what is known in them."""
 
-    def __init__(self, residual: Residual, left: Leftover) -> None:
-        self.residual, self.left = residual, left
-        self.scope = left.python.__globals__
-        names = stored(left.tree)
-        self.local = {*names, *left.arguments}
-        self.once = {name for name in names if names.count(name) == 1} - set(left.arguments)
-        self.known: dict[str, Any] = {k: v for k, v in left.known.items() if k not in names}
+    kept = (int, float)
 
-    def block(self, nodes: list[ast.stmt]) -> list[ast.stmt]:
-        """Statements that are left; none behind a return."""
-        result: list[ast.stmt] = []
-        for node in nodes:
-            left = self.visit(node)
-            result += left if isinstance(left, list) else [left]
-            if result and isinstance(result[-1], ast.Return):
-                break
-        return [ast.fix_missing_locations(each) for each in result]
+    def __init__(self, residual: Residual, left: Leftover) -> None:
+        super().__init__(left.tree, left.python.__globals__, residual.look)
+        self.residual, self.left = residual, left
+        written = stored(left.tree)
+        self.known |= {name: value for name, value in left.known.items() if name not in written}
 
     # --- statements --------------------------------------------------------------------------------
 
@@ -116,34 +99,16 @@ class _Body(ast.NodeTransformer):
         target, value = node.targets[0], self.visit(node.value)
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple) and not overlap(target, value):
             pairs = zip(target.elts, value.elts, strict=True)
-            return [ast.Assign([self.visit(t)], v, lineno=0) for t, v in pairs if not self._told(t, v)]
-        if len(node.targets) == 1 and self._told(target, value):
+            return [ast.Assign([self.visit(t)], v, lineno=0) for t, v in pairs if not self.told(t, v)]
+        if len(node.targets) == 1 and self.told(target, value):
             return []
         return [ast.Assign([self.visit(each) for each in node.targets], value, lineno=0)]
-
-    def _told(self, target: ast.expr, value: ast.expr) -> bool:
-        """Note a variable that is assigned here alone, and known."""
-        if not (isinstance(target, ast.Name) and target.id in self.once and isinstance(value, ast.Constant)):
-            return False
-        self.known[target.id] = value.value
-        return True
 
     def visit_AugAssign(self, node: ast.AugAssign) -> list[ast.stmt]:
         value = self.visit(node.value)
         if isinstance(node.op, ast.Add | ast.Sub) and _is(value, 0.0):
             return []
         return [ast.AugAssign(self.visit(node.target), node.op, value)]
-
-    def visit_If(self, node: ast.If) -> list[ast.stmt]:
-        test = self.visit(node.test)
-        if isinstance(test, ast.Constant):
-            return self.block(node.body if test.value else node.orelse)
-        body, orelse = self.block(node.body), self.block(node.orelse)
-        if not body and not orelse:
-            return []
-        if not body:
-            return [ast.If(self.visit(ast.UnaryOp(ast.Not(), test)), orelse, [])]
-        return [ast.If(test, body, orelse)]
 
     def visit_For(self, node: ast.For) -> list[ast.stmt]:
         assert isinstance(node.iter, ast.Call)
@@ -191,47 +156,11 @@ class _Body(ast.NodeTransformer):
         value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
         return ast.Constant(value) if type(value) in (int, float) else node
 
-    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
-        place = self.visit(node.slice)
-        row = node.value.id if isinstance(node.value, ast.Name) else ""
-        if isinstance(node.ctx, ast.Load) and isinstance(place, ast.Constant):
-            value = self.residual.look(row, number(place))
-            if value is not None:
-                return ast.Constant(value)
-        return ast.Subscript(node.value, place, node.ctx)
-
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         left, right, kind = self.visit(node.left), self.visit(node.right), type(node.op)
         if isinstance(left, ast.Constant) and isinstance(right, ast.Constant) and kind in _FOLD:
             return ast.Constant(_FOLD[kind](left.value, right.value))
         return _shorter(left, kind, right) or ast.BinOp(left, node.op, right)
-
-    def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.expr:
-        inner = self.visit(node.operand)
-        if isinstance(inner, ast.Constant):
-            return ast.Constant(not inner.value if isinstance(node.op, ast.Not) else -number(inner))
-        return ast.UnaryOp(node.op, inner)
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
-        ends = isinstance(node.op, ast.Or)
-        values = [self.visit(each) for each in node.values]
-        if any(isinstance(each, ast.Constant) and bool(each.value) is ends for each in values):
-            return ast.Constant(ends)
-        rest = [each for each in values if not isinstance(each, ast.Constant)]
-        return ast.BoolOp(node.op, rest) if len(rest) > 1 else rest[0] if rest else ast.Constant(not ends)
-
-    def visit_Compare(self, node: ast.Compare) -> ast.expr:
-        left, rights = self.visit(node.left), [self.visit(each) for each in node.comparators]
-        result = ast.Compare(left, node.ops, rights)
-        value = value_of(result, lambda _node: None)
-        return result if value is None else ast.Constant(value)
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.expr:
-        test = self.visit(node.test)
-        if isinstance(test, ast.Constant):
-            chosen: ast.expr = self.visit(node.body if test.value else node.orelse)
-            return chosen
-        return ast.IfExp(test, self.visit(node.body), self.visit(node.orelse))
 
     def visit_Call(self, node: ast.Call) -> ast.expr:
         arguments = [self.visit(each) for each in node.args]
@@ -278,11 +207,6 @@ def _is_brief(value: ast.expr | None, left: Leftover) -> bool:
     names = [node.id for node in ast.walk(value) if isinstance(node, ast.Name) and node.id in left.arguments]
     rows = any(isinstance(node, ast.Subscript | ast.IfExp) for node in ast.walk(value))
     return len(names) == len(set(names)) and not rows
-
-
-def number(node: ast.Constant) -> Any:
-    """The number that a constant is."""
-    return node.value
 
 
 def _is(node: ast.expr, value: float) -> bool:

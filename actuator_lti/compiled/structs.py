@@ -10,10 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from actuator_lti.compiled.expressions import ARITHMETIC, Expressions, Text, bare
+from actuator_lti.compiled.form import number
 from actuator_lti.compiled.kernel import kernel
 from actuator_lti.compiled.kinds import Function, Kind, c_float, c_name
 from actuator_lti.compiled.program import Collector, Program, declared, program_of
-from actuator_lti.compiled.residual import Leftover, number
+from actuator_lti.compiled.residual import Leftover
 from actuator_lti.compiled.statements import INDENT, Statements
 
 _WHOLE = re.compile(r"-?\d+\.0")

@@ -18,7 +18,8 @@ def without_unread(
     while before != (text := _text(functions)):
         before = text
         trees = [left.tree for left in functions.values()]
-        read = {_owner(node, place) for tree in trees for node in ast.walk(tree) if _is_load(node)}
+        nodes = (node for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Subscript))
+        read = {_owner(node, place) for node in nodes if isinstance(node.ctx, ast.Load)}
         for left in functions.values():
             left.tree = _Shorter(functions, left, read, place).visit(left.tree)
         functions = _reached(functions, entries)
@@ -32,12 +33,7 @@ def _text(functions: dict[str, Leftover]) -> str:
     return "".join(ast.unparse(left.tree) + ",".join(left.arguments) for left in functions.values())
 
 
-def _is_load(node: ast.AST) -> bool:
-    return isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Load)
-
-
-def _owner(node: ast.AST, place: Place) -> object:
-    assert isinstance(node, ast.Subscript)
+def _owner(node: ast.Subscript, place: Place) -> object:
     assert isinstance(node.value, ast.Name)
     return place(node.value.id, node.slice)
 
@@ -151,9 +147,9 @@ class _Shorter(ast.NodeTransformer):
 
 def _writing(functions: dict[str, Leftover], tree: ast.AST) -> list[ast.Call]:
     """Calls in a tree that write into a row, themselves or by what they call."""
-    return [call for call in _calls(functions, tree) if _writes(functions, functions[call.func.id].tree)]  # type: ignore[attr-defined]
 
+    def writes(tree: ast.AST) -> bool:
+        rows = (each for each in ast.walk(tree) if isinstance(each, ast.Subscript))
+        return any(isinstance(each.ctx, ast.Store) for each in rows) or bool(_writing(functions, tree))
 
-def _writes(functions: dict[str, Leftover], tree: ast.AST) -> bool:
-    stored = (isinstance(each, ast.Subscript) and isinstance(each.ctx, ast.Store) for each in ast.walk(tree))
-    return any(stored) or bool(_writing(functions, tree))
+    return [call for call in _calls(functions, tree) if writes(functions[call.func.id].tree)]  # type: ignore[attr-defined]

@@ -32,17 +32,10 @@ def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]])
 @face
 def design_html(design: Design) -> str:
     """Every value of a design as it was written, with source, grade and tolerance."""
-    rows = [
-        (
-            known.path,
-            known.symbol,
-            known.text,
-            "" if known.tolerance is None else known.tolerance.text,
-            known.grade or "",
-            known.source,
-        )
-        for known in design.parameters.values()
-    ]
+    rows = []
+    for known in design.parameters.values():
+        tolerance = "" if known.tolerance is None else known.tolerance.text
+        rows.append((known.path, known.symbol, known.text, tolerance, known.grade or "", known.source))
     title = f"{design.name}: {design.title}" if design.title else design.name
     return html_table(title, ("key", "symbol", "value", "tolerance", "grade", "source"), rows)
 
@@ -50,15 +43,10 @@ def design_html(design: Design) -> str:
 @face
 def loops_html(loops: Loops) -> str:
     """The loops that there are: where each is cut, its unit and its period."""
-    rows = [
-        (
-            name,
-            loop.break_point,
-            loop.unit_in,
-            "continuous" if loop.period_s is None else f"{1e3 * loop.period_s:g} ms",
-        )
-        for name, loop in loops.present.items()
-    ]
+    rows = []
+    for name, loop in loops.present.items():
+        every = "continuous" if loop.period_s is None else f"{1e3 * loop.period_s:g} ms"
+        rows.append((name, loop.break_point, loop.unit_in, every))
     head = f"{loops.design.name}: {loops.form}, {loops.operating_point}, load {loops.load_Nm:g}"
     return html_table(head, ("loop", "cut at", "unit", "period"), rows)
 
@@ -68,8 +56,9 @@ def run_html(run: Any) -> str:
     """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
     linear = run.axis == "linear"
     factor, angle, speed = (1e3, "mm", "m/s") if linear else (57.29577951308232, "deg", "rad/s")
+    every = round((run.time_s[1] - run.time_s[0]) / run.period_s) if run.time_s.size > 1 else 1
     rows = [
-        ("rows", f"{run.time_s.size} of {1e3 * run.period_s * _every(run):g} ms"),
+        ("rows", f"{run.time_s.size} of {1e3 * run.period_s * every:g} ms"),
         ("output, from", f"{_least(factor * run.output_angle_rad, min):.5g} {angle}"),
         ("output, to", f"{_least(factor * run.output_angle_rad, max):.5g} {angle}"),
         ("motor speed, up to", f"{_least(abs(run.motor_speed_rad_s), max):.5g} {speed}"),
@@ -89,11 +78,6 @@ def run_html(run: Any) -> str:
 def _least(values: Any, which: Any) -> float:
     """Smallest or largest of some values; NaN of none."""
     return float(which(values)) if len(values) else float("nan")
-
-
-def _every(run: Any) -> float:
-    """Ticks between two rows."""
-    return float(round((run.time_s[1] - run.time_s[0]) / run.period_s)) if run.time_s.size > 1 else 1.0
 
 
 @face

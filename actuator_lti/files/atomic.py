@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import secrets
 import shutil
 import stat
 import sys
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.reading import reason
 
 Name = TypeVar("Name", bound=str | os.PathLike[str])
 _PART = ".part"
@@ -89,7 +91,6 @@ def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO]
         for temporary, target in staged:
             path = target
             _sync(temporary)
-            os.chmod(temporary, 0o666 & ~_umask())
         folders = {path.parent for _, path in staged}
         while staged:
             temporary, path = staged[0]
@@ -101,7 +102,7 @@ def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO]
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"cannot write: {_reason(error)}", where=_named(error, path)) from error
+        raise InputError(f"cannot write: {reason(error)}", where=_named(error, path)) from error
     finally:
         for temporary, _ in staged:
             with suppress(OSError):
@@ -162,15 +163,15 @@ def _write_through(held: BinaryIO, path: Path) -> None:
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
     """Fill a file beside its place, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=".", suffix=_PART, dir=path.parent)
+    temporary = path.with_name(f".{secrets.token_hex(8)}{_PART}")
     try:
-        with os.fdopen(handle, "wb") as file:
+        with open(temporary, "xb") as file:
             write(file)
     except BaseException:
         with suppress(OSError):
-            os.unlink(name)
+            temporary.unlink()
         raise
-    return Path(name)
+    return temporary
 
 
 def _sync(path: Path) -> None:
@@ -182,18 +183,7 @@ def _sync(path: Path) -> None:
         os.close(handle)
 
 
-def _reason(error: OSError | ValueError) -> str:
-    return (error.strerror if isinstance(error, OSError) else None) or str(error)
-
-
 def _named(error: OSError | ValueError, path: Path) -> str:
     """The path that stands in the way, never one of our own temporary ones."""
     named = str(getattr(error, "filename", None) or "")
     return str(path) if not named or named.endswith(_PART) else named
-
-
-def _umask() -> int:
-    """Give the mask that new files of this process get."""
-    mask = os.umask(0o022)
-    os.umask(mask)
-    return mask

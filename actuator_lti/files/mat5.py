@@ -12,6 +12,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,139 +65,146 @@ def read_mat5(data: bytes) -> MatContent:
         raise InputError("no MATLAB level 5 file (level 4 and other formats are not read; save it with -v7)")
     if struct.unpack(f"{order}H", version)[0] == 0x0200 or data[HEADER : HEADER + 4] == b"\x89HDF":
         raise InputError("is a MATLAB 7.3 (HDF5) file; save it with -v7")
-    content = MatContent()
-    for kind, body, place in _elements(data, HEADER, len(data), order):
-        if kind == COMPRESSED:
-            inflated = _inflated(body, place)
-            for inner, inner_body, inner_place in _elements(inflated, 0, len(inflated), order):
-                _take(inner, inner_body, inner_place, order, content)
-        else:
-            _take(kind, body, place, order, content)
-    return content
+    reader = _Reader(order)
+    for kind, body, place in reader.elements(data, HEADER):
+        held = reader.elements(_inflated(body, place)) if kind == COMPRESSED else [(kind, body, place)]
+        for element in held:
+            reader.take(*element)
+    return reader.content
 
 
-def _take(kind: int, body: bytes, place: int, order: str, content: MatContent) -> None:
-    """Add one top-level element to the content."""
-    if kind != MATRIX:
-        content.passed_over.append(f"element of type {kind} at byte {place}")
-        return
-    parts = list(_elements(body, 0, len(body), order))
-    if len(parts) < 3 or len(parts[0][1]) < 8:
-        content.passed_over.append(f"incomplete array at byte {place}")
-        return
-    flags = struct.unpack(f"{order}I", parts[0][1][:4])[0]
-    name = parts[2][1].decode("latin-1")
-    special = {CELL: _take_cell, STRUCTURE: _take_structure, TEXT: _take_text}.get(flags & 0xFF)
-    if special is not None:
-        special(name, parts, order, content)
-        return
-    is_complex = bool((flags >> 8) & COMPLEX_FLAG)
-    if is_complex or (flags & 0xFF) not in NUMERIC_CLASSES or len(parts) < 4:
-        content.passed_over.append(name)
-        if not is_complex or len(parts) < 5:
+Part = tuple[int, bytes, int]  # type, content, place
+
+
+class _Reader:
+    """Takes elements of one byte order into a content."""
+
+    def __init__(self, order: str) -> None:
+        self.order, self.content = order, MatContent()
+
+    def take(self, kind: int, body: bytes, place: int) -> None:
+        """Add one top-level element."""
+        parts = list(self.elements(body)) if kind == MATRIX else []
+        if len(parts) < 3 or len(parts[0][1]) < 8:
+            what = "incomplete array" if kind == MATRIX else f"element of type {kind}"
+            self.content.passed_over.append(f"{what} at byte {place}")
             return
-    shape = _numbers(parts[1][0], parts[1][1], order)
-    values = _numbers(parts[3][0], parts[3][1], order)
-    if shape is None or values is None or not 0 < len(shape) <= MAX_DIMENSIONS:
-        raise InputError(f'array "{name}" at byte {place}: no numbers in it')
-    dimensions = [int(n) for n in shape]
-    count = 1
-    for n in dimensions:
-        count *= n
-    if min(dimensions) < 0 or count != len(values):
-        raise InputError(f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}')
-    if is_complex:
-        imaginary = _numbers(parts[4][0], parts[4][1], order)
+        name = parts[2][1].decode("latin-1")
+        takers = {CELL: self._cell, STRUCTURE: self._structure, TEXT: self._text}
+        if not takers.get(self._flags(parts[0]) & 0xFF, self._array)(name, parts, place):
+            self.content.passed_over.append(name)
+
+    def _array(self, name: str, parts: list[Part], place: int) -> bool:
+        """A numeric array; a complex one is kept, too, but not taken for a real one."""
+        flags = self._flags(parts[0])
+        is_complex = bool((flags >> 8) & COMPLEX_FLAG)
+        if len(parts) < (5 if is_complex else 4) or not (is_complex or flags & 0xFF in NUMERIC_CLASSES):
+            return False
+        shape, values = self._numbers(parts[1]), self._numbers(parts[3])
+        if shape is None or values is None or not 0 < len(shape) <= MAX_DIMENSIONS:
+            raise InputError(f'array "{name}" at byte {place}: no numbers in it')
+        dimensions = [int(n) for n in shape]
+        count = prod(dimensions)
+        if min(dimensions) < 0 or count != len(values):
+            raise InputError(
+                f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}'
+            )
+        if not is_complex:
+            self.content.arrays[name] = values.reshape(dimensions, order="F")
+            return True
+        imaginary = self._numbers(parts[4])
         if imaginary is None or len(imaginary) != count:
             raise InputError(f'array "{name}" at byte {place}: no imaginary part for the shape {dimensions}')
-        content.complexes[name] = (values + 1j * imaginary).reshape(dimensions, order="F")
-    else:
-        content.arrays[name] = values.reshape(dimensions, order="F")
+        self.content.complexes[name] = (values + 1j * imaginary).reshape(dimensions, order="F")
+        return False
 
+    def _text(self, name: str, parts: list[Part], _place: int) -> bool:
+        """A text: one name for each row of a character array."""
+        shape = self._numbers(parts[1])
+        if len(parts) < 4 or shape is None or len(shape) != 2:
+            return False
+        rows, columns = int(shape[0]), int(shape[1])
+        kind, body, at = parts[3]
+        codes = self._numbers(({16: 2, 17: 4}.get(kind, kind), body, at))
+        if codes is None or len(codes) != rows * columns or np.any(codes > 0x10FFFF) or np.any(codes < 0):
+            return False
+        table = codes.astype(int).reshape((rows, columns), order="F")
+        self.content.texts[name] = tuple("".join(map(chr, row)).strip() for row in table.tolist())
+        return True
 
-Parts = list[tuple[int, bytes, int]]
+    def _cell(self, name: str, parts: list[Part], _place: int) -> bool:
+        """A cell array whose cells are all texts of one row."""
+        result: list[str] = []
+        for cell in parts[3:]:
+            texts = self._inside(cell).texts.values() if self._class_of(cell) == TEXT else ()
+            words = [text for rows in texts for text in rows]
+            if len(words) != 1:
+                return False
+            result += words
+        self.content.texts[name] = tuple(result)
+        return True
 
+    def _structure(self, name: str, parts: list[Part], _place: int) -> bool:
+        """The numeric fields of a single structure, as ``name.field``."""
+        shape = self._numbers(parts[1])
+        if len(parts) < 5 or shape is None or np.prod(shape) != 1:
+            return False
+        length, text = self._numbers(parts[3]), parts[4][1]
+        size = 0 if length is None or not len(length) else int(length[0])
+        if not 0 < size <= 64 or len(text) % size:
+            return False
+        fields = [text[k : k + size].split(b"\0")[0].decode("latin-1") for k in range(0, len(text), size)]
+        for field_name, part in zip(fields, parts[5:], strict=False):
+            full = f"{name}.{field_name}"
+            if self._class_of(part) not in NUMERIC_CLASSES:
+                self.content.passed_over.append(full)
+                continue
+            inner = self._inside(part)
+            self.content.arrays.update(zip([full], inner.arrays.values(), strict=False))
+            self.content.complexes.update(zip([full], inner.complexes.values(), strict=False))
+        return True
 
-def _take_text(name: str, parts: Parts, order: str, content: MatContent) -> None:
-    """A text: one name for each row of a character array."""
-    shape = _numbers(parts[1][0], parts[1][1], order)
-    if len(parts) < 4 or shape is None or len(shape) != 2:
-        content.passed_over.append(name)
-        return
-    rows, columns = int(shape[0]), int(shape[1])
-    kind, body = parts[3][0], parts[3][1]
-    codes = _numbers({16: 2, 17: 4}.get(kind, kind), body, order)
-    if codes is None or len(codes) != rows * columns or np.any(codes > 0x10FFFF) or np.any(codes < 0):
-        content.passed_over.append(name)
-        return
-    table = codes.astype(int).reshape((rows, columns), order="F")
-    content.texts[name] = tuple("".join(map(chr, row)).strip() for row in table.tolist())
+    def _inside(self, part: Part) -> MatContent:
+        """What one element within another holds."""
+        reader = _Reader(self.order)
+        reader.take(*part)
+        return reader.content
 
+    def _class_of(self, part: Part) -> int:
+        """The class of an array; 0 where it is none, or incomplete."""
+        first = next(self.elements(part[1]), None) if part[0] == MATRIX else None
+        return 0 if first is None or len(first[1]) < 4 else self._flags(first) & 0xFF
 
-def _take_cell(name: str, parts: Parts, order: str, content: MatContent) -> None:
-    """A cell array whose cells are all texts of one row."""
-    inner = MatContent()
-    result: list[str] = []
-    for kind, body, place in parts[3:]:
-        inner.texts.clear()
-        if kind == MATRIX and _class_of(body, order) == TEXT:
-            _take(kind, body, place, order, inner)
-        texts = [text for rows in inner.texts.values() for text in rows]
-        if len(texts) != 1:
-            content.passed_over.append(name)
-            return
-        result += texts
-    content.texts[name] = tuple(result)
+    def _flags(self, part: Part) -> int:
+        return int(struct.unpack(f"{self.order}I", part[1][:4])[0])
 
+    def elements(self, data: bytes, place: int = 0) -> Iterator[Part]:
+        """Data elements from a place on, each within the data."""
+        while place + 8 <= len(data):
+            first, size = struct.unpack_from(f"{self.order}II", data, place)
+            if first >> 16:
+                kind, size, begin, following = first & 0xFFFF, first >> 16, place + 4, place + 8
+                if size > 4:
+                    raise InputError(f"damaged at byte {place}: a small element of {size} bytes")
+            else:
+                kind, begin = first, place + 8
+                following = begin + (size if kind == COMPRESSED else -(-size // 8) * 8)
+            if begin + size > len(data):
+                there = len(data) - begin
+                raise InputError(f"damaged at byte {place}: {size} bytes announced, {there} there")
+            yield kind, data[begin : begin + size], place
+            place = following
 
-def _take_structure(name: str, parts: Parts, order: str, content: MatContent) -> None:
-    """The numeric fields of a single structure, as ``name.field``."""
-    shape = _numbers(parts[1][0], parts[1][1], order)
-    if len(parts) < 5 or shape is None or np.prod(shape) != 1:
-        content.passed_over.append(name)
-        return
-    length = _numbers(parts[3][0], parts[3][1], order)
-    size = 0 if length is None or not len(length) else int(length[0])
-    text = parts[4][1]
-    if not 0 < size <= 64 or len(text) % size:
-        content.passed_over.append(name)
-        return
-    fields = [text[k : k + size].split(b"\0")[0].decode("latin-1") for k in range(0, len(text), size)]
-    for field_name, (kind, body, place) in zip(fields, parts[5:], strict=False):
-        if kind != MATRIX or _class_of(body, order) not in NUMERIC_CLASSES:
-            content.passed_over.append(f"{name}.{field_name}")
-            continue
-        inner = MatContent()
-        _take(kind, body, place, order, inner)
-        content.arrays |= {f"{name}.{field_name}": values for values in inner.arrays.values()}
-        content.complexes |= {f"{name}.{field_name}": values for values in inner.complexes.values()}
-
-
-def _class_of(body: bytes, order: str) -> int:
-    """The class of an array; 0 where it is incomplete."""
-    first = next(iter(_elements(body, 0, len(body), order)), None)
-    if first is None or len(first[1]) < 4:
-        return 0
-    return int(struct.unpack(f"{order}I", first[1][:4])[0]) & 0xFF
-
-
-def _elements(data: bytes, start: int, stop: int, order: str) -> Iterator[tuple[int, bytes, int]]:
-    """Data elements (type, content, place) between two places, each within them."""
-    place = start
-    while place + 8 <= stop:
-        first, size = struct.unpack_from(f"{order}II", data, place)
-        if first >> 16:
-            kind, size, begin, following = first & 0xFFFF, first >> 16, place + 4, place + 8
-            if size > 4:
-                raise InputError(f"damaged at byte {place}: a small element of {size} bytes")
-        else:
-            kind, begin = first, place + 8
-            padded = size if kind == COMPRESSED else -(-size // 8) * 8
-            following = begin + padded
-        if begin + size > stop:
-            raise InputError(f"damaged at byte {place}: {size} bytes announced, {stop - begin} there")
-        yield kind, data[begin : begin + size], place
-        place = following
+    def _numbers(self, part: Part) -> FloatArray | None:
+        """Numbers of one element as floats; None for a type that is no number."""
+        code = NUMBERS.get(part[0])
+        if code is None:
+            return None
+        dtype = np.dtype(f"{self.order}{code}")
+        if len(part[1]) % dtype.itemsize:
+            return None
+        MAT_VALUES.check(len(part[1]) // dtype.itemsize)
+        return np.frombuffer(part[1], dtype=dtype).astype(np.float64)
 
 
 def _inflated(body: bytes, place: int) -> bytes:
@@ -211,15 +219,3 @@ def _inflated(body: bytes, place: int) -> bytes:
     if unpack.unconsumed_tail or not unpack.eof:
         raise InputError(f"damaged at byte {place}: compressed data do not end")
     return inflated
-
-
-def _numbers(kind: int, body: bytes, order: str) -> FloatArray | None:
-    """Numbers of one element as floats; None for a type that is no number."""
-    code = NUMBERS.get(kind)
-    if code is None:
-        return None
-    dtype = np.dtype(f"{order}{code}")
-    if len(body) % dtype.itemsize:
-        return None
-    MAT_VALUES.check(len(body) // dtype.itemsize)
-    return np.frombuffer(body, dtype=dtype).astype(np.float64)

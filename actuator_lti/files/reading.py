@@ -90,7 +90,7 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
     except IsADirectoryError:
         raise InputError(f"is a directory; allowed: a {what}", where=where) from None
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {_reason(error)}", where=where) from None
+        raise InputError(f"cannot be read: {reason(error)}", where=where) from None
     mode = os.fstat(handle).st_mode
     if not stat.S_ISREG(mode):
         os.close(handle)
@@ -109,7 +109,8 @@ def _near(path: str | PathLike[str]) -> str:
     return f" (there is {shown(near[0])})" if near else ""
 
 
-def _reason(error: OSError | ValueError) -> str:
+def reason(error: OSError | ValueError) -> str:
+    """What the system says is wrong."""
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
@@ -128,7 +129,7 @@ def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound
             while len(data) <= most.most and (piece := stream.read(_PIECE)):
                 data += piece
         except OSError as error:
-            raise InputError(f"cannot be read: {_reason(error)}", where=where) from None
+            raise InputError(f"cannot be read: {reason(error)}", where=where) from None
     if len(data) > most.most:
         raise InputError(f"is larger than allowed: {most.allowed}", where=where)
     return bytes(data)

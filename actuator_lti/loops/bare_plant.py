@@ -12,11 +12,11 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import COMMANDS, Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.flow import ALL, SOURCES, FlowProgram
+from actuator_lti.loops import walk
+from actuator_lti.loops.continuous import flow_system
+from actuator_lti.loops.flow import ALL, FlowProgram
 from actuator_lti.loops.result import Form
 from actuator_lti.loops.tick import TickProgram
-from actuator_lti.loops.walk import INPUTS
-from actuator_lti.systems.plain_system import PlainDelaySystem
 
 if TYPE_CHECKING:
     import control
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from actuator_lti.systems.delay_system import DelaySystem
 
 PlantInput = Literal["u", "i_ref"]
+INPUTS = ("ref", "moment")  # behind ``command`` and ``load_torque``
 OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist"}
 
 
@@ -103,7 +104,7 @@ def _sampled(wired: Drive, command: str) -> control.StateSpace:
 
     program = TickProgram(wired, wired.outermost)
     tick, n = program.tick(0), len(program.states)
-    columns = [INPUTS.index(name) for name in ("ref", "moment")]
+    columns = [walk.INPUTS.index(name) for name in INPUTS]
     signals, names = _names(tick.signals, command)
     rows = np.array([tick.signals[signal] for signal in signals])
     parts = (tick.A, tick.B[:, columns], rows[:, :n], rows[:, n:][:, columns], wired.tick_s)
@@ -113,23 +114,13 @@ def _sampled(wired: Drive, command: str) -> control.StateSpace:
 
 def _continuous(wired: Drive, command: str, form: Form) -> control.StateSpace | DelaySystem:
     flow = FlowProgram(wired, wired.outermost, None, (), ALL if form == "continuous" else frozenset()).flow()
-    n, k = len(flow.states), len(flow.delays_s)
-    u = [n + k + SOURCES.index(name) for name in ("ref", "moment")]
     signals, names = _names(flow.signals, command)
-    rows = np.array([flow.signals[signal] for signal in signals])
-    x, z = slice(0, n), slice(n, n + k)
-    states = tuple(state.replace(".", "_") for state in flow.states)
+    plain = flow_system(flow, INPUTS, np.array([flow.signals[signal] for signal in signals]))
     if form == "ideal":
         import control
 
-        parts = (flow.rates[:, x], flow.rates[:, u], rows[:, x], rows[:, u])
-        return control.ss(*parts, remove_useless_states=False, states=list(states), **names)
+        parts = (plain.A, plain.B1, plain.C1, plain.D11)
+        return control.ss(*parts, remove_useless_states=False, states=list(plain.states), **names)
     from actuator_lti.systems.delay_system import DelaySystem
 
-    plain = PlainDelaySystem(
-        A=flow.rates[:, x], B1=flow.rates[:, u], B2=flow.rates[:, z],
-        C1=rows[:, x], D11=rows[:, u], D12=rows[:, z],
-        C2=flow.delayed[:, x], D21=flow.delayed[:, u], D22=flow.delayed[:, z],
-        delays_s=flow.delays_s, states=states,
-    )  # fmt: skip
     return DelaySystem.of(plain, **names)

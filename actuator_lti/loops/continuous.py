@@ -23,15 +23,23 @@ RATES = {"ref": ("ref", "ref_rate", "ref_rate_rate"), "cut": ("cut", "cut_rate")
 
 def delay_system(flow: Flow, source: str, signal: str, scale: float = 1.0) -> PlainDelaySystem:
     """SISO system from one input of a flow to one of its signals, of the states between both."""
-    n, k = len(flow.states), len(flow.delays_s)
-    row = scale * flow.signals[signal]
+    n, row = len(flow.states) + len(flow.delays_s), scale * flow.signals[signal]
     every = np.vstack([flow.rates, flow.delayed])
-    u = [n + k + SOURCES.index(source)]
     family = next((names for names in RATES.values() if source in names), (source,))
-    depends, driven = every[:, : n + k] != 0, [n + k + SOURCES.index(name) for name in family]
-    used = seen(depends, row[: n + k] != 0) & seen(depends.T, np.any(every[:, driven] != 0, axis=1))
+    depends, driven = every[:, :n] != 0, [n + SOURCES.index(name) for name in family]
+    used = seen(depends, row[:n] != 0) & seen(depends.T, np.any(every[:, driven] != 0, axis=1))
+    return flow_system(flow, (source,), row[None, :], used)
+
+
+def flow_system(
+    flow: Flow, sources: tuple[str, ...], y: np.ndarray, used: np.ndarray | None = None
+) -> PlainDelaySystem:
+    """From inputs of a flow to rows over all that it has; of the states and delays used, or of all."""
+    n, k = len(flow.states), len(flow.delays_s)
+    used = np.ones(n + k, dtype=bool) if used is None else used
+    every, u = np.vstack([flow.rates, flow.delayed]), [n + k + SOURCES.index(name) for name in sources]
     x, z = np.flatnonzero(used[:n]), n + np.flatnonzero(used[n:])
-    dx, v, y = every[x], every[z], row[None, :]
+    dx, v = every[x], every[z]
     return PlainDelaySystem(
         A=dx[:, x], B1=dx[:, u], B2=dx[:, z],
         C1=y[:, x], C2=v[:, x],

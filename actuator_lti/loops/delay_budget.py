@@ -23,7 +23,9 @@ from actuator_lti.drive.blocks import centre_rad_s
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
+from actuator_lti.loops.continuous import stage_system
 from actuator_lti.loops.flow import ALL
+from actuator_lti.loops.sampled import stage_loop
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Filter
@@ -155,14 +157,10 @@ def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
 
 
 def _continuous(wired: Drive, stage: str, delays: frozenset[str], omega: np.ndarray) -> np.ndarray:
-    from actuator_lti.loops.continuous import stage_system
-
     return np.asarray(stage_system(wired, stage, delays)(1j * omega))
 
 
 def _sampled(wired: Drive, stage: str, omega: np.ndarray) -> np.ndarray:
-    from actuator_lti.loops.sampled import stage_loop
-
     loop = stage_loop(wired, stage).plain_open
     return np.asarray(loop(np.exp(1j * omega * loop.dt)))
 

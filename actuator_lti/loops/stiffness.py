@@ -42,6 +42,7 @@ class StiffnessFigures:
     """
 
     design: Design
+    load_Nm: float = 0.0
 
     @cached_property
     def static_stiffness_Nm_rad(self) -> Any:
@@ -62,11 +63,6 @@ class StiffnessFigures:
     @cached_property
     def _response(self) -> Compliance:
         return compliance(self.design)
-
-
-def stiffness_figures(design: Design, load_Nm: float = 0.0) -> StiffnessFigures:
-    """The figures of a design or of stacked ones, the same at every load."""
-    return StiffnessFigures(design)
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:

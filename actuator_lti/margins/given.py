@@ -42,27 +42,26 @@ class Given:
         """The names of what it is given by."""
         return ("numerator", "denominator") if self.A is None else ("A", "b", "c", "d")
 
-    def behind_samples(self) -> Given:
-        """Coefficients over z^samples: the whole samples as poles at z = 0."""
-        late = np.concatenate((self.denominator, np.zeros(self.samples)))
-        return replace(self, denominator=late, samples=0)
-
     def neighbours(self) -> tuple[Given, Given]:
         """The same with every entry moved by 8 ulp, up or down at random, and the other way; zeros stay.
 
         To first order whatever the one does the other undoes: between them lies what the data decide.
         """
-        return self._moved(1.0), self._moved(-1.0)
-
-    def _moved(self, way: float) -> Given:
         names = self.entries
-        entries = [np.asarray(getattr(self, name), dtype=float) for name in names]
-        signs = np.split(_signs(sum(x.size for x in entries)), np.cumsum([x.size for x in entries])[:-1])
-        moved: Any = {
-            name: x + way * ULP * np.spacing(x) * sign.reshape(x.shape) * (x != 0.0)
-            for name, x, sign in zip(names, entries, signs, strict=True)
-        }
-        return replace(self, **moved)
+        up, down = (moved(way, *(getattr(self, name) for name in names)) for way in (1.0, -1.0))
+        pairs: Any = [dict(zip(names, entries, strict=True)) for entries in (up, down)]
+        return replace(self, **pairs[0]), replace(self, **pairs[1])
+
+
+def moved(way: float, *entries: Any) -> list[Any]:
+    """Arrays and numbers with every entry moved by 8 ulp, see `Given.neighbours`."""
+    arrays = [np.asarray(each, dtype=float) for each in entries]
+    ends = np.cumsum([x.size for x in arrays])
+    signs = np.split(_signs(int(ends[-1])), ends[:-1])
+    return [
+        x + way * ULP * np.spacing(x) * sign.reshape(x.shape) * (x != 0.0)
+        for x, sign in zip(arrays, signs, strict=True)
+    ]
 
 
 @lru_cache

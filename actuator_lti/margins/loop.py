@@ -113,8 +113,6 @@ class RationalLoop:
             above, below, d_above, d_below = horner(self._with_slopes, p)
             L = above / below
             return L, turn * (d_above / below - L * (d_below / below))
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex), np.zeros(p.shape, dtype=complex)
         matrix = self._resolvent(p)
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
@@ -127,8 +125,6 @@ class RationalLoop:
         if self.coefficients is not None:
             above, below = horner(np.asarray(self.coefficients, np.longdouble), p)
             return np.asarray((above / below).astype(complex))
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex)
         A = np.asarray(self._state, np.longdouble)
         matrix = self._resolvent(p.astype(complex))
         X = np.zeros((p.size, self.order), dtype=np.clongdouble)
@@ -163,8 +159,6 @@ class RationalLoop:
             with np.errstate(all="ignore"):
                 above, below = horner(self._with_slopes[:2], p)
                 return np.asarray(above / below)
-        if self.order == 0:
-            return np.full(p.shape, self.d, dtype=complex)
         return np.asarray(self.d + np.linalg.solve(self._resolvent(p), self.b[:, None])[..., 0] @ self.c)
 
     def _resolvent(self, p: Complex) -> Complex:

@@ -50,8 +50,8 @@ class StabilityMargins:
       right, no pole lies within its own error of the stability boundary, and each figure has a small bound
       of its error; behind a delay also from the zeros and poles of the exact polynomials, if 8 ulp of the
       entries change nothing.
-    - ``"withheld"``: 8 ulp of the entries change the answer, so the data do not determine it, or a search
-      came to its end. The reason says which.
+    - ``"withheld"``: 8 ulp of the entries change the verdict or the crossings, so the data do not determine
+      them, or a search came to its end. The reason says which.
 
     Attributes
     ----------

@@ -13,13 +13,11 @@ from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
-from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided, free_motion
+from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import step_of
-from actuator_lti.systems.exact_fraction import product
 from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to step at first
@@ -30,7 +28,6 @@ _ZERO = 1e-12  # of the largest response about the poles
 _MOST = 400_000
 _FORGOTTEN = 25.0  # time constants
 _CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points on it
-_BITS = 256
 
 
 class Stepped:
@@ -84,8 +81,10 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         late = np.arange(len(values) * 3 // 4, len(values))
         modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
         if np.abs(modes - values[late, 0]).max() <= _MEET:
-            early = Stepped(values, h)
-            return early, _motion(exact, weights * np.exp(exact * early.end) / final, early.end), final
+            early, n = Stepped(values, h), exact.size
+            A = flint.acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
+            state = weights * np.exp(exact * early.end) / final
+            return early, Motion(A, np.ones(n), state, False, early.end), final
         head *= 2.0
 
 
@@ -135,20 +134,6 @@ def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]
         found.append((pole + off, residue / (pole + off) * (1.0 if pole.imag == 0.0 else 2.0)))
     exact, weights = np.array(found, dtype=complex).reshape(-1, 2).T
     return exact, weights
-
-
-def _motion(poles: Complex, weights: Complex, start: float) -> Motion:
-    """The motion that is the real part of the sum of weights times exponentials from the start on."""
-    real = poles.imag == 0.0
-    every = [flint.acb(complex(p)) for p in np.concatenate((poles, poles[~real].conj()))]
-    parts = np.concatenate((np.where(real, weights, 0.5 * weights), 0.5 * weights[~real].conj()))
-
-    def motion() -> Motion | None:
-        beside = (product(every[:k] + every[k + 1 :]) for k in range(len(every)))
-        terms = (p * flint.acb(complex(w)) for p, w in zip(beside, parts, strict=True))
-        return free_motion(sum(terms, flint.acb_poly([0])), every, False, start)
-
-    return at_enough_bits(motion, _BITS, "a pole of the step response")
 
 
 def _grid_step(delays: Real, horizon: float) -> float:

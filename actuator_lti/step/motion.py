@@ -14,7 +14,7 @@ Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Ort
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -61,31 +61,28 @@ _LONG = "the step response rings for too long: what it settles to is known, when
 class Motion:
     """Deviation e(t) from the final value, relative to it; t in s, or in samples.
 
-    Of stable poles, the slowest first, and the state at the time ``start``.
+    The real part of ``output`` times the free motion of ``A``, upper triangular with stable poles and, but
+    for diagonal ones, a contraction, from the ``state`` at the time ``start`` on.
     """
 
-    def __init__(
-        self, poles: Sequence[flint.acb], state: Sequence[flint.acb], sampled: bool, start: float = 0.0
-    ) -> None:
-        self.sampled, self.start = sampled, start
-        self._x = np.array([complex(each) for each in state], dtype=complex)
-        exact, output = _cascade(poles, sampled)
-        self._A, self._c = _doubles(exact), np.array([complex(each) for each in output], dtype=complex)
-        rates = [1 - abs(each) if sampled else -each.real for each in poles]
+    def __init__(self, A: flint.acb_mat, output: Any, state: Any, sampled: bool, start: float = 0.0) -> None:
+        self.sampled, self.start, self.tie = sampled, start, _TIE if sampled else 0.0
+        self._x, self._c = (np.array([complex(each) for each in part]) for part in (state, output))
+        self._A, n = _doubles(A), len(self._x)
+        rates = [1 - abs(A[k, k]) if sampled else -A[k, k].real for k in range(n)]
         self._decay = np.array([float(rate.mid()) for rate in rates], dtype=float)
-        self.tie = _TIE if sampled else 0.0
-        size = float(np.linalg.norm(self._A, 2)) if poles and not sampled else 0.0
+        size = float(np.linalg.norm(self._A, 2)) if n and not sampled else 0.0
         self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
-        turned = self._A - np.eye(len(poles)) if sampled else self._A
+        turned = self._A - np.eye(n) if sampled else self._A
         self._second = np.abs(self._c @ turned @ turned)
-        self._moves = self._levels(exact)
+        self._moves = self._levels(A)
 
     def _levels(self, exact: flint.acb_mat) -> list[Complex]:
         """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts."""
+        everlasting = np.abs(self._c) @ self._largest(np.inf)
         with flint.ctx.workprec(_BITS):  # a rounding of the first is doubled each time
             move = exact if self.sampled or not self._x.size else (exact * flint.arb(self.shortest)).exp()
             moves = [_doubles(move)]
-            everlasting = np.abs(self._c) @ self._largest(np.inf)
             while everlasting @ np.abs(moves[-1] @ self._x) > OVER:
                 if len(moves) == _LEVELS:
                     raise NumericalError(_LONG)
@@ -105,11 +102,8 @@ class Motion:
     @cached_property
     def _bounds(self) -> list[tuple[Real, Real]]:
         """For each level rows that bound |e|, and how far e leaves its chord, from |x| at the start."""
-        spans = self.shortest * 2.0 ** np.arange(len(self._moves))
-        return [
-            (np.abs(self._c) @ M, 0.125 * h * h * (self._second @ M))
-            for h, M in ((h, self._largest(h)) for h in spans)
-        ]
+        every = [(h, self._largest(h)) for h in self.shortest * 2.0 ** np.arange(len(self._moves))]
+        return [(np.abs(self._c) @ M, 0.125 * h * h * (self._second @ M)) for h, M in every]
 
     @property
     def slowest(self) -> float:
@@ -156,25 +150,6 @@ class Motion:
         return np.array(rows[::-1]).T
 
 
-def gain_of(p: flint.acb, sampled: bool) -> flint.arb:
-    """The output gain of one section: what makes its free motion of energy 1."""
-    return (1 - abs(p) ** 2).sqrt() if sampled else (-2 * p.real).sqrt()
-
-
-def _cascade(poles: Sequence[flint.acb], sampled: bool) -> tuple[flint.acb_mat, list[flint.acb]]:
-    """A and c: each section is driven by the output of those after it."""
-    n = len(poles)
-    A, output = [[flint.acb(0)] * n for _ in poles], [flint.acb(0)] * n
-    for i in reversed(range(n)):
-        p, gain = poles[i], flint.acb(gain_of(poles[i], sampled))
-        A[i] = [gain * y if sampled else -gain * y for y in output]
-        A[i][i] = p
-        if sampled:
-            output = [-p.conjugate() * y for y in output]
-        output[i] = gain
-    return flint.acb_mat(n, n, [each for row in A for each in row]), output
-
-
 def _doubles(exact: flint.acb_mat) -> Complex:
     n = exact.nrows()
     out = np.zeros((n, n), dtype=complex)
@@ -204,12 +179,12 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
         if abs(double(final)) <= dc_noise(loop):
             raise NumericalError(NO_FINAL.replace("is zero:", "is zero within the rounding of the entries:"))
         rest = (f.num / final - f.den) / flint.fmpq_poly([-dc, 1])
-        return free_motion(balls(rest / f.den[f.den.degree()]), poles, loop.in_z)
+        return _free_motion(balls(rest / f.den[f.den.degree()]), poles, loop.in_z)
 
     return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), double(f.num(dc) / f.den(dc))
 
 
-def free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool, start: float = 0.0) -> Motion | None:
+def _free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool) -> Motion | None:
     """The motion with the transform rest/(product of x - pole); ``None``: more digits are needed.
 
     Sampled: e_0 + e_1/z + ... is z times that. The fastest pole first, which alone its function has.
@@ -219,14 +194,34 @@ def free_motion(rest: flint.acb_poly, poles: _Poles, sampled: bool, start: float
     for p in poles:
         q = p.conjugate()
         mirrored.append(mirrored[-1] * flint.acb_poly([1, -q] if sampled else [q, 1]))
-    state: list[flint.acb] = [flint.acb(0)] * len(poles)
+    state: _Poles = [flint.acb(0)] * len(poles)
     for j in reversed(range(len(poles))):
-        gain = gain_of(poles[j], sampled)
+        gain = _gain_of(poles[j], sampled)
         state[j] = rest(poles[j]) / (gain * mirrored[j](poles[j]))
         rest = divided(rest - state[j] * gain * mirrored[j], poles[j])
         if not _sharp(state[j] * gain, 1.0) or not _sharp(poles[j], abs(complex(poles[j]))):
             return None
-    return Motion(poles, state, sampled, start)
+    return _cascade(poles, state, sampled)
+
+
+def _cascade(poles: _Poles, state: _Poles, sampled: bool) -> Motion:
+    """The motion of all-pass sections, each driven by the output of those after it."""
+    n = len(poles)
+    A, output = flint.acb_mat(n, n), [flint.acb(0)] * n
+    for i in reversed(range(n)):
+        p, gain = poles[i], _gain_of(poles[i], sampled)
+        for k in range(i + 1, n):
+            A[i, k] = gain * output[k] if sampled else -gain * output[k]
+        A[i, i] = p
+        if sampled:
+            output = [-p.conjugate() * y for y in output]
+        output[i] = gain
+    return Motion(A, output, state, sampled)
+
+
+def _gain_of(p: flint.acb, sampled: bool) -> flint.acb:
+    """The output gain of one section: what makes its free motion of energy 1."""
+    return flint.acb((1 - abs(p) ** 2).sqrt() if sampled else (-2 * p.real).sqrt())
 
 
 def _sharp(value: flint.acb, unit: float) -> bool:

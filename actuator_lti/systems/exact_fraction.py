@@ -8,7 +8,7 @@ from typing import Any
 import flint
 import numpy as np
 
-from actuator_lti.margins.exact.loop import exact_polynomials, warped
+from actuator_lti.margins.exact.loop import exact_polynomials, rational, warped
 from actuator_lti.margins.exact.roots import all_roots
 from actuator_lti.margins.given import ULP, given_of
 from actuator_lti.margins.loop import RationalLoop
@@ -118,11 +118,6 @@ def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
 def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
     """Whether a hidden pole of a state space counts as one at zero frequency."""
     return loop.coefficients is None and _nearest_dc(complex(p), loop) <= _NEAR_DC
-
-
-def rational(value: Any) -> flint.fmpq:
-    """A double as the rational number that it is."""
-    return flint.fmpq(*float(value).as_integer_ratio())
 
 
 def double(value: flint.fmpq) -> float:

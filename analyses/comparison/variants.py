@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from math import isfinite, nan
@@ -19,13 +19,16 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
-from analyses.comparison.variant_figures import (
+from analyses.comparison.found import (
+    Changed,
+    Contribution,
     FigureName,
+    Found,
+    Kept,
     LargeSignal,
     figure_names,
     small_signal,
 )
-from analyses.comparison.variant_store import Changed, Contribution, Found, Kept
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.specification.sensitivity import Sensitivities, moved, population_figures, sensitivities
@@ -154,13 +157,11 @@ def compare(
 
     work = partial(_beside, base, origin, plan, tested)
     (engine or Engine(threads=1)).map(work, missing, take, lambda done, _: tell(first + done, total))
-    ends = tuple(
-        _compared(variant, one) for variant, one in zip(good, result, strict=True) if one is not None
-    )
-    reference = _compared(study.base, base)
+    pairs = zip((study.base, *good), (base, *result), strict=True)
+    reference, *ends = (_compared(variant, one) for variant, one in pairs if one is not None)
     names = figure_names([c.figures for c in (reference, *ends)], origin)
     refused = tuple(v for v in study.variants if v.design is None)
-    return Comparison(study, names, reference, ends, slopes, refused)
+    return Comparison(study, names, reference, tuple(ends), slopes, refused)
 
 
 def _compared(variant: Variant, result: Found) -> Compared:
@@ -207,35 +208,31 @@ def _beside(
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:
     """Keys of the design file that differ; names and texts of the head do not count."""
-    flat, flat_other = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
-    keys = [*flat, *(key for key in flat_other if key not in flat)]
+    before, after = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
     return tuple(
-        Changed(key, flat.get(key, "–"), flat_other.get(key, "–"))
-        for key in keys
-        if flat.get(key) != flat_other.get(key) and not key.startswith(("design.", "requirement", "fact"))
+        Changed(key, before.get(key, "–"), after.get(key, "–"))
+        for key in {**before, **after}
+        if before.get(key) != after.get(key) and not key.startswith(("design.", "requirement", "fact"))
     )
 
 
-def _flat(tree: Any, path: str = "") -> list[tuple[str, str]]:
+def _flat(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
     """Leaves of a design tree as texts, by dotted key; an entry with a value is one leaf."""
-    if isinstance(tree, Mapping):
-        if "value" in tree:
-            return [(path, str(tree["value"]))]
-        return [leaf for key, item in tree.items() for leaf in _flat(item, f"{path}.{key}" if path else key)]
-    if isinstance(tree, list) and tree and all(isinstance(item, Mapping) for item in tree):
-        return [
-            leaf
-            for k, item in enumerate(tree)
-            for leaf in _flat(item, f"{path}.{item.get('name') or item.get('id') or k}")
-        ]
-    return [(path, str(tree))]
+    if isinstance(tree, Mapping) and "value" not in tree:
+        below = list(tree.items())
+    elif isinstance(tree, list) and tree and all(isinstance(item, Mapping) for item in tree):
+        below = [(item.get("name") or item.get("id") or k, item) for k, item in enumerate(tree)]
+    else:
+        yield path, str(tree["value"] if isinstance(tree, Mapping) else tree)
+        return
+    for key, item in below:
+        yield from _flat(item, f"{path}.{key}" if path else key)
 
 
 def _moved_by(
     base: Design, other: Design, changed: tuple[Changed, ...], differences: Mapping[str, float]
 ) -> dict[str, tuple[Contribution, ...]]:
     """Change one number at a time, starting from the base."""
-
     if len(changed) == 1:
         return {key: (Contribution(changed[0].path, amount),) for key, amount in differences.items()}
     both = set(variable_paths(base)) & set(variable_paths(other))
@@ -246,8 +243,8 @@ def _moved_by(
     causes: dict[str, tuple[Contribution, ...]] = {}
     for key, total in differences.items():
         column = columns.get(key, np.full(len(paths) + 1, nan))
-        amounts = [float(there) - float(column[0]) for there in column[1:]]
-        parts = [Contribution(path, amount) for path, amount in zip(paths, amounts, strict=True)]
-        parts = [one for one in parts if isfinite(one.amount) and abs(one.amount) > 1e-6 * abs(total)]
-        causes[key] = tuple(sorted(parts, key=lambda part: -abs(part.amount)))
+        amounts = (float(there) - float(column[0]) for there in column[1:])
+        parts = map(Contribution, paths, amounts)
+        strong = [one for one in parts if isfinite(one.amount) and abs(one.amount) > 1e-6 * abs(total)]
+        causes[key] = tuple(sorted(strong, key=lambda part: -abs(part.amount)))
     return causes

@@ -49,14 +49,11 @@ class Asked:
         for name in ("stop_rad", "deflection_rad", "detection_s", "watched_s"):
             if not 0.0 < getattr(self, name) < inf:
                 raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
-        if self.deflection_rad > self.stop_rad:
-            raise InputError(
-                f"deflection {self.deflection_rad:g}: must not be beyond the stop, {self.stop_rad:g}"
-            )
-        if self.detection_s > self.watched_s:
-            raise InputError(
-                f"detection {self.detection_s:g} s: must not be after {self.watched_s:g} s, the end"
-            )
+        near, stop, seen, end = self.deflection_rad, self.stop_rad, self.detection_s, self.watched_s
+        if near > stop:
+            raise InputError(f"deflection {near:g}: must not be beyond the stop, {stop:g}")
+        if seen > end:
+            raise InputError(f"detection {seen:g} s: must not be after {end:g} s, the end")
         if not isfinite(self.load_Nm):
             raise InputError(f"load {self.load_Nm}: must be finite")
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -63,22 +64,20 @@ class Rig:
 
     def measured(self) -> Measured:
         """The truth about the plant at t_k."""
-        plant, N = self.plant, self.design.total_ratio
-        w, th = plant.value("speed"), plant.value("angle")
-        elastic = self.design.coupling is not None
-        y = plant.value("output") if elastic else th / N
-        Y = plant.value("output_speed") if elastic else w / N
-        return Measured(plant.value("current"), w, th, y, Y)
+        value, N = self.plant.value, self.design.total_ratio
+        i, w, th = value("current"), value("speed"), value("angle")
+        if self.design.coupling is None:
+            return Measured(i, w, th, th / N, w / N)
+        return Measured(i, w, th, value("output"), value("output_speed"))
 
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
-        true, u = self.measured(), self.plant.value("voltage")
-        elastic = self.design.coupling is not None
+        true, elastic = self.measured(), self.design.coupling is not None
         state = State(
             motor_angle_rad=true.angle_rad,
             motor_speed_rad_s=true.speed_rad_s,
             current_A=true.current_A,
-            voltage_V=u,
+            voltage_V=self.plant.value("voltage"),
             output_angle_rad=true.output_angle_rad if elastic else None,
             output_speed_rad_s=true.output_speed_rad_s if elastic else None,
         )
@@ -86,9 +85,8 @@ class Rig:
 
     def step(self, command: float) -> Measured:
         """One tick; gives the truth at its start. `moment_Nm` is what the train carried, at the output."""
-        true = self.measured()
+        true, design, bus = self.measured(), self.design, self.plant.value("voltage_limit")
         seen = true if self.sensing is None else self.sensing(true)
-        bus = self.plant.value("voltage_limit")
         u = self.controller.control(
             command, seen.current_A, seen.speed_rad_s, seen.angle_rad,
             seen.output_angle_rad, bus, seen.output_speed_rad_s,
@@ -96,7 +94,6 @@ class Rig:
         if self.driving is not None:
             u = self.driving(u, bus)
         self.plant.step(u)
-        design = self.design
         if design.coupling is not None:
             self.moment_Nm = self.plant.noted("coupling_torque") * design.ratio_behind_coupling
         else:
@@ -111,6 +108,10 @@ OPEN = 1e4  # times the resistance: of a winding with an open phase
 Course = Callable[[float], float]
 
 
+def _whole(rig: Rig) -> None:
+    """Nothing is done to the rig: the command alone fails."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One failure."""
@@ -118,9 +119,7 @@ class Case:
     name: str
     words: str
     command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
-    broken: Callable[[Rig], None] = lambda _: (
-        None
-    )  # what is done to the rig; nothing: the command alone fails
+    broken: Callable[[Rig], None] = _whole  # what is done to the rig
     start_rad: float = 0.0  # where the drive holds before
     # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
@@ -129,48 +128,48 @@ class Case:
 
 def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:
     """The cases that exist for a design, and why the others do not."""
-    far, near = asked.stop_rad, asked.deflection_rad
-    half = _size(design, 0.5 * far)
-
-    def hold(value: float) -> Course:
-        return lambda _: value
-
-    def hard_over(rig: Rig) -> None:
-        rig.driving = lambda _, bus: bus
-
-    made = [
-        Case("hard-over", "the power stage puts the whole bus on the motor", hold(0.0), hard_over),
-        Case("open-phase", _open_words(design), hold(0.0), _open),
-    ]
+    open_phase = "the winding is open: no current, no torque"
+    if design.motor.constants != "dc":
+        more = "a DC equivalent has one winding; the pulsating torque of two phases left is not modelled"
+        open_phase += f" ({more})"
+    made = (
+        Case("hard-over", "the power stage puts the whole bus on the motor", _hold(0.0), _hard_over),
+        Case("open-phase", open_phase, _hold(0.0), _open),
+    )
     if design.controller.position is None:
-        return tuple(made), dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
+        return made, dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
+    far, near, half = asked.stop_rad, asked.deflection_rad, 0.5 * asked.stop_rad
     frequency, where = _followed_most_hz(design)
-    sine = f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}"
     frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
-    lost = f"the position sensor reads zero while the drive holds {half}"
-    made += [
-        Case("hard-over-command", "the command jumps to the stop", hold(far)),
-        Case(
-            "jam",
-            "the output jams half-way through a step to the stop",
-            hold(far),
-            lambda rig: rig.fail(jammed(design)),
-            at_rad=0.5 * far,
-            stops=False,
-        ),
-        Case("frozen-sensor", frozen, hold(near), lambda rig: _sense(rig, lose=False)),
-        Case("lost-sensor", lost, hold(0.5 * far), lambda rig: _sense(rig, lose=True), start_rad=0.5 * far),
-        Case(
-            "oscillatory-command",
-            sine,
-            lambda t: near * math.sin(2.0 * math.pi * frequency * t),
-            stops=False,
-        ),
-    ]
-    return tuple(made), {}
+    lost = f"the position sensor reads zero while the drive holds {_size(design, half)}"
+    waves = f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}"
+
+    def jam(rig: Rig) -> None:
+        rig.fail(jammed(design))
+
+    def sine(t: float) -> float:
+        return near * math.sin(2.0 * math.pi * frequency * t)
+
+    jams = "the output jams half-way through a step to the stop"
+    of_loop = (
+        Case("hard-over-command", "the command jumps to the stop", _hold(far)),
+        Case("jam", jams, _hold(far), jam, at_rad=half, stops=False),
+        Case("frozen-sensor", frozen, _hold(near), partial(_sense, lose=False)),
+        Case("lost-sensor", lost, _hold(half), partial(_sense, lose=True), start_rad=half),
+        Case("oscillatory-command", waves, sine, stops=False),
+    )
+    return made + of_loop, {}
 
 
 _LOOP_CASES = ("hard-over-command", "jam", "frozen-sensor", "lost-sensor", "oscillatory-command")
+
+
+def _hold(value: float) -> Course:
+    return lambda _: value
+
+
+def _hard_over(rig: Rig) -> None:
+    rig.driving = lambda _, bus: bus
 
 
 def jammed(design: Design) -> Design:
@@ -196,26 +195,12 @@ def _open(rig: Rig) -> None:
 
 def _sense(rig: Rig, *, lose: bool) -> None:
     """Freeze the position loop's sensor, or let it read zero; a speed taken from it is zero."""
-    frozen, loop = rig.measured(), rig.design.controller.position_loop
-    y, th = (0.0, 0.0) if lose else (frozen.output_angle_rad, frozen.angle_rad)
-
-    def output(true: Measured) -> Measured:
-        return replace(true, output_angle_rad=y, output_speed_rad_s=0.0)
-
-    def motor(true: Measured) -> Measured:
-        return replace(true, angle_rad=th, speed_rad_s=0.0)
-
-    rig.sensing = output if loop.sensor == "output" else motor
-
-
-def _open_words(design: Design) -> str:
-    """What an open phase is taken for; a motor of three phases has two left, which one winding cannot say."""
-    words = "the winding is open: no current, no torque"
-    if design.motor.constants == "dc":
-        return words
-    return (
-        f"{words} (a DC equivalent has one winding; the pulsating torque of two phases left is not modelled)"
-    )
+    frozen, part = rig.measured(), 0.0 if lose else 1.0
+    if rig.design.controller.position_loop.sensor == "output":
+        stuck = {"output_angle_rad": part * frozen.output_angle_rad, "output_speed_rad_s": 0.0}
+    else:
+        stuck = {"angle_rad": part * frozen.angle_rad, "speed_rad_s": 0.0}
+    rig.sensing = lambda true: replace(true, **stuck)
 
 
 def _followed_most_hz(design: Design) -> tuple[float, str]:

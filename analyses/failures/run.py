@@ -51,14 +51,11 @@ class Failures:
     before: tuple[Settling, ...]  # what holding each start ends in, the drive whole
 
     def case(self, name: str) -> FailureCase:
-        """A case by its name.
-
-        Raises `InputError`: where there is none of that name.
-        """
-        for one in self.cases:
-            if one.name == name:
-                return one
-        raise InputError(f"failure {name!r}: one of {', '.join(one.name for one in self.cases)}")
+        """A case by its name; raises `InputError` where there is none."""
+        by_name = {one.name: one for one in self.cases}
+        if name not in by_name:
+            raise InputError(f"failure {name!r}: one of {', '.join(by_name)}")
+        return by_name[name]
 
 
 SETTLED = 1e-3
@@ -123,8 +120,7 @@ def _settling_s(design: Design, asked: Asked) -> float:
 
 def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     """What comes of a failure."""
-    Ts = rig.design.controller.period_s
-    start = rig.measured().output_angle_rad
+    Ts, start = rig.design.controller.period_s, rig.measured().output_angle_rad
     case.broken(rig)
     rows = []
     for k in range(ceil(asked.watched_s / Ts) + 1):
@@ -134,7 +130,7 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
         if case.stops and abs(moved) >= asked.stop_rad:
             break
     t, moved, current, moment, overloaded = np.array(rows).T
-    protected = np.flatnonzero(overloaded > 0.0)
+    protected = t[overloaded > 0.0]
     return FailureCase(
         name=case.name,
         words=case.words,
@@ -147,7 +143,7 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
         at_detection_rad=float(np.abs(moved)[t <= asked.detection_s * (1.0 + 1e-12)].max()),
         peak_current_A=float(np.abs(current).max()),
         peak_moment_Nm=float(np.abs(moment).max()),
-        protected_s=float(t[protected[0]]) if protected.size else None,
+        protected_s=float(protected[0]) if protected.size else None,
     )
 
 

@@ -1,4 +1,7 @@
-"""The smallest command that moves the output, and what a slow one loses at a reversal; both simulated too."""
+"""At rest: the smallest command that moves the output, and what a slow one loses at a reversal.
+
+Both by the gains of the controllers, and simulated.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +13,73 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import holding_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, standing_gain
+from actuator_lti.drive.steady import motor_torque_Nm, standing_gain, torque_gain_Nm_rad
 from analyses.finite import finite
-from analyses.linear.static_threshold import StaticThreshold, static_threshold
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
 from nonlinear.settling.rest import first_motion_s
+
+
+@dataclass(frozen=True)
+class StaticThreshold:
+    """Smallest step that moves the output at once, by the proportional parts of the controllers."""
+
+    load_Nm: float
+    # Motor torque per position error at the output, rotor at rest, before any integrator has acted
+    torque_gain_Nm_rad: float
+    # Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already does,
+    # ``inf`` where the drive is not strong enough
+    forward_rad: float
+    backward_rad: float
+    # Integral time of the velocity controller, else of the position controller: with one any smaller command
+    # moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the threshold is
+    # final
+    integral_time_s: float | None
+    # That of the position controller, where the velocity controller integrates too
+    outer_integral_time_s: float | None = None
+
+    @property
+    def smallest_rad(self) -> float:
+        """The smaller of both directions."""
+        return min(self.forward_rad, self.backward_rad)
+
+    def waiting_time_s(self, amplitude_rad: float) -> float:
+        """Time until a forward step moves the output: ``Tn (A0/A - 1)``; ``inf`` where it never does.
+
+        With a constant error the torque grows as ``1 + t/Tn``; two integrals one behind the other, of times T
+        and U, give ``1 + t/T + t/U + t^2/(2 T U)``.
+        """
+        if amplitude_rad >= self.forward_rad:
+            return 0.0
+        if self.integral_time_s is None or amplitude_rad <= 0.0 or math.isinf(self.forward_rad):
+            return math.inf
+        more = self.forward_rad / amplitude_rad - 1.0
+        if self.outer_integral_time_s is None:
+            return self.integral_time_s * more
+        T, U = self.integral_time_s, self.outer_integral_time_s
+        return math.sqrt((T + U) ** 2 + 2.0 * T * U * more) - (T + U)
+
+
+def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
+    """Find the smallest command that moves the output at once.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> result = static_threshold(load_design("emps"))
+    >>> round(1e6 * result.backward_rad, 3)  # um: (Fc - |offset|) and (Fc + |offset|) over the stiffness
+    17.187
+    """
+    gain, strongest = float(torque_gain_Nm_rad(design)), float(stall_torque_Nm(design))
+    needed = (breakaway_torque_Nm(design, load_Nm, direction) for direction in (1, -1))
+    forward, backward = (torque / gain if torque < strongest else math.inf for torque in needed)
+    velocity, position = design.controller.velocity, design.controller.position_loop
+    times = [None if velocity is None else velocity.integral_time_s, position.integral_time_s]
+    first, second, *_ = *(one for one in times if one is not None), None, None
+    return StaticThreshold(load_Nm, gain, forward, backward, first, second)
+
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
 WITHIN, COUNT = 0.05, 51
@@ -49,7 +112,6 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     motor that starts, from angle zero: what dry friction holds behind a spring follows later.
     """
     design = replace(design, command=Command())
-    moment = load_Nm + float(design.load.moment_Nm(0.0))
     friction = design.friction
     at_zero = replace(  # its own torque there an offset, no friction behind the spring
         design,
@@ -57,7 +119,7 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
         load=replace(design.load.level(), friction=None),
         friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
     )
-    static = static_threshold(at_zero, moment)
+    static = static_threshold(at_zero, load_Nm + float(design.load.moment_Nm(0.0)))
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if design.controller.position_loop.kicks:

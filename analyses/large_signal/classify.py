@@ -31,12 +31,6 @@ def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> Rat
 
     ``amplitude``: peak of the command.
     ``rate_limit``: R, in the unit of the amplitude per second.
-
-    Examples
-    --------
-    >>> result = rate_limited(10.0, 2 * math.pi * 5.0, 150.0)
-    >>> round(result.gain, 6), round(result.lag_deg, 4), result.peak
-    (0.607927, 41.4096, 7.5)
     """
     x = omega_rad_s * amplitude / rate_limit
     if x <= 1.0:
@@ -101,28 +95,21 @@ def limiter_fractions(result: BatchResult) -> np.ndarray:
 
 
 def causes(
-    result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray, rubs: np.ndarray | bool = True
+    result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray, rubs: bool = True
 ) -> np.ndarray:
     """Name what keeps each run from being linear (`CAUSE_RULE`); index into `CAUSES`.
 
-    ``linear`` is the response from command to output at each run's frequency; ``rubs`` says where it is dry
+    ``linear`` is the response from command to output at each run's frequency; ``rubs`` says whether it is dry
     friction that keeps a run from being linear.
     """
     fractions = limiter_fractions(result)
-    limited, stuck = fractions.max(axis=1) > 0.0, result.window_stick_fraction >= STICK_FRACTION
-    choices = [
-        CAUSES.index(LIMITERS[0]) + np.argmax(fractions, axis=1),
-        np.full(len(limited), CAUSES.index("stiction")),
-        np.where(rubs, CAUSES.index("friction"), CAUSES.index("other")),
-    ]
-    conditions = [limited, stuck, not_linear(result, linear, amplitude_rad)]
-    return np.select(conditions, choices, CAUSES.index("none"))
-
-
-def unexplained(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:
-    """Which runs are off the linear one although no limit acts and the drive does not stick."""
-    acts = (limiter_fractions(result).max(axis=1) > 0.0) | (result.window_stick_fraction >= STICK_FRACTION)
-    return ~acts & not_linear(result, linear, amplitude_rad)
+    conditions = {
+        CAUSES.index("stiction"): result.window_stick_fraction >= STICK_FRACTION,
+        CAUSES.index("friction" if rubs else "other"): not_linear(result, linear, amplitude_rad),
+    }
+    codes = np.select([*conditions.values()], [*conditions], CAUSES.index("none"))
+    limiter = CAUSES.index(LIMITERS[0]) + np.argmax(fractions, axis=1)
+    return np.where(fractions.max(axis=1) > 0.0, limiter, codes)
 
 
 def not_linear(result: BatchResult, linear: np.ndarray, amplitude_rad: np.ndarray) -> np.ndarray:

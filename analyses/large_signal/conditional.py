@@ -13,10 +13,10 @@ it and goes on integrating.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -29,7 +29,7 @@ from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
 from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
-from nonlinear import LIMITERS, Rows
+from nonlinear import LIMITERS, Rows, commands, simulate
 from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
 Floats = npt.NDArray[np.float64]
@@ -98,13 +98,7 @@ class Conditional:
 
 
 def saturation_gain(ratio: float) -> float:
-    """Describing function of saturation, of amplitude over limit; 1 up to the limit.
-
-    Examples
-    --------
-    >>> saturation_gain(1.0), round(saturation_gain(2.0), 4)
-    (1.0, 0.609)
-    """
+    """Describing function of saturation, of amplitude over limit; 1 up to the limit."""
     if ratio <= 1.0:
         return 1.0
     return 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
@@ -123,7 +117,7 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
     ``loops`` are sampled and sliding; in ``settle_ticks`` the linear drive settles.
     """
     margins = {point: exact_margins(loops, point) for point in wire(design).points if point != "output"}
-    result = [
+    predictions = [
         _prediction(loops, point, margins[point].gain_lower, limit, limiter)
         for point, limit, limiter in _limits(design)
         if isfinite(limit) and margins[point].stable and margins[point].gain_lower > LOW_GAIN
@@ -131,16 +125,16 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
     design = quiet(design)
     threshold, following = step_threshold(design, settle_ticks)
     hertz, amplitude = _hovering(design, threshold, settle_ticks) if threshold else (None, None)
-    found = Conditional(
+    return Conditional(
         margins=margins,
-        predictions=tuple(one for one in result if one is not None),
+        predictions=tuple(one for one in predictions if one is not None),
         threshold_rad=threshold,
         next_rad=following,
         full_deflection_rad=design.validation.full_deflection_rad,
         oscillation_hz=hertz,
         oscillation_rad=amplitude,
+        **({} if following is None else _end(design, following, settle_ticks)),
     )
-    return found if following is None else _ended(found, design, following, settle_ticks)
 
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:
@@ -162,10 +156,9 @@ def _prediction(loops: Loops, point: str, gain: float, limit: float, limiter: st
     hertz = _oscillation_hz(periodic_loop(loops, point), gain)
     if hertz == 0.0:
         return None
-    design, omega = loops.design, 2.0 * pi * hertz
-    behind = gain * ratio * limit  # fundamental behind the limit
-    output = behind * _to_output(design, point, omega)
-    integral = {"i_ref": design.controller.velocity, "u": design.controller.current}.get(point)
+    control = loops.design.controller
+    output = gain * ratio * limit * _to_output(loops.design, point, 2.0 * pi * hertz)  # fundamental behind it
+    integral = {"i_ref": control.velocity, "u": control.current}.get(point)
     stops = integral is not None and integral.integral_time_s is not None and "U/R" not in limiter
     return Prediction(point, limit, limiter, gain, ratio * limit, hertz, output, stops)
 
@@ -187,20 +180,20 @@ def _oscillation_hz(loop: PeriodicLoop, gain: float) -> float:
 
 def _to_output(design: Design, point: str, omega: float) -> float:
     """Output angle per unit behind the limit at a frequency, inner loops taken as ideal."""
-    motor, J, friction = design.effective_motor, design.inertia_kgm2, design.friction
-    inertia = abs(J * (1j * omega) ** 2 + friction.viscous() * 1j * omega)
+    motor, J, N, s = design.effective_motor, design.inertia_kgm2, design.total_ratio, 1j * omega
     if point == "w_ref":
-        return 1.0 / (omega * design.total_ratio)
+        return 1.0 / (omega * N)
+    drag, kM = design.friction.viscous(), motor.torque_constant_Nm_A or 0.0
+    inertia = abs(J * s**2 + drag * s)
     if point == "i_ref":
-        return (motor.torque_constant_Nm_A or 0.0) / (inertia * design.total_ratio)
+        return kM / (inertia * N)
     if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V / (inertia * design.total_ratio)
+        return motor.source_gain_Nm_V / (inertia * N)
     assert motor.resistance_ohm is not None
     assert motor.inductance_H is not None
-    kM, kE = motor.torque_constant_Nm_A or 0.0, motor.back_emf_constant_Vs_rad or 0.0
-    s = 1j * omega
-    whole = (J * s + friction.viscous()) * (motor.inductance_H * s + motor.resistance_ohm) + kM * kE
-    return abs(kM / (s * whole)) / design.total_ratio
+    kE = motor.back_emf_constant_Vs_rad or 0.0
+    whole = (J * s + drag) * (motor.inductance_H * s + motor.resistance_ohm) + kM * kE
+    return abs(kM / (s * whole)) / N
 
 
 def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
@@ -260,13 +253,10 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
     if rows["ticks"].max() > LONGEST_TICKS:
         raise TooManyTicks(f"a step of {int(rows['ticks'].max())} ticks: at most {LONGEST_TICKS} are run")
     result = rows.run()
-    errors = []
-    for last in (0, 1):
-        low, high = result.span("output_angle_rad", last)
-        errors.append(np.maximum(np.abs(high - sizes_rad), np.abs(low - sizes_rad)))
+    spans = [result.span("output_angle_rad", last) for last in (0, 1)]
+    errors = [np.abs(np.array(span) - sizes_rad).max(axis=0) for span in spans]
     near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design) + accepted_rad(design))
-    low, high = result.span("output_angle_rad")
-    rests = high - low <= RESTING * sizes_rad
+    rests = np.ptp(spans[0], axis=0) <= RESTING * sizes_rad
     limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
     held = rests & (limited > HELD)
     alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
@@ -311,10 +301,10 @@ def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int 
     return rows
 
 
-def _ended(found: Conditional, design: Design, size_rad: float, settle_ticks: int) -> Conditional:
+def _end(design: Design, size_rad: float, settle_ticks: int) -> dict[str, Any]:
     """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
     result = step_rows(design, np.array([size_rad]), settle_ticks, AGAIN[1]).run()
-    spans = [float(np.subtract(*result.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
+    spans = [float(np.ptp(result.span("output_angle_rad", last))) for last in (0, 1)]
     used = result.window_limit_fraction if result.ok[0] else result.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in OWN}
     limiter = max(shares, key=lambda name: shares[name])
@@ -323,23 +313,17 @@ def _ended(found: Conditional, design: Design, size_rad: float, settle_ticks: in
         ending = "diverges"
     elif spans[0] <= RESTING * size_rad:
         ending = "is held by a limit"
-    return replace(
-        found,
-        limiter=limiter if shares[limiter] > 0.0 else "",
-        limiter_share=shares[limiter],
-        ending=ending,
-        end_rad=0.5 * spans[0],
-    )
+    share = shares[limiter]
+    named = limiter if share > 0.0 else ""
+    return {"limiter": named, "limiter_share": share, "ending": ending, "end_rad": 0.5 * spans[0]}
 
 
 def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    from nonlinear import commands, simulate
-
-    ticks = step_rows(design, np.array([size_rad]), settle_ticks).value("ticks")
-    run = simulate(
-        design, commands.step(size_rad), ticks * design.controller.period_s, raise_on_failure=False
+    seconds = (
+        step_rows(design, np.array([size_rad]), settle_ticks).value("ticks") * design.controller.period_s
     )
+    run = simulate(design, commands.step(size_rad), seconds, raise_on_failure=False)
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))

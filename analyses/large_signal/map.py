@@ -15,25 +15,24 @@ from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
 from analyses.finite import finite
+from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import (
     CAUSES,
     WAVEFORMS,
     causes,
     limiter_fractions,
     not_linear,
-    unexplained,
     waveforms,
 )
-from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import (
     MOST_TICKS,
     amplitudes,
     frequency_range_hz,
+    linear_steady_state,
     run_tones,
     tones,
     work_ticks,
 )
-from analyses.linear.static_threshold import static_threshold
 
 if TYPE_CHECKING:
     import pandas
@@ -93,21 +92,17 @@ class AmplitudeMap:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row a point: command, what acts, waveform, fundamental (pandas needed)."""
-
-        frame = need("pandas", "tables", "to_pandas")
         amplitude, frequency = np.meshgrid(self.amplitude_rad, self.frequency_hz, indexing="ij")
-        return frame.DataFrame(
-            {
-                "amplitude_rad": amplitude.ravel(),
-                "frequency_hz": frequency.ravel(),
-                "cause": np.array(CAUSES)[self.cause].ravel(),
-                "waveform": np.array(WAVEFORMS)[self.waveform].ravel(),
-                "gain_db": self.gain_db.ravel(),
-                "phase_deg": self.phase_deg.ravel(),
-                "distortion": self.distortion.ravel(),
-                "stick_fraction": self.stick_fraction.ravel(),
-            }
-        )
+        columns = {
+            "amplitude_rad": amplitude,
+            "frequency_hz": frequency,
+            "cause": np.array(CAUSES)[self.cause],
+            "waveform": np.array(WAVEFORMS)[self.waveform],
+        }
+        names = ("gain_db", "phase_deg", "distortion", "stick_fraction")
+        columns |= {name: getattr(self, name) for name in names}
+        frame = need("pandas", "tables", "to_pandas")
+        return frame.DataFrame({name: values.ravel() for name, values in columns.items()})
 
     def share(self, *names: str) -> float:
         """Fraction of the points with one of these causes."""
@@ -127,9 +122,8 @@ def amplitude_map(
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
     `MOST_TICKS`.
     """
-    asked, work = counts, counts[0] * work_ticks(design, loops, counts[1])
-    part = min(np.sqrt(MOST_TICKS / work), 1.0)  # of the grid on either side, within `MOST_TICKS`
-    counts = max(int(part * asked[0]), 2), max(int(part * asked[1]), 2)
+    part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
+    given, counts = counts, tuple(max(int(part * count), 2) for count in counts)
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
@@ -137,26 +131,26 @@ def amplitude_map(
     start = linear_steady_state(loops, omega)
     border, slow = onset(loops, omega), slow_protection(design, loops)
     which = np.tile(np.arange(len(omega)), len(levels))
-    amplitude = np.repeat(levels, len(omega))
+    amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
     result = run_tones(
         design, frequencies, which, amplitude, start, begin,
         load_Nm=load_Nm, friction_on=friction_on, insist=True,
     )  # fmt: skip
-    rubs = np.zeros(len(which), dtype=bool)
-    off = np.flatnonzero(friction_on & unexplained(result, start.output[which], amplitude))
+    cause = causes(result, linear, amplitude, friction_on)
+    off = np.flatnonzero(cause == CAUSES.index("friction"))
     if len(off):  # the same runs without dry friction: is it that?
         free = run_tones(
             design, frequencies, which[off], amplitude[off], start, begin[off],
             load_Nm=load_Nm, friction_on=False,
         )  # fmt: skip
-        rubs[off] = ~not_linear(free, start.output[which[off]], amplitude[off])
+        cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
         load_Nm=load_Nm,
         amplitude_rad=levels,
         frequency_hz=omega / (2.0 * np.pi),
-        cause=causes(result, start.output[which], amplitude, rubs).reshape(shape),
+        cause=cause.reshape(shape),
         waveform=waveforms(result).reshape(shape),
         limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),
@@ -166,7 +160,7 @@ def amplitude_map(
         linear=start.output,
         onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
         ticks=int(result.column("ticks").sum()),
-        coarser=counts != asked,
+        coarser=counts != given,
     )
 
 
@@ -175,8 +169,7 @@ def slow_protection(design: Design, loops: Loops) -> list[str]:
     limits = design.limits
     if limits.peak_time_s is None or limits.overload_time_s is None:
         return []
-    _, high = frequency_range_hz(design, loops)
-    return ["overload"] if limits.overload_time_s * high > LONG else []
+    return ["overload"] if limits.overload_time_s * frequency_range_hz(design, loops)[1] > LONG else []
 
 
 FINE = 64  # points between two frequencies of the map, at which the linear response is known
@@ -217,8 +210,8 @@ class AmplitudeBode:
 def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) -> AmplitudeBode:
     """Read the responses at the design's amplitude fractions, and the bandwidths at all, from a map."""
     full = design.validation.full_deflection_rad
-    asked = sorted(design.validation.amplitude_fractions)
     there = amplitude_map.amplitude_rad / full  # a coarse map has not all
+    asked = sorted(design.validation.amplitude_fractions)
     nearest = {fraction: int(np.argmin(np.abs(there - fraction))) for fraction in asked}
     on_it = {one: k for one, k in nearest.items() if math.isclose(there[k], one, rel_tol=1e-9)}
     places = list(on_it.values())
@@ -232,7 +225,6 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
     fine_deg = np.degrees(np.unwrap(np.angle(linear_steady_state(loops, 2.0 * math.pi * fine).output)))
-    linear_db, linear_deg = fine_db[::FINE], fine_deg[::FINE]
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:
         with np.errstate(invalid="ignore"):
@@ -247,8 +239,8 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
         amplitude_rad=amplitude_map.amplitude_rad[places],
         gain_db=gain[places],
         phase_deg=phase[places],
-        linear_db=linear_db,
-        linear_deg=linear_deg,
+        linear_db=fine_db[::FINE],
+        linear_deg=fine_deg[::FINE],
         all_amplitude_rad=amplitude_map.amplitude_rad,
         minus3db_hz=first_3,
         minus90deg_hz=first_90,
@@ -271,15 +263,7 @@ def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:
 
 
 def crossing_range(hz: np.ndarray, values: np.ndarray, level: float) -> tuple[float, float]:
-    """The frequencies between which the values first fall through a level; what is NaN tells nothing.
-
-    Examples
-    --------
-    >>> import math
-    >>> import numpy as np
-    >>> crossing_range(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.0, math.nan, -5.0, -9.0]), -3.0)
-    (1.0, 4.0)
-    """
+    """The frequencies between which the values first fall through a level; what is NaN tells nothing."""
     known = np.flatnonzero(~np.isnan(values))
     above = values[known] >= level
     first = int(np.argmin(above)) if known.size and not above.all() else known.size

@@ -25,8 +25,7 @@ from analyses.large_signal.map import (
     amplitude_map,
 )
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
-from analyses.large_signal.steady_start import DECAY, linear_steady_state
-from analyses.large_signal.tones import MOST_TICKS, run_tones, tones, work_ticks
+from analyses.large_signal.tones import DECAY, MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
 
@@ -79,21 +78,20 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
     omega = np.array([t.omega_rad_s for t in chosen])
     border, start = onset(loops, omega), linear_steady_state(loops, omega)
     brief = replace(start, settling_ticks=ceil(start.settling_ticks * log(SETTLED) / DECAY))
-    limited = np.flatnonzero(np.isfinite(border.amplitude_rad))
+    there = np.isfinite(border.amplitude_rad)
+    limited, linear = np.flatnonzero(there), border.amplitude_rad[there]
     if not (start.stable and limited.size):
         return None
-    simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
-    linear = border.amplitude_rad[limited]
 
     def acting(amplitude: np.ndarray) -> np.ndarray:
         begin = np.minimum(amplitude, 0.99 * linear)
-        seen = run_tones(design, chosen, limited, amplitude, brief, begin, harmonics=1)
-        return limiter_fractions(seen)
+        return limiter_fractions(run_tones(design, chosen, limited, amplitude, brief, begin, harmonics=1))
 
+    simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
     simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])
     return LimitShift(
         omega / (2.0 * np.pi),
-        np.where(np.isfinite(border.amplitude_rad), border.amplitude_rad, np.nan),
+        np.where(there, border.amplitude_rad, np.nan),
         simulated,
         border.active,
         tuple(names),

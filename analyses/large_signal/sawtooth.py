@@ -11,7 +11,7 @@ import numpy as np
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
-from analyses.large_signal.tones import tone
+from analyses.large_signal.tones import Tone, tone
 from analyses.specification.capability import drive_figures
 from nonlinear import State, commands, simulate
 
@@ -128,41 +128,44 @@ def sawtooth(
     chosen = tone(wanted, design, least_updates=400)
     runs = []
     for load in design.validation.loads_Nm:
-        result = _run(design, amplitude, chosen.frequency_hz, chosen.ticks // chosen.cycles, load, rate)
+        result = _run(design, amplitude, chosen, load, rate)
         if result is None:
             reason = f"at a load of {load:g} N m the output stands still"
             return Sawtooth(amplitude, chosen.frequency_hz, rate, reason=reason)
         runs.append(result)
-    swift = design.controller.position_loop.gain / chosen.omega_rad_s
     push = min(result.acceleration_rad_s2 for result in figures)
-    reversal = math.degrees(2.0 * rate / push * chosen.omega_rad_s)
-    electric = design.motor.has_electrical_dynamics
     return Sawtooth(
-        amplitude, chosen.frequency_hz, rate, swift, reversal, electric, tuple(runs), slowest_rad_s=slowest
+        amplitude,
+        chosen.frequency_hz,
+        rate,
+        gain_over_frequency=design.controller.position_loop.gain / chosen.omega_rad_s,
+        reversal_deg=math.degrees(2.0 * rate / push * chosen.omega_rad_s),
+        has_current=design.motor.has_electrical_dynamics,
+        runs=tuple(runs),
+        slowest_rad_s=slowest,
     )
 
 
-def _run(
-    design: Design, amplitude: float, frequency_hz: float, period_ticks: int, load_Nm: float, rate: float
-) -> SawtoothRun | None:
+def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float) -> SawtoothRun | None:
     """Simulate from the flank of the triangle on, and keep the last periods; none of a drive that stands."""
-    formula = rate_limited(amplitude, 2.0 * math.pi * frequency_hz, rate)
-    N = design.total_ratio
+    formula, N, period = (
+        rate_limited(amplitude, at.omega_rad_s, rate),
+        design.total_ratio,
+        at.ticks // at.cycles,
+    )
     begin = State()
     if formula.x >= FULL_TRIANGLE:
-        lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * frequency_hz)
+        lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * at.frequency_hz)
         begin = State(motor_angle_rad=-N * rate * lag_s)
-    seconds = (2 + PERIODS_SHOWN) * period_ticks * design.controller.period_s
-    run = simulate(design, commands.sine(amplitude, frequency_hz), seconds, load_Nm, initial=begin)
-    last = slice(-period_ticks, None)
+    seconds = (2 + PERIODS_SHOWN) * period * design.controller.period_s
+    run = simulate(design, commands.sine(amplitude, at.frequency_hz), seconds, load_Nm, initial=begin)
+    last = slice(-period, None)
     y = run.output_angle_rad[last] - run.output_angle_rad[last].mean()
-    turn = np.exp(-2j * np.pi * frequency_hz * run.time_s[last])
-    phasor = 2j * np.mean(y * turn)
-    fundamental = abs(phasor)
-    rms = float(np.sqrt(np.mean(y**2)))
+    phasor = 2j * np.mean(y * np.exp(-2j * np.pi * at.frequency_hz * run.time_s[last]))
+    fundamental, rms, peak = abs(phasor), float(np.sqrt(np.mean(y**2))), float(np.max(np.abs(y)))
     if rms == 0.0 or fundamental == 0.0:
         return None
-    shown = slice(-PERIODS_SHOWN * period_ticks, None, max(1, PERIODS_SHOWN * period_ticks // POINTS))
+    shown = slice(-PERIODS_SHOWN * period, None, max(1, PERIODS_SHOWN * period // POINTS))
     time = run.time_s[shown]
     return SawtoothRun(
         load_Nm=load_Nm,
@@ -174,8 +177,8 @@ def _run(
         current_A=run.current_A[shown],
         gain=fundamental / amplitude,
         lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0),
-        peak_rad=float(np.max(np.abs(y))),
+        peak_rad=peak,
         distortion=math.sqrt(max(rms**2 - fundamental**2 / 2.0, 0.0)) / (fundamental / math.sqrt(2.0)),
-        crest=float(np.max(np.abs(y))) / rms,
+        crest=peak / rms,
         formula=formula,
     )

@@ -17,9 +17,10 @@ border: ``A = 2 q/(pi g)``, stable.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from math import exp, log, pi
+from itertools import pairwise
+from math import exp, log, nan, pi
 from typing import Literal
 
 import numpy as np
@@ -78,14 +79,11 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
     if coupling is None or coupling.play_rad <= 0.0 or design.controller.position is None:
         return ()
     half = 0.5 * coupling.play_rad
-    grid = np.geomspace(LEAST * half, MOST * half, POINTS)
-
-    def mode(log_A: float, near: Mode | None) -> Mode | None:
-        return _at_twist(design, exp(log_A), friction, near)
-
+    grid = np.log(np.geomspace(LEAST * half, MOST * half, POINTS))
+    found = kept_up(lambda log_A, near: _at_twist(design, exp(log_A), friction, near), grid)
     return tuple(
         _cycle("play", design, there, exp(log_A), there.shape["twist"], friction=friction, stable=stable)
-        for log_A, there, stable in kept_up(mode, np.log(grid))
+        for log_A, there, stable in found
     )
 
 
@@ -105,14 +103,7 @@ def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -
 
 
 def _cycle(
-    cause: Cause,
-    design: Design,
-    mode: Mode,
-    inner: float,
-    seen: complex,
-    *,
-    friction: bool,
-    stable: bool,
+    cause: Cause, design: Design, mode: Mode, inner: float, seen: complex, *, friction: bool, stable: bool
 ) -> Cycle:
     """The cycle whose nonlinearity sees ``inner``, where it sees ``seen`` of the mode."""
     state = {name: inner / seen * value for name, value in mode.shape.items()}
@@ -145,7 +136,7 @@ def kept_up(
     Gives value, oscillation, and whether it dies out beyond: an amplitude at which it attracts.
     """
     last: Mode | None = None
-    for k, value in enumerate(map(float, grid)):
+    for low, value in pairwise([nan, *map(float, grid)]):
         now = mode(value, last)
         if last is not None and now is not None and _changes(last.radius - 1.0, now.radius - 1.0):
 
@@ -153,7 +144,6 @@ def kept_up(
                 found = mode(x, near)
                 return -1.0 if found is None else found.radius - 1.0
 
-            low = float(grid[k - 1])
             if _changes(excess(low), excess(value)):
                 root = float(brentq(excess, low, value, xtol=1e-12))
                 there = mode(root, last)
@@ -201,21 +191,16 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     for _, twist, beyond in coupling.pieces[1:]:  # each bend is a dead zone of its own
         stiffness, k = stiffness + (beyond - k) * dead_zone((half + twist) / A), beyond
     own = replace(design.friction, load_coefficient=0.0)
-    slope = own.viscous_Nms_rad
+    slope, load_slope = own.viscous_Nms_rad, behind.viscous_Nms_rad
     if friction:
         at = Operating(point="describing-function", speed_amplitude_rad_s=W)
         slope = slope_at(replace(design, friction=own), at)
-    load_slope = behind.viscous_Nms_rad + (described_dry(behind.dry_torque_Nm, W_l) if friction else 0.0)
-    return replace(
-        design,
-        coupling=Coupling(
-            stiffness_Nm_rad=stiffness,
-            damping_Nms_rad=n * coupling.damping_Nms_rad,
-            after=coupling.after,
-        ),
-        friction=Friction(viscous_Nms_rad=slope),
-        load=replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope)),
+        load_slope += described_dry(behind.dry_torque_Nm, W_l)
+    spring = Coupling(
+        stiffness_Nm_rad=stiffness, damping_Nms_rad=n * coupling.damping_Nms_rad, after=coupling.after
     )
+    load = replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope))
+    return replace(design, coupling=spring, friction=Friction(viscous_Nms_rad=slope), load=load)
 
 
 def mode_at(design: Design, at: Operating) -> Mode | None:
@@ -235,11 +220,6 @@ def output_of(design: Design, state: dict[str, complex]) -> complex:
     return phi / design.ratio_behind_coupling
 
 
-def cycles_of_quantisation(design: Design) -> tuple[Cycle, ...]:
-    """The cycles about the edge of a count of each sensor, friction left out."""
-    return (*cycle_of_counts(design, "quantisation"), *cycle_of_counts(design, "motor-quantisation"))
-
-
 def quantum_of(design: Design, cause: Cause) -> float | None:
     """One count of a sensor: of the output's in rad at the output, of the motor's in rad at the motor."""
     return design.output_quantum_rad if cause == "quantisation" else design.angle_quantum_rad
@@ -255,19 +235,22 @@ def counts_matter(design: Design, cause: Cause) -> bool:
     return velocity is not None and velocity.sensor == "motor" and design.encoder.speed != "ideal"
 
 
-def cycle_of_counts(design: Design, cause: Cause) -> tuple[Cycle, ...]:
-    """The cycle of one sensor: where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up."""
-    q = quantum_of(design, cause)
-    if q is None or not counts_matter(design, cause):
-        return ()
-    free = without_nonlinearities(design)
-    found = _border_of_speed(free) if cause == "motor-quantisation" else _border_at_output(free)
-    if found is None:
-        return ()
-    border, mode = found
-    amplitude = 2.0 * q / (pi * border)
-    seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
-    return (_cycle(cause, free, mode, amplitude, seen, friction=False, stable=True),)
+def cycles_of_quantisation(design: Design, causes: Iterable[Cause] = tuple(SENSORS)) -> tuple[Cycle, ...]:
+    """The cycles about the edge of a count of each sensor, friction left out.
+
+    There is one where the loop needs the gain ``2 q/(pi A)`` of its counts to keep it up.
+    """
+    free, found = without_nonlinearities(design), []
+    for cause in causes:
+        if not counts_matter(design, cause):
+            continue
+        border = _border_at_output(free) if cause == "quantisation" else _border_of_speed(free)
+        if border is not None:
+            gain, mode = border
+            amplitude = 2.0 * (quantum_of(design, cause) or 0.0) / (pi * gain)
+            seen = output_of(free, mode.shape) if cause == "quantisation" else mode.shape["th"]
+            found.append(_cycle(cause, free, mode, amplitude, seen, friction=False, stable=True))
+    return tuple(found)
 
 
 def _border_at_output(free: Design) -> tuple[float, Mode] | None:
@@ -337,12 +320,10 @@ def _oscillation(
 def without_nonlinearities(design: Design) -> Design:
     """The drive in contact, without play, friction by load and dry friction."""
     coupling, behind = design.coupling, design.load.friction
+    smooth = None if behind is None else LoadFriction(viscous_Nms_rad=behind.viscous_Nms_rad)
     return replace(
         design,
         coupling=None if coupling is None else replace(coupling, play_rad=0.0),
         friction=Friction(viscous_Nms_rad=design.friction.viscous_Nms_rad),
-        load=replace(
-            design.load,
-            friction=None if behind is None else LoadFriction(viscous_Nms_rad=behind.viscous_Nms_rad),
-        ),
+        load=replace(design.load, friction=smooth),
     )

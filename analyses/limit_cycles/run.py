@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.large_signal.steady_start import ELASTIC, PLACES
+from analyses.large_signal.tones import ELASTIC, PLACES
 from analyses.limit_cycles.describing import (
     SENSORS,
     Cycle,
@@ -28,9 +28,6 @@ CYCLES_WATCHED = 24
 _STARTS = {**PLACES, **ELASTIC}
 
 
-Seen = Literal["confirmed", "refuted"]
-
-
 @dataclass(frozen=True)
 class Confirmation:
     """A predicted cycle against the simulator, started in its shape at several sizes."""
@@ -42,7 +39,7 @@ class Confirmation:
     frequency_hz: float | None  # where the motion ends, of a stable one
 
     @property
-    def verdict(self) -> Seen:
+    def verdict(self) -> Literal["confirmed", "refuted"]:
         """In one word."""
         return "refuted" if self.ratio is None else "confirmed"
 
@@ -126,16 +123,11 @@ def confirm(design: Design, cycle: Cycle) -> Confirmation:
     row = rows.take(int(turns[nearest]))
     row["ticks"] = window
     run = row.trajectory()
-    return Confirmation(cycle, float(ratios[nearest]), _frequency(run.time_s, run.motor_speed_rad_s))
-
-
-def _frequency(time_s: np.ndarray, values: np.ndarray) -> float | None:
-    """Frequency from the rising zero crossings; ``None`` with fewer than two of them."""
-    up = np.flatnonzero((values[:-1] < 0.0) & (values[1:] >= 0.0))
-    if len(up) < 2:
-        return None
-    exact = time_s[up] - values[up] * (time_s[up + 1] - time_s[up]) / (values[up + 1] - values[up])
-    return float((len(up) - 1) / (exact[-1] - exact[0]))
+    t, w = run.time_s, run.motor_speed_rad_s
+    up = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
+    rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
+    hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None
+    return Confirmation(cycle, float(ratios[nearest]), hertz)
 
 
 def _tried(design: Design, cycle: Cycle) -> Design:

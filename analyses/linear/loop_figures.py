@@ -31,7 +31,7 @@ HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
-AWAY = "the load or falling friction drives it away"
+AWAY = "the load, cogging or falling friction drives it away"
 
 
 def held_loop(loops: Loops, name: str) -> Loop | None:
@@ -52,13 +52,7 @@ def other_loops(loops: Loops, design: Design, *, rotor: RotorState = "free") -> 
 
 
 def by_itself(name: str) -> str:
-    """What is said of such a loop.
-
-    Examples
-    --------
-    >>> by_itself("velocity")
-    'with the load moment held; by itself, outer loops open, the load or falling friction drives it away'
-    """
+    """What is said of such a loop."""
     return f"with the {HELD[name]}; by itself, {OPEN[name]}, {AWAY}"
 
 
@@ -67,43 +61,25 @@ Figure = TypeVar("Figure")
 
 @dataclass(frozen=True)
 class LoopFigures:
-    """The figures of one loop.
-
-    Attributes
-    ----------
-    loop : Loop
-        The loop itself.
-    plain_response : PlainSystem or python-control system
-        What bandwidth and step are taken of, behind `mean`: the closed loop; for the position loop the
-        command to the output, feed-forward and filter of the command included.
-    margins : StabilityMargins
-        Of the open loop.
-    bandwidth, peaks, step : Bandwidth, Peaks, StepFigures or None
-        ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why).
-    notes : tuple of str
-        Why a figure of a stable loop is missing.
-    held : LoopFigures or None
-        Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop
-        as `analyses.linear.loop_figures` holds it, which is stable.
-    locked : LoopFigures or None
-        Of a current loop with a free rotor: the same with the rotor locked, where it was asked for.
-    mean : CommandMean or None
-        What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk.
-    reference : LoopFigures or None
-        Of a position loop with a mean or a filter of the command: the same with bandwidth and step of the
-        response to the reference behind them.
-    """
+    """The figures of one loop."""
 
     loop: Loop
+    # What bandwidth and step are taken of, behind ``mean``: the closed loop; for the position loop the
+    # command to the output, feed-forward and filter of the command included. A plain or python-control system
     plain_response: Any
-    margins: StabilityMargins
+    margins: StabilityMargins  # of the open loop
+    # ``None`` where the closed loop is not stable, or has no such figure (then ``notes`` say why)
     bandwidth: Bandwidth | None
     peaks: Peaks | None
     step: StepFigures | None
     notes: tuple[str, ...] = ()
+    # Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop as
+    # `held_loop` holds it, which is stable
     held: LoopFigures | None = None
-    locked: LoopFigures | None = None
+    locked: LoopFigures | None = None  # of a current loop with a free rotor, where it was asked for: locked
+    # What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk
     mean: CommandMean | None = None
+    # Of a position loop with a mean or a filter of the command: with bandwidth and step behind them
     reference: LoopFigures | None = None
 
     def asked(self, requirement: Requirement) -> LoopFigures:
@@ -162,7 +138,6 @@ def loop_figures(
     Raises `InputError`, `NumericalError`: if the margins cannot be found; another figure that cannot becomes
     a note.
     """
-
     response = loop.plain_closed if response is None else response
     margins = stability_margins(loop.plain_open, certify=certify)
     if margins.stable is not True:
@@ -172,7 +147,7 @@ def loop_figures(
 
 
 def _answering(
-    figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool, step: bool
+    figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool = True, step: bool
 ) -> LoopFigures:
     """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
     from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
@@ -230,14 +205,14 @@ def all_loop_figures(
     """
     result = {}
     needed = any(r.rotor == "locked" for r in loops.design.requirements)
+    wanted = (needed if locked is None else locked) and loops.operating.rotor != "locked"
     for name, loop in loops.present.items():
         try:
             if name == "position":
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
-            wanted = name == "current" and loops.operating.rotor != "locked"
-            if wanted and (needed if locked is None else locked):
+            if name == "current" and wanted:
                 own = partial(_locked, loops, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
                 result[name] = replace(result[name], locked=with_it)
@@ -272,6 +247,6 @@ def _position(loops: Loops, loop: Loop, *, step: bool, certify: bool) -> LoopFig
     if filtered:
         bare = replace(design, command=replace(design.command, filter_time_s=0.0))
         response = other_loops(loops, bare).plain_response
-    reference = _answering(figures, response, None, bandwidth=True, step=step)
+    reference = _answering(figures, response, None, step=step)
     said = (profile_note(design),) if mean else ()
     return replace(figures, reference=reference, notes=(*figures.notes, *said))

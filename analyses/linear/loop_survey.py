@@ -68,32 +68,17 @@ class OperatingPointFigures:
 
 @dataclass(frozen=True)
 class LoopSurvey:
-    """The loops of a design from every side.
-
-    Attributes
-    ----------
-    loops : Loops
-        Sampled, sliding, no load.
-    forms : mapping of str to mapping of str to LoopFigures
-        By form, then by loop; step figures of the sampled form only.
-    break_points : mapping of str to BreakPoint
-    operating_points : tuple of OperatingPointFigures
-    budgets : mapping of str to DelayBudget
-        At the lowest gain crossover of each loop that has one.
-    onset : Onset or None
-        The limit of linear validity; ``None`` where nothing limits.
-    refused : tuple of str
-        Loops of the other forms and operating points whose margins were not found, and why.
-    """
+    """The loops of a design from every side."""
 
     design: Design
-    loops: Loops
+    loops: Loops  # sampled, sliding, no load
+    # By form, then by loop; step figures of the sampled form only
     forms: Mapping[str, Mapping[str, LoopFigures]]
     break_points: Mapping[str, BreakPoint]
     operating_points: tuple[OperatingPointFigures, ...]
-    budgets: Mapping[str, DelayBudget]
-    onset: Onset | None
-    refused: tuple[str, ...] = ()
+    budgets: Mapping[str, DelayBudget]  # at the lowest gain crossover of each loop that has one
+    onset: Onset | None  # the limit of linear validity; ``None`` where nothing limits
+    refused: tuple[str, ...] = ()  # loops of other forms and points whose margins were not found, and why
 
     @property
     def figures(self) -> Mapping[str, LoopFigures]:
@@ -183,10 +168,8 @@ def _break_points(loops: Loops) -> dict[str, BreakPoint]:
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
     """Measure the loop at one break point."""
-
     loop = loops.break_points[name]
-    exact = exact_margins(loops, name) if loop.periodic else None
-    states = len(loop.plain_open.A)
+    exact, states = exact_margins(loops, name) if loop.periodic else None, len(loop.plain_open.A)
     if exact is not None and states > MOST_STATES:
         why = f"the fundamental has {states} states; up to {MOST_STATES} are certified in a report"
         return BreakPoint(None, exact, f"{why}; the exact stability limits are below")
@@ -206,15 +189,15 @@ def operating_points(
     """
     from analyses.specification.capability import drive_figures
 
+    linear = design.axis == "linear"
+
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
     ) -> OperatingPointFigures:
-        moment = load or 0.0
-        at = Operating(point=kind, load_Nm=moment, speed_amplitude_rad_s=speed)
+        at = Operating(point=kind, load_Nm=load or 0.0, speed_amplitude_rad_s=speed)
         slope, loops = slope_at(design, at), loops_at(design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
-        unit = "N" if design.axis == "linear" else "N m"
-        return OperatingPointFigures(kind, label, load, slope, figures, unit)
+        return OperatingPointFigures(kind, label, load, slope, figures, "N" if linear else "N m")
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
@@ -225,19 +208,17 @@ def operating_points(
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
     top = drive_figures(design).output_rate_rad_s * design.total_ratio
-    shares = DESCRIBED_FRACTIONS if described and 0.0 < top < np.inf else ()
+    speeds = [share * top for share in DESCRIBED_FRACTIONS] if described and 0.0 < top < np.inf else []
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point("at rest", load, "rest"))
-        for speed in (share * top for share in shares):
-            unit = "rad/s" if design.axis == "rotary" else "m/s"
-            label = f"speed amplitude {speed:.3g} {unit}"
+        for speed in speeds:
+            label = f"speed amplitude {speed:.3g} {'m/s' if linear else 'rad/s'}"
             points.append(point(label, load, "describing-function", speed))
     return tuple(points)
 
 
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
     """Give the delay budget at the lowest gain crossover of each loop."""
-
     budgets: dict[str, DelayBudget] = {}
     for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
         crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
@@ -250,7 +231,6 @@ def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, De
 
 def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     """Give the limit of linear validity around the bandwidth of the outermost loop."""
-
     outermost = loops.design.controller.outermost
     if not loops.limiters or outermost not in figures:
         return None

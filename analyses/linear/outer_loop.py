@@ -61,17 +61,15 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     >>> loop_around(assemble_loops("ilr33-amber"), OuterLoop("roll rate", "fin", "command", airframe, 1e-3))
     Loop(roll rate, broken at command, in rad, every 1 ms)
     """
-    drive = loops.reference_to_output
+    drive, system, period = loops.reference_to_output, outer.system, None
     if drive is None:
         raise InputError("--around: these loops have no response to a command", where=loops.design.name)
     if loops.form == "sampled":
         system, period = _sampled(outer, float(drive.dt))
         drive = held(control.ss(drive), round(period / float(drive.dt)))
-    else:
-        if not outer.continuous:
-            message = f"dt: a sampled outer loop; allowed with --form {loops.form}: a continuous one (dt = 0)"
-            raise InputError(message, where=outer.name)
-        system, period = outer.system, None
+    elif not outer.continuous:
+        message = f"dt: a sampled outer loop; allowed with --form {loops.form}: a continuous one (dt = 0)"
+        raise InputError(message, where=outer.name)
     around = drive * (-outer.sign * system)
     if isinstance(around, control.StateSpace):
         one = control.ss([], [], [], [[1.0]], around.dt)
@@ -80,16 +78,8 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     angle = "m" if loops.design.axis == "linear" else "rad"
     units = {"position": angle, "velocity": f"{angle}/s", "current": "A"}
     unit = units.get(loops.design.controller.outermost, "V")
-    return Loop(
-        name=outer.name,
-        break_point="command",
-        plain_open=around,
-        plain_closed=around.feedback(1),
-        plain_sensitivity=one.feedback(around),
-        period_s=period,
-        unit_in=unit,
-        unit_out=unit,
-    )
+    closed, sensitivity = around.feedback(1), one.feedback(around)
+    return Loop(outer.name, "command", around, closed, sensitivity, period, unit_in=unit, unit_out=unit)
 
 
 def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, float]:
@@ -101,10 +91,8 @@ def _sampled(outer: OuterLoop, drive_s: float) -> tuple[control.StateSpace, floa
     times = round(period / drive_s)
     if times < 1 or abs(times * drive_s - period) > _SAME_TIME * period:
         key = "sampling_period" if outer.continuous else "dt"
-        message = (
-            f"{key} = {period:g} s: allowed: whole multiples of {drive_s:g} s, the period of the command"
-        )
-        raise InputError(message, where=outer.name)
+        allowed = f"whole multiples of {drive_s:g} s, the period of the command"
+        raise InputError(f"{key} = {period:g} s: allowed: {allowed}", where=outer.name)
     if outer.continuous:
         return control.ss(control.sample_system(outer.system, period, method="zoh")), period
     return outer.system, period

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg import schur
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.loop import rational_loop
+from actuator_lti.systems.phase import unwrapped_phase_deg
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import LoopFigures
 
@@ -45,8 +47,6 @@ def curve(system: Any, omega_rad_s: np.ndarray) -> Curve:
     Where the phase cannot be followed (an undamped spring: a zero or pole on the axis), it is that of the
     points, made continuous from one to the next.
     """
-    from actuator_lti.systems.phase import unwrapped_phase_deg
-
     values = response_at(system, omega_rad_s)
     try:
         phase = np.asarray(unwrapped_phase_deg(system, omega_rad_s))
@@ -93,8 +93,6 @@ def _triangular(system: Any, points: np.ndarray) -> np.ndarray:
 
     A break point over a whole position period has hundreds of states.
     """
-    from scipy.linalg import schur
-
     a, b, c, d = (np.asarray(part, dtype=float) for part in (system.A, system.B, system.C, system.D))
     upper, turned = schur(a, output="complex")
     right, left = (turned.conj().T @ b)[:, 0], (c @ turned)[0]
@@ -112,17 +110,15 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
     The crossovers themselves are points of it.
     """
     margins = figures.margins
-    marks = [m.frequency_rad_s for m in margins.gain_margins]
-    marks += [m.frequency_rad_s for m in margins.phase_margins]
-    marks = [mark for mark in marks if math.isfinite(mark) and mark > 0.0]
+    every = [m.frequency_rad_s for m in (*margins.gain_margins, *margins.phase_margins)]
+    marks = [mark for mark in every if math.isfinite(mark) and mark > 0.0]
     nyquist = math.pi / margins.period_s if margins.period_s else None
     crossings = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0] or marks
     centre = min(crossings, default=(nyquist or 1e3) / 30.0)
     low = min([centre, *marks[:3]]) / 10**DECADES_BELOW
     high = nyquist or max(centre, *marks[:3], centre) * 10**DECADES_ABOVE
-    grid = np.geomspace(low, high, points)
     inside = [mark for mark in marks if low < mark < high]
-    grid = np.unique(np.concatenate([grid, np.array(inside, dtype=float)]))
+    grid = np.unique([*np.geomspace(low, high, points), *inside])
     if nyquist is not None:
         grid[-1] = nyquist * (1.0 - 1e-4)  # a zero at z = -1 has turned nothing yet
     return grid
@@ -130,7 +126,6 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
 
 def sampled_step(system: Any, samples: int) -> np.ndarray:
     """Give the first samples of the unit step response of a sampled system, for a figure."""
-
     loop = rational_loop(system)
     state, response = np.zeros(loop.order), np.empty(samples)
     for k in range(samples):
@@ -155,15 +150,9 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
         values = np.concatenate([values, response_at(system, middle)])[order]
         omega = np.concatenate([omega, middle])[order]
     shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
-    kept = _framed(shown, frame)
-    return omega[kept], shown[kept]
-
-
-def _framed(shown: np.ndarray, frame: float) -> np.ndarray:
-    """Tell which points a figure needs: one outside the frame as a gap, none too near to be told apart."""
-    kept = [0]
+    kept = [0]  # points that a figure needs: one outside the frame as a gap, none too near to be told apart
     for k, value in enumerate(shown[1:], 1):
         last = shown[kept[-1]]
         if np.isnan(value) != np.isnan(last) or abs(value - last) > 0.006 * frame:
             kept.append(k)
-    return np.array(kept, dtype=int)
+    return omega[kept], shown[kept]

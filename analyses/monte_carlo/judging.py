@@ -21,7 +21,7 @@ from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.statistics import Sketch
+from analyses.monte_carlo.result import Sketch
 from analyses.studies.engine import Chunk
 
 if TYPE_CHECKING:
@@ -66,8 +66,8 @@ def by_loop(design: Design) -> list[Requirement]:
     """The requirements of a design, once for every loop that each holds for: as all verdicts count them."""
     made = []
     for one in design.requirements:
-        named = one.quantity not in LOOP_QUANTITIES or one.loop not in (None, "every")
-        loops = () if named else loops_of(design)
+        every = one.quantity in LOOP_QUANTITIES and one.loop in (None, "every")
+        loops = loops_of(design) if every else ()
         made += [replace(one, id=f"{one.id}/{loop}", loop=loop) for loop in loops] or [one]
     return made
 
@@ -80,12 +80,10 @@ def in_populations(requirement: Requirement, design: Design) -> bool:
     quantity, command = QUANTITIES[requirement.quantity], design.command
     if quantity.scope == "analysis" or requirement.rotor == "locked":
         return False
-    stages = design.controller.stages
-    if not quantity.of_response or "position" not in judged_loops(requirement.loop, stages):
+    loops = judged_loops(requirement.loop, design.controller.stages)
+    if not quantity.of_response or "position" not in loops:
         return True
-    if requirement.to == "reference":
-        return command.filter_time_s == 0.0
-    return command_mean(design) is None
+    return command.filter_time_s == 0.0 if requirement.to == "reference" else command_mean(design) is None
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
@@ -104,27 +102,19 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     values = np.stack([columns[name] for name in names])
     if QUANTITIES[requirement.quantity].absolute:
         values = np.abs(values)  # a margin counts in either direction
-    low = -np.inf if requirement.minimum is None else requirement.minimum
-    high = np.inf if requirement.maximum is None else requirement.maximum
+    distances = np.full(values.shape, np.inf)  # of a value that is itself unlimited, too
     with np.errstate(invalid="ignore"):
-        distances = np.fmin(_beyond(values, low), _beyond(-values, -high))
+        if requirement.minimum is not None:
+            distances = np.fmin(distances, values - requirement.minimum)
+        if requirement.maximum is not None:
+            distances = np.fmin(distances, requirement.maximum - values)
+    distances[np.isnan(values)] = -np.inf
     for k, name in enumerate(names):
-        loop = name.partition(".")[0]
-        unstable = (
-            columns[f"{loop}.stable"] != 1.0 if loop != "drive" else np.zeros(values.shape[1], dtype=bool)
-        )
-        distances[k, unstable | np.isnan(values[k])] = -np.inf
-    worst = np.argmin(distances, axis=0)
-    places = np.arange(values.shape[1])
+        if (stable := columns.get(f"{name.partition('.')[0]}.stable")) is not None:
+            distances[k, stable != 1.0] = -np.inf
+    worst, places = np.argmin(distances, axis=0), np.arange(values.shape[1])
     distance = distances[worst, places]
     return Judged(values[worst, places], distance, distance >= 0.0)
-
-
-def _beyond(values: np.ndarray, limit: float) -> np.ndarray:
-    """values - limit, +inf where there is no limit or the value is itself unlimited."""
-    if np.isneginf(limit):
-        return np.full(values.shape, np.inf)
-    return values - limit
 
 
 def label(requirement: Requirement) -> str:

@@ -6,7 +6,7 @@ import functools
 import hashlib
 import json
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
@@ -37,11 +37,18 @@ from analyses.monte_carlo.judging import (
     source_columns,
     unpacked,
 )
-from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
-from analyses.monte_carlo.store import CHUNK, Store
-from analyses.monte_carlo.task import SampleTask, StepCheck
+from analyses.monte_carlo.result import (
+    MOST,
+    Driver,
+    MonteCarloResult,
+    Odds,
+    WorstCase,
+    clopper_pearson,
+    column_statistics,
+)
+from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
+from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
@@ -146,19 +153,18 @@ def monte_carlo(
     ]
     if tallies:
         odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
-    worst = _worst_cases(task, tallies, Path(folder)) if settings.worst_cases else ()
     return MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
         {name: column_statistics(name, unit, whole.columns[name]) for name, unit in task.units.items()},
-        tuple(odds), worst, Path(folder),
-        {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
+        tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
+        Path(folder), {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
         notes=_notes(task, settings.samples), drivers=_drivers(task, odds),
     )  # fmt: skip
 
 
 def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
     """What each tolerance does alone to the figures that requirements look at, all others nominal."""
-    factors, names = task.sampler.factors, dict.fromkeys(name for one in odds for name in one.columns)
+    factors, names = task.sampler.factors, list(dict.fromkeys(name for one in odds for name in one.columns))
     if not factors or not names:
         return ()
     rows = np.tile(task.sampler.nominal, (2 * len(factors), 1))
@@ -166,12 +172,11 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
         rows[2 * k : 2 * k + 2, k] = factor.box
     figures = task.figures(rows)
     made = [
-        Driver(name, factor.path, *factor.box, *(finite(x) for x in figures[name][2 * k : 2 * k + 2]))
+        Driver(name, factor.path, *factor.box, *map(finite, figures[name][2 * k : 2 * k + 2]))
         for name in names
         for k, factor in enumerate(factors)
     ]
-    order = {name: place for place, name in enumerate(names)}
-    return tuple(sorted(made, key=lambda one: (order[one.column], -one.swing)))
+    return tuple(sorted(made, key=lambda one: (names.index(one.column), -one.swing)))
 
 
 def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:
@@ -208,31 +213,24 @@ def _reduced(
 
 def _worst_cases(
     task: SampleTask, tallies: Sequence[tuple[Requirement, Tally]], folder: Path
-) -> tuple[WorstCase, ...]:
-    from analyses.slugs import slug
-
-    result = []
-    for place, (requirement, tally) in enumerate(tallies):
-        timed = QUANTITIES[requirement.quantity].timed
-        quick = replace(task, step=None, time_figures=timed)
+) -> Iterator[WorstCase]:
+    """The worst case of each requirement, with a design file of it."""
+    design = task.design
+    for place, (requirement, tally) in enumerate(tallies, 1):
+        quick = replace(task, step=None, time_figures=QUANTITIES[requirement.quantity].timed)
         case = worst_case(quick, requirement, np.array([sample for _, sample, _ in tally.worst]))
-        name = f"worst-{place + 1:02d}-{slug(requirement.id)}"
-        changed = with_values(task.design, case.parameters, check=False)
-        titled = replace(
-            changed,
-            name=f"{slug(task.design.name)}-{name}",
-            title=f"{task.design.title or task.design.name}: worst case for {requirement.id}",
-        )
+        name = f"worst-{place:02d}-{slug(requirement.id)}"
+        title = f"{design.title or design.name}: worst case for {requirement.id}"
+        changed = with_values(design, case.parameters, check=False)
+        titled = replace(changed, name=f"{slug(design.name)}-{name}", title=title)
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())
-        result.append(replace(case, file=path))
-    return tuple(result)
+        yield replace(case, file=path)
 
 
 def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
-    sampler = task.sampler
-    normal = any(f.tolerance.kind != "uniform" for f in sampler.factors)
-    correlated = not np.array_equal(sampler.correlation, np.eye(len(sampler.correlation)))
+    normal = any(f.tolerance.kind != "uniform" for f in task.sampler.factors)
+    correlated = not np.array_equal(task.sampler.correlation, np.eye(len(task.sampler.factors)))
     notes = {
         "Scrambled Sobol points: intervals are those of independent samples (Clopper and Pearson, 95 %), "
         "which is on the safe side.": True,

@@ -1,10 +1,19 @@
-"""What is computed for every sample: parameters drawn, linear figures, static figures, a nonlinear step."""
+"""What is computed for every sample: linear figures, static figures, a nonlinear step; where it is kept.
+
+On disk it is one Parquet file a chunk, and a manifest that says of what. A chunk appears under its name only
+when it is complete (written beside, synchronised, renamed); a run that is interrupted, killed included, goes
+on from the chunks that are there.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +23,101 @@ from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree
 from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
 from nonlinear import Rows
+from nonlinear.runs.reduced import BatchResult
+
+SCHEMA = "actuator-lti/samples"
+VERSION = 1
+CHUNK = 4096
+
+
+@dataclass(frozen=True)
+class Store:
+    """A folder of chunks of so many numbers; ``manifest``, written before the first, says of what study."""
+
+    folder: Path
+    chunk: int
+    manifest: bytes
+
+    @classmethod
+    def open(cls, folder: Path, identity: Mapping[str, Any], chunk: int = CHUNK) -> Store:
+        """Open a folder for a study, new or begun before; one that holds another study is refused.
+
+        ``identity`` is everything that decides the numbers (hashes, seed, settings), plain JSON.
+        """
+        path = folder / "manifest.json"
+        wanted = {"schema": SCHEMA, "version": VERSION, "identity": dict(identity)}
+        if path.exists():
+            result = _read_manifest(path)
+            if {key: result.get(key) for key in wanted} != wanted:
+                words = "holds another study (design, seed, settings or code); take another folder"
+                raise InputError(words, where=str(folder))
+            chunk = int(result["chunk"])
+        text = json.dumps({**wanted, "chunk": chunk}, indent=1, sort_keys=True)
+        return cls(folder, chunk, text.encode())
+
+    def put(self, path: Path, data: bytes) -> None:
+        """Put a file of the study on disk, in a folder that says of what it is."""
+        manifest = self.folder / "manifest.json"
+        if not manifest.exists():
+            write_bytes(manifest, self.manifest)
+        write_bytes(path, data)
+
+    def path(self, chunk: Chunk) -> Path:
+        """File of a chunk."""
+        return self.folder / f"samples-{chunk[0]:010d}-{chunk[1]}.parquet"
+
+    def chunks(self, total: int) -> list[Chunk]:
+        """All chunks of a study of so many numbers."""
+        return [(first, min(self.chunk, total - first)) for first in range(0, total, self.chunk)]
+
+    def missing(self, total: int) -> list[Chunk]:
+        """Chunks that are not on disk, or whose file is damaged."""
+        return [chunk for chunk in self.chunks(total) if not _whole(self.path(chunk), chunk[1])]
+
+    def write(self, chunk: Chunk, arrays: Arrays) -> None:
+        """Put a chunk on disk."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        sink = pa.BufferOutputStream()
+        pq.write_table(pa.table(dict(arrays)), sink, compression="zstd")
+        self.put(self.path(chunk), sink.getvalue().to_pybytes())
+
+    def blocks(self, total: int) -> Iterator[Arrays]:
+        """The columns of one chunk after the other."""
+        import pyarrow.parquet as pq
+
+        for chunk in self.chunks(total):
+            part = pq.read_table(self.path(chunk), partitioning=None)
+            yield {name: part.column(name).to_numpy() for name in part.column_names}
+
+
+def _read_manifest(path: Path) -> Tree:
+    try:
+        result = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(f"cannot be read: {error}", where=str(path)) from error
+    if not isinstance(result, dict) or not isinstance(result.get("chunk"), int) or result["chunk"] < 1:
+        raise InputError("is no manifest of a study", where=str(path))
+    return result
+
+
+def _whole(path: Path, count: int) -> bool:
+    """Whether a chunk's file is there and holds as many rows as it should."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        return int(pq.read_metadata(path).num_rows) == count
+    except (OSError, pa.ArrowInvalid):
+        return False
 
 
 @dataclass(frozen=True)
@@ -35,28 +133,30 @@ class StepCheck:
             raise InputError("nonlinear step: an amplitude above 0 and a duration above 0, at most 100 s")
 
 
-def step_units() -> dict[str, str]:
-    """Columns of a nonlinear step with their units.
+STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
+    "rise_time": ("s", lambda run: run.step.rise_time_s),
+    "overshoot": ("%", lambda run: run.step.overshoot_percent),
+    "settling_time": ("s", lambda run: run.step.settling_time_s),
+    "final_error": ("%", lambda run: 100.0 * (1.0 - run.step.final_ratio)),
+    "peak_current": ("A", lambda run: np.maximum(*np.abs(run.extreme("current_A")))),
+    "speed_limited": ("%", lambda run: 100.0 * run.limit_fraction("speed")),
+    "current_limited": ("%", lambda run: 100.0 * run.limit_fraction("current")),
+    "voltage_limited": ("%", lambda run: 100.0 * run.limit_fraction("voltage")),
+}
+"""Figures of a nonlinear step: unit, and how they are read.
 
-    Rise, overshoot and settling against the commanded angle (missing where it is not reached);
-    ``final_error`` at the end, in percent of it; shares of the time in which a limiter acted.
-    """
-    return {
-        "nonlinear.rise_time": "s",
-        "nonlinear.overshoot": "%",
-        "nonlinear.settling_time": "s",
-        "nonlinear.final_error": "%",
-        "nonlinear.peak_current": "A",
-        "nonlinear.speed_limited": "%",
-        "nonlinear.current_limited": "%",
-        "nonlinear.voltage_limited": "%",
-    }
+Rise, overshoot and settling against the commanded angle (missing where it is not reached); the error at the
+end in percent of it; shares of the time in which a limiter acted.
+"""
+
+
+def step_units() -> dict[str, str]:
+    """Columns of a nonlinear step with their units."""
+    return {f"nonlinear.{name}": unit for name, (unit, _) in STEP.items()}
 
 
 def step_rows(step: StepCheck, population: Population) -> Rows:
     """Simulator rows of every design."""
-    from nonlinear import Rows
-
     rows = Rows.of(population.stacked, population.count)
     rows["load"] = step.load_Nm
     rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
@@ -67,20 +167,9 @@ def step_rows(step: StepCheck, population: Population) -> Rows:
 
 
 def step_columns(step: StepCheck, population: Population) -> Arrays:
-    """Figures of the nonlinear step of every design, by the columns of `step_units`."""
-    result = step_rows(step, population).run(threads=1)
-    low, high = result.extreme("current_A")
-    figures = result.step
-    columns = {
-        "nonlinear.rise_time": figures.rise_time_s,
-        "nonlinear.overshoot": figures.overshoot_percent,
-        "nonlinear.settling_time": figures.settling_time_s,
-        "nonlinear.final_error": 100.0 * (1.0 - figures.final_ratio),
-        "nonlinear.peak_current": np.maximum(np.abs(low), np.abs(high)),
-        **{f"nonlinear.{name}_limited": 100.0 * result.limit_fraction(name)
-           for name in ("speed", "current", "voltage")},
-    }  # fmt: skip
-    return {name: np.where(result.ok, values, np.nan) for name, values in columns.items()}
+    """Figures of the nonlinear step of every design, by the columns of `step_units`; NaN of a failed run."""
+    run = step_rows(step, population).run(threads=1)
+    return {f"nonlinear.{name}": np.where(run.ok, read(run), np.nan) for name, (_, read) in STEP.items()}
 
 
 @dataclass(frozen=True)
@@ -109,9 +198,9 @@ class SampleTask:
 
     def columns(self, first: int, draws: np.ndarray) -> Arrays:
         """All columns of samples from the first on, for their parameter values."""
-        columns: Arrays = {"sample": np.arange(first, first + len(draws), dtype=np.int64)}
-        columns |= {f"parameter.{p}": draws[:, k] for k, p in enumerate(self.sampler.paths)}
-        return columns | self.figures(draws)
+        numbers = np.arange(first, first + len(draws), dtype=np.int64)
+        values = {f"parameter.{p}": draws[:, k] for k, p in enumerate(self.sampler.paths)}
+        return {"sample": numbers, **values, **self.figures(draws)}
 
     def sample(self) -> bytes:
         """The first sample, to be computed alike wherever the study is (`analyses.studies.proof`)."""
@@ -139,22 +228,17 @@ class SampleTask:
         return tuple(n for n, q in LOOP_QUANTITIES.items() if self.time_figures or not q.timed)
 
     @cached_property
-    def _drive_wanted(self) -> tuple[tuple[str, float], ...]:
-        wanted = {
-            (r.quantity, r.load_Nm or 0.0) for r in self.design.requirements if r.quantity in DRIVE_QUANTITIES
-        }
-        return tuple(sorted(wanted))
+    def _drive_wanted(self) -> list[tuple[str, float]]:
+        asked = (r for r in self.design.requirements if r.quantity in DRIVE_QUANTITIES)
+        return sorted({(r.quantity, r.load_Nm or 0.0) for r in asked})
 
     @property
     def units(self) -> dict[str, str]:
         """Columns of figures (without parameters and stability flags) with their units."""
-        axis = self.design.axis
-        names = self._quantities
-        units = {f"{loop}.{q}": QUANTITIES[q].unit_for(axis) for loop in loops_of(self.design) for q in names}
-        units |= {drive_column(q, load): QUANTITIES[q].unit_for(axis) for q, load in self._drive_wanted}
-        if self.step is not None:
-            units |= step_units()
-        return units
+        of = {f"{loop}.{name}": name for loop in loops_of(self.design) for name in self._quantities}
+        of |= {drive_column(name, load): name for name, load in self._drive_wanted}
+        units = {column: QUANTITIES[name].unit_for(self.design.axis) for column, name in of.items()}
+        return units | ({} if self.step is None else step_units())
 
     def identity(self) -> Tree:
         """Everything that decides the numbers, as plain JSON."""
@@ -175,16 +259,7 @@ class SampleTask:
 
 
 def replay(design: Design, sampler: Sampler, number: int) -> Design:
-    """The design of one sample, by its number.
-
-    Examples
-    --------
-    >>> from actuator_lti import load_design
-    >>> from analyses.studies.sampling import sampler_of
-    >>> design = load_design("ilr33-amber")
-    >>> replay(design, sampler_of(design, seed=3), 17).load.inertia_kgm2 == design.load.inertia_kgm2
-    False
-    """
+    """The design of one sample, by its number."""
     values = sampler.draw(number, 1)[0]
     changes = {path: float(v) for path, v in zip(sampler.paths, values, strict=True)}
     return with_values(design, changes, check=False)

@@ -2,12 +2,13 @@
 
 Sampling alone finds no worst case: the chance that a point lands near a corner of a box of many dimensions is
 small.  The search starts from the corners and the worst samples, and never returns less bad than the worst of
-them.  Correlated parameters stay together (`analyses.monte_carlo.worst`).  Storn and Price 1997
+them.  Correlated parameters stay together (`Group`).  Storn and Price 1997
 (`scipy.optimize.differential_evolution`), then Nelder and Mead.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -69,23 +70,22 @@ class Region:
     sampler: Sampler
 
     @cached_property
+    def sets(self) -> list[tuple[int, ...]]:
+        """Columns that hang together by correlations; of a parameter without one it is alone."""
+        from scipy.sparse.csgraph import connected_components
+
+        _, of = connected_components(self.sampler.correlation != 0.0, directed=False)
+        return sorted(tuple(np.flatnonzero(of == one).tolist()) for one in set(of.tolist()))
+
+    @cached_property
     def alone(self) -> tuple[int, ...]:
         """Columns of the parameters without correlation."""
-        return tuple(k for k in range(len(self.sampler.factors)) if len(self._set_of(k)) == 1)
+        return tuple(columns[0] for columns in self.sets if len(columns) == 1)
 
     @cached_property
     def groups(self) -> tuple[Group, ...]:
         """The sets of parameters that hang together by correlations."""
-        sets = {self._set_of(k) for k in range(len(self.sampler.factors)) if k not in self.alone}
-        return tuple(Group.of(columns, self.sampler.correlation) for columns in sorted(sets))
-
-    def _set_of(self, k: int) -> tuple[int, ...]:
-        result, new = {k}, [k]
-        while new:
-            near = np.flatnonzero(self.sampler.correlation[new.pop()]).tolist()
-            new += [j for j in near if j not in result]
-            result.update(near)
-        return tuple(sorted(result))
+        return tuple(Group.of(columns, self.sampler.correlation) for columns in self.sets if len(columns) > 1)
 
     @property
     def dimensions(self) -> int:
@@ -95,19 +95,17 @@ class Region:
 
     def values(self, cube: np.ndarray) -> np.ndarray:
         """SI values at points of the unit cube, shape (count, dimensions), columns as `Sampler.paths`."""
-        sampler = self.sampler
-        cube = np.clip(cube, 0.0, 1.0)
+        sampler, cube = self.sampler, np.clip(cube, 0.0, 1.0)
         lower, upper = sampler.box
         out = np.empty((len(cube), len(sampler.paths)))
+        at = len(self.alone)
         for j, k in enumerate(self.alone):
             out[:, k] = lower[k] + cube[:, j] * (upper[k] - lower[k])
-        at = len(self.alone)
         for group in self.groups:
             rank = group.axes.shape[1]
-            scores = group.scores(cube[:, at : at + rank])
-            for column, score in zip(group.columns, scores.T, strict=True):
-                result = sampler.factors[column].quantile(_probability(sampler.factors[column], score, group))
-                out[:, column] = np.clip(result, lower[column], upper[column])
+            for k, score in zip(group.columns, group.scores(cube[:, at : at + rank]).T, strict=True):
+                factor = sampler.factors[k]
+                out[:, k] = np.clip(factor.quantile(_probability(factor, score, group)), lower[k], upper[k])
             at += rank
         if sampler.table is not None:
             rows = sampler.table.rows
@@ -119,10 +117,8 @@ class Region:
         """Points of the unit cube for values, shape (count, len(paths)); from outside, the nearest within."""
         sampler = self.sampler
         lower, upper = sampler.box
-        parts = [
-            ((values[:, k] - lower[k]) / (upper[k] - lower[k]) if upper[k] > lower[k] else 0.0 * values[:, k])
-            for k in self.alone
-        ]
+        width = np.where(upper > lower, upper - lower, np.inf)
+        parts = [(values[:, k] - lower[k]) / width[k] for k in self.alone]
         for group in self.groups:
             scores = [_score(sampler.factors[k], values[:, k], group) for k in group.columns]
             parts += list(group.cube(np.column_stack(scores)).T)
@@ -161,73 +157,57 @@ GENERATIONS = 40  # of the evolution
 _UNSTABLE = -1e6  # stands for a distance of - infinity, so that the optimiser can compare
 
 
-def corners(lower: np.ndarray, upper: np.ndarray, seed: int) -> np.ndarray:
-    """Corners of a box, shape (corners, dimensions): all, or a random 1024 where there are more."""
-    size = len(lower)
+def corners(size: int, seed: int) -> np.ndarray:
+    """Corners of the unit cube, shape (corners, size): all, or a random 1024 where there are more."""
     if 2**size <= MOST_CORNERS:
-        choice = np.array(list(product((False, True), repeat=size)))
-    else:
-        choice = np.random.default_rng(seed).integers(0, 2, (MOST_CORNERS, size)).astype(bool)
-    return np.where(choice, upper, lower)
-
-
-def distances(task: SampleTask, requirement: Requirement, points: np.ndarray) -> np.ndarray:
-    """Distance to the limit of designs at points (SI), shape (count,)."""
-    judged = judge(requirement, task.design, task.figures(points)).distance
-    return np.where(np.isneginf(judged), _UNSTABLE, judged)
+        return np.array(list(product((0.0, 1.0), repeat=size)))
+    return np.random.default_rng(seed).integers(0, 2, (MOST_CORNERS, size)).astype(float)
 
 
 def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.ndarray) -> WorstCase:
     """Make the worst samples (by their numbers, worst first) worse."""
-    from scipy.optimize import differential_evolution, minimize
+    region, looked_at = Region(task.sampler), 0
 
-    region = Region(task.sampler)
-    size = region.dimensions
-    looked_at = 0
-
-    def cost(unit: np.ndarray) -> np.ndarray:
+    def distance(unit: np.ndarray) -> np.ndarray:
+        """To the limit, at points of the unit cube, shape (dimensions, count)."""
         nonlocal looked_at
         points = region.values(np.atleast_2d(unit.T))
         looked_at += len(points)
-        return distances(task, requirement, points)
+        judged = judge(requirement, task.design, task.figures(points)).distance
+        return np.where(np.isneginf(judged), _UNSTABLE, judged)
 
     drawn = np.vstack([task.sampler.draw(int(k), 1) for k in worst_samples])
-    edges = corners(np.zeros(size), np.ones(size), task.sampler.seed)
-    pool = np.vstack([edges, region.cube(drawn)])
-    distance = cost(pool.T)
+    pool = np.vstack([corners(region.dimensions, task.sampler.seed), region.cube(drawn)])
+    point = region.values(_smallest(distance, pool, task.sampler.seed)[None])[0]
+    both = judge(requirement, task.design, task.figures(np.vstack([drawn[0], point])))
+    return WorstCase(
+        requirement=requirement.id,
+        unit=requirement.unit,
+        sampled=finite(both.value[0]),
+        sample=int(worst_samples[0]),
+        value=float(both.value[1]) if np.isfinite(both.distance[1]) else None,
+        distance=finite(both.distance[1]),
+        passed=bool(both.passed[1]),
+        parameters=dict(zip(task.sampler.paths, point.tolist(), strict=True)),
+        evaluations=looked_at,
+    )
+
+
+def _smallest(cost: Callable[[np.ndarray], np.ndarray], pool: np.ndarray, seed: int) -> np.ndarray:
+    """The point of the unit cube with the smallest cost, from the best of a pool on."""
+    from scipy.optimize import differential_evolution, minimize
+
+    found, size = cost(pool.T), pool.shape[1]
     many = max(12, min(40, 4 * size))
-    rng = np.random.default_rng(task.sampler.seed)
-    chosen = pool[np.argsort(distance, kind="stable")[:many]]
-    population = np.vstack([chosen, rng.uniform(size=(many - len(chosen), size))])
+    chosen = pool[np.argsort(found, kind="stable")[:many]]
+    more = np.random.default_rng(seed).uniform(size=(many - len(chosen), size))
     result = differential_evolution(
-        cost, [(0.0, 1.0)] * size, init=population, maxiter=GENERATIONS, tol=1e-10, polish=False,
-        vectorized=True, updating="deferred", rng=np.random.default_rng(task.sampler.seed),
+        cost, [(0.0, 1.0)] * size, init=np.vstack([chosen, more]), maxiter=GENERATIONS, tol=1e-10,
+        polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(seed),
     )  # fmt: skip
     fine = minimize(
-        lambda x: float(cost(x[:, None])[0]), result.x, method="Nelder-Mead",
-        bounds=[(0.0, 1.0)] * size,
+        lambda x: float(cost(x[:, None])[0]), result.x, method="Nelder-Mead", bounds=[(0.0, 1.0)] * size,
         options={"maxfev": 60 * size, "xatol": 1e-9, "fatol": 1e-12},
     )  # fmt: skip
-    candidates = np.vstack([fine.x, result.x, pool[np.argmin(distance)]])
-    best = candidates[np.argmin(cost(candidates.T))]
-    return _described(task, requirement, region.values(best[None])[0], int(worst_samples[0]), looked_at)
-
-
-def _described(
-    task: SampleTask, requirement: Requirement, point: np.ndarray, sample: int, evaluations: int
-) -> WorstCase:
-    drawn = task.sampler.draw(sample, 1)
-    judged = judge(requirement, task.design, task.figures(np.vstack([drawn[0], point])))
-    sampled, value = (float(v) for v in judged.value)
-    distance = float(judged.distance[1])
-    return WorstCase(
-        requirement.id,
-        requirement.unit,
-        finite(sampled),
-        sample,
-        value if np.isfinite(distance) else None,
-        finite(distance),
-        bool(judged.passed[1]),
-        dict(zip(task.sampler.paths, (float(v) for v in point), strict=True)),
-        evaluations,
-    )
+    candidates = np.vstack([fine.x, result.x, pool[np.argmin(found)]])
+    return np.asarray(candidates[np.argmin(cost(candidates.T))])

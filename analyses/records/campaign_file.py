@@ -47,7 +47,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path, read_campaign_toml, shown_path
 from analyses.records.naming import canonical
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
-from analyses.toml_tables import Table, key_of
+from analyses.request import key_of
+from analyses.toml_tables import Table
 
 RECORDS = (
     'CSV, JSON, Parquet or MATLAB, or a TOML with file = "log.csv" or [[record]]'

@@ -17,8 +17,8 @@ from analyses.corners.run import Corners
 from analyses.linear.loop_survey import LoopSurvey
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, loop_columns
 from analyses.specification.weakest import View, WeakPoint, limit_of, views
-from analyses.tuning.placing import allowed_range
 from analyses.tuning.problem import GAINS
+from analyses.tuning.start import allowed_range
 
 FURTHEST = 4.0  # a gain goes to a quarter of what it is, or to four times it
 STEPS = 12  # on either side, and once more between the last that does not mend and the first that does

@@ -1,27 +1,13 @@
 """Stiffness of a drive at its output: dynamic, static, lost motion (model.md section 9)."""
 
-from analyses.stiffness.run import (
-    AtRest,
-    Check,
-    LostMotion,
-    Stiffness,
-    StiffnessCurve,
-    check_stiffness,
-    lost_motion_seen,
-    stiffness,
-    stiffness_at_rest,
-    stiffness_curves,
-)
+from actuator_lti.start.on_first_use import on_first_use
 
-__all__ = [
-    "AtRest",
-    "Check",
-    "LostMotion",
+_NAMES = (
     "Stiffness",
-    "StiffnessCurve",
     "check_stiffness",
     "lost_motion_seen",
     "stiffness",
     "stiffness_at_rest",
     "stiffness_curves",
-]
+)
+__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys(_NAMES, f"{__name__}.run"))

@@ -3,14 +3,21 @@
 Parts are chunks of a numbered study, or any items. What comes of a part must not depend on where it is
 computed; results come in any order and are given to a sink one by one, so that memory holds only a few,
 whatever their number.
+
+Whoever can talk to a Dask scheduler can run code on it. The local cluster therefore listens on this machine
+only, under TLS with certificates that are made for the run and never leave it, and shows no dashboard.
 """
 
 from __future__ import annotations
 
+import ipaddress
+import logging
 import os
+import signal
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, CancelledError, ThreadPoolExecutor, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -20,10 +27,156 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.start.extras import need
-from analyses.studies import cluster
+from analyses.studies.proof import Proof, hold_against, packages_of, prove, prove_once
 
 if TYPE_CHECKING:
-    from distributed import Client
+    from distributed import Client, LocalCluster
+
+IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
+CONNECT_S = 10.0
+TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
+PARTS = ("scheduler", "worker", "nanny")
+_RETRIES = 20  # workers that may die over one part before the run gives up
+
+
+def is_open(address: str) -> bool:
+    """Whether others than this machine may reach an address, and nobody is asked who he is."""
+    scheme, _, rest = address.rpartition("://")
+    host = rest.rpartition(":")[0].strip("[]")
+    if scheme not in ("", "tcp") or host in ("", "localhost"):
+        return False
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:  # a name
+        return True
+
+
+def connected(address: str, tls: Path | None) -> Client:
+    """Connect to a running scheduler; an address that is none, or a certificate of no use, is refused."""
+    import ssl
+
+    import distributed
+
+    security = None
+    if tls is not None:
+        files = {key: tls / name for key, name in TLS_FILES.items()}
+        for path in files.values():
+            if not path.is_file():
+                raise InputError("no such file; allowed: a certificate in PEM", where=str(path))
+        keys = {key: str(path) for key, path in files.items()}
+        security = distributed.Security(require_encryption=True, **keys)
+    try:
+        return distributed.Client(address, timeout=CONNECT_S, security=security)
+    except ssl.SSLError as error:
+        said = f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
+        raise InputError(said) from error
+    except ValueError as error:
+        raise InputError(f"--scheduler {address!r}: an address such as tcp://host:8786") from error
+
+
+def local_cluster(workers: int) -> LocalCluster:
+    """Start worker processes that leave Ctrl-C to this one: each would print its own traceback."""
+    from multiprocessing import resource_tracker
+
+    import dask
+    import distributed
+
+    resource_tracker.ensure_running()  # its start would take the mask away again
+    held = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # what is started now inherits it
+    settings: dict[str, Any] = {f"distributed.{part}.http.routes": [] for part in PARTS}
+    settings["distributed.nanny.pre-spawn-environ"] = {}  # workers add up as this process does
+    try:
+        with dask.config.set(settings):
+            return distributed.LocalCluster(
+                n_workers=workers,
+                threads_per_worker=1,
+                processes=True,
+                host="127.0.0.1",
+                protocol="tls://",
+                security=distributed.Security.temporary(),
+                dashboard_address=None,
+                scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # or it asks for 8787, and warns
+                silence_logs=50,
+            )
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, held)
+
+
+def quiet() -> AbstractContextManager[None]:
+    """What Dask would log of a lost connection is said in one line, by what is raised."""
+    from distributed.utils import silence_logging_cmgr
+
+    return silence_logging_cmgr(logging.CRITICAL + 1)
+
+
+@contextmanager
+def _closed_is_lost() -> Iterator[None]:
+    """A client that its scheduler has left is asked for more: `CancelledError`, as for what it was asked."""
+    from distributed.client import ClosedClientError
+
+    try:
+        yield
+    except ClosedClientError as error:
+        raise CancelledError from error
+
+
+@_closed_is_lost()
+def submit(
+    client: Any, work: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None]
+) -> None:
+    """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
+    import distributed
+
+    client.wait_for_workers(1, timeout=30)
+    packages = packages_of(work)
+    here = prove(packages)
+    for address, there in client.run(prove, packages, on_error="return").items():
+        if not isinstance(there, OSError):  # gone: who takes its place proves itself before its first part
+            hold_against(here, there, address)
+    here = prove(packages, work)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Sending large graph")  # a table of samples goes once
+        sent = client.submit(_the_same, work, pure=False, retries=_RETRIES)  # lost with a worker, made again
+    width = max(2, sum(client.nthreads().values())) * IN_FLIGHT
+    waiting = iter(todo)
+    parts: dict[str, Any] = {}
+
+    def start(part: Any) -> Any:
+        future = client.submit(_answered, sent, here, part, pure=False, retries=_RETRIES)
+        parts[future.key] = part
+        return future
+
+    running = distributed.as_completed([start(part) for part in islice(waiting, width)])
+    for future in running:
+        try:
+            result, error = future.result()
+        except distributed.KilledWorker as death:
+            raise NumericalError(
+                "workers keep dying over one part, of too little memory, say; what is done is kept"
+            ) from death
+        future.release()
+        if error is not None:
+            raise error
+        sink(parts.pop(future.key), result)
+        for following in islice(waiting, 1):
+            running.add(start(following))
+
+
+def _the_same(work: Any) -> Any:
+    return work
+
+
+def _answered(work: Callable[[Any], Any], proof: Proof, part: Any) -> tuple[Any, Exception | None]:
+    """The result or the error of a part: tried again is only what a dying worker took along.
+
+    A worker proves itself before its first part, also one that has joined late.
+    """
+    try:
+        prove_once(proof, packages_of(work), work)
+        return work(part), None
+    except Exception as error:  # noqa: BLE001 - raised again where it was asked for
+        return None, error
+
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
@@ -34,21 +187,17 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Engine:
-    """Where parts are computed.
+    """Where parts are computed."""
 
-    A local Dask cluster of ``workers`` processes; a running ``scheduler``, such as ``tls://host:8786``, with
-    """
-
-    workers: int | None = None
-    scheduler: str | None = None
-    threads: int | None = None
-    # A folder with ca.pem, cert.pem and key.pem; else ``threads`` of this process (default: all processors)
-    tls: Path | None = None
+    workers: int | None = None  # processes of a local Dask cluster
+    scheduler: str | None = None  # one that is running, such as ``tls://host:8786``
+    threads: int | None = None  # without either, of this process; all processors where left out
+    tls: Path | None = None  # with a scheduler: folder with ca.pem, cert.pem and key.pem
 
     @property
     def caution(self) -> str:
         """What to know of the connection before it is used; empty where nothing."""
-        if self.scheduler is None or not cluster.is_open(self.scheduler):
+        if self.scheduler is None or not is_open(self.scheduler):
             return ""
         return (
             f"--scheduler {self.scheduler}: not encrypted, and whoever reaches it can run code on its workers"
@@ -60,12 +209,12 @@ class Engine:
             raise InputError("--workers and --scheduler: one of them")
         if self.workers is not None and self.workers < 1:
             raise InputError(f"--workers {self.workers}: at least 1")
-        if self.tls is not None and not (self.scheduler or "").startswith("tls://"):
+        encrypted = (self.scheduler or "").startswith("tls://")
+        if self.tls is not None and not encrypted:
             raise InputError("--tls: goes with --scheduler tls://HOST:PORT")
-        if self.tls is None and (self.scheduler or "").startswith("tls://"):
-            raise InputError(
-                f"--scheduler {self.scheduler}: needs --tls DIR with {', '.join(cluster.TLS_FILES.values())}"
-            )
+        if self.tls is None and encrypted:
+            files = ", ".join(TLS_FILES.values())
+            raise InputError(f"--scheduler {self.scheduler}: needs --tls DIR with {files}")
 
     @property
     def distributed(self) -> bool:
@@ -101,11 +250,9 @@ class Engine:
         finished = False
         try:
             with self._client() as client:
-                cluster.submit(client, work, todo, take)
+                submit(client, work, todo, take)
                 finished = True
-        except (OSError, TimeoutError, CancelledError) as error:
-            if isinstance(error, InputError):
-                raise
+        except (OSError, CancelledError) as error:
             if not finished:  # a cluster too slow to close takes no result back
                 said = " ".join(str(error).split()) or "no answer in time"
                 if isinstance(error, CancelledError):
@@ -120,16 +267,13 @@ class Engine:
         need("distributed", "cluster", "a cluster of workers")
         import distributed
 
-        if self.scheduler is not None:
-            with cluster.quiet(), cluster.connected(self.scheduler, self.tls) as client:
-                yield client
-            return
-        with (
-            cluster.quiet(),
-            cluster.local_cluster(self.workers or 1) as here,
-            distributed.Client(here) as client,
-        ):
-            yield client
+        with ExitStack() as stack:
+            stack.enter_context(quiet())
+            if self.scheduler is not None:
+                yield stack.enter_context(connected(self.scheduler, self.tls))
+            else:
+                here = stack.enter_context(local_cluster(self.workers or 1))
+                yield stack.enter_context(distributed.Client(here))
 
 
 def _threads(
@@ -139,7 +283,7 @@ def _threads(
     waiting = iter(todo)
     pool = ThreadPoolExecutor(threads)
     try:
-        running = {pool.submit(call, part): part for part in islice(waiting, threads * cluster.IN_FLIGHT)}
+        running = {pool.submit(call, part): part for part in islice(waiting, threads * IN_FLIGHT)}
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good

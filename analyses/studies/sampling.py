@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -131,18 +130,11 @@ class Sampler:
             values += list(self.table.rows[rows].T)
         return np.column_stack(values)
 
-    @cached_property
-    def _root(self) -> np.ndarray | None:
-        if np.array_equal(self.correlation, np.eye(len(self.factors))):
-            return None
-        return semidefinite_root(self.correlation)
-
     def _correlated(self, points: np.ndarray) -> np.ndarray:
         """Uniform coordinates whose normal scores have the wanted correlation."""
-        root = self._root
-        if root is None:
+        if np.array_equal(self.correlation, np.eye(len(self.factors))):
             return points
-        scores = ndtri(points)
+        root, scores = semidefinite_root(self.correlation), ndtri(points)
         mixed = np.zeros_like(scores)
         for i in range(len(root)):  # by hand, so that the bits do not depend on a library's blocking
             for j in range(i + 1):
@@ -173,11 +165,6 @@ def semidefinite_root(matrix: np.ndarray) -> np.ndarray:
 
     Two parameters that are one (correlation 1 or -1) have a zero on the diagonal of L, so that the second
     follows the first exactly.
-
-    Examples
-    --------
-    >>> semidefinite_root(np.array([[1.0, -1.0], [-1.0, 1.0]])).tolist()
-    [[1.0, 0.0], [-1.0, 0.0]]
     """
     size = len(matrix)
     root = np.zeros((size, size))
@@ -208,7 +195,8 @@ def correlation_of(design: Design, names: Sequence[str]) -> np.ndarray:
 def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> Sampler:
     """The sampler of a design's tolerances and correlations; columns of a table replace tolerances.
 
-    Refused where nothing has a tolerance, or a correlation names a key that has none.
+    Refused where nothing has a tolerance, where one reaches values that its key does not allow, or a
+    correlation names a key that has none.
 
     Examples
     --------
@@ -216,30 +204,19 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     >>> sampler_of(load_design("ilr33-amber")).draw(5, 1).shape
     (1, 4)
     """
-
-    taken = set(table.paths) if table else set()
+    taken, where = set(table.paths) if table else set(), design.origin or None
     factors = tuple(Factor(p, value, t) for p, value, t in tolerances(design) if p not in taken)
     for factor in factors:
-        _check_range(factor, design.origin or None)
+        allowed, ends = field_of(factor.path), factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))
+        if allowed is not None and not all(allowed.accepts(float(end)) for end in ends):
+            said = f"{factor.path}: its {factor.tolerance.kind} tolerance reaches {ends[0]:g}, not allowed"
+            raise InputError(f'{said}; take kind "truncated-normal" with lower and upper', where=where)
     names = [factor.path for factor in factors]
     for pair in design.correlations:
         for name in (pair.first, pair.second):
             if name not in names and not taken & {pair.first, pair.second}:
-                raise InputError(f"correlation of {name}: it has no tolerance", where=design.origin or None)
+                raise InputError(f"correlation of {name}: it has no tolerance", where=where)
     return Sampler(factors, correlation_of(design, names), table, seed)
-
-
-def _check_range(factor: Factor, where: str | None) -> None:
-    """Refuse a distribution that may give values that the key does not allow."""
-
-    allowed = field_of(factor.path)
-    ends = factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))
-    if allowed is not None and not all(allowed.accepts(float(end)) for end in ends):
-        raise InputError(
-            f"{factor.path}: its {factor.tolerance.kind} tolerance reaches {ends[0]:g}, not allowed; "
-            'take kind "truncated-normal" with lower and upper',
-            where=where,
-        )
 
 
 def read_table(path: str | Path, known: Sequence[str]) -> Table:
@@ -253,13 +230,13 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
     data = read_bytes(path, "CSV or Parquet file", TABLE_BYTES)
     try:
         frame = _parquet(data, where) if where.endswith(".parquet") else pd.read_csv(BytesIO(data))
-    except (OSError, ValueError, pd.errors.ParserError, pa.ArrowException) as error:
-        if isinstance(error, InputError):
-            raise
+    except InputError:
+        raise
+    except (OSError, ValueError, pa.ArrowException) as error:
         raise InputError(f"cannot be read as a table: {error}", where=where) from error
     TABLE_ROWS.check(len(frame), where, name="--from-samples")
-    unknown = [str(name) for name in frame.columns if name not in known]
-    if unknown:
+    names = tuple(map(str, frame.columns))
+    if unknown := [name for name in names if name not in known]:
         raise InputError(f"column {shown(unknown[0])}: no parameter of this design", where=where)
     try:
         rows = frame.to_numpy(dtype=float)
@@ -267,7 +244,7 @@ def read_table(path: str | Path, known: Sequence[str]) -> Table:
         raise InputError(f"a value is no number: {error}", where=where) from error
     if rows.size == 0 or not np.all(np.isfinite(rows)):
         raise InputError("a table with at least one row of finite numbers is needed", where=where)
-    return Table(tuple(str(name) for name in frame.columns), rows, where)
+    return Table(names, rows, where)
 
 
 def _parquet(data: bytes, where: str) -> pd.DataFrame:

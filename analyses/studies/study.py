@@ -43,7 +43,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from itertools import chain, product
+from itertools import product
 from math import prod
 from pathlib import Path
 from typing import Any, Literal
@@ -61,50 +61,34 @@ from analyses.slugs import slug
 from analyses.toml_tables import Table
 
 
-@dataclass(frozen=True)
-class Axis:
-    """A parameter and its values, as texts or numbers."""
-
-    parameter: str
-    values: tuple[Any, ...]
-
-
 @dataclass(frozen=True, kw_only=True)
-class _WrittenAxis:
-    """An axis as written; beside it stand ``values``, or ``from`` and ``to``."""
+class _Axis:
+    """A parameter and how its values lie; beside it stand ``values``, or ``from`` and ``to``."""
 
     parameter: str
     points: int = 5
     spacing: Literal["linear", "log"] = "linear"
 
 
-def read_axis(table: Table, base: Design) -> Axis:
-    """Read ``values``, or ``from``, ``to``, ``points`` and ``spacing`` ("linear" or "log")."""
-    one = table.read(_WrittenAxis, beside=("values", "from", "to"))
-    return Axis(one.parameter, _listed(table) if "values" in table else _ranged(table, one, base))
-
-
-def _listed(table: Table) -> tuple[Any, ...]:
-    values = table.data["values"]
-    good = isinstance(values, list) and 0 < len(values) <= AXIS_POINTS.most
-    if not good or not all(isinstance(v, str | int | float) for v in values):
-        raise table.fail("values", f"allowed: a list of 1 to {AXIS_POINTS.most} texts or numbers")
-    return tuple(values)
-
-
-def _ranged(table: Table, one: _WrittenAxis, base: Design) -> tuple[Any, ...]:
-    field = field_of(one.parameter)
+def _values(table: Table, base: Design) -> tuple[Any, ...]:
+    """Texts or numbers: ``values``, or those between ``from`` and ``to``."""
+    one, most = table.read(_Axis, beside=("values", "from", "to")), AXIS_POINTS.most
+    if "values" in table:
+        values = table.data["values"]
+        good = isinstance(values, list) and 0 < len(values) <= most
+        if not good or not all(isinstance(v, str | int | float) for v in values):
+            raise table.fail("values", f"allowed: a list of 1 to {most} texts or numbers")
+        return tuple(values)
+    field, log = field_of(one.parameter), one.spacing == "log"
     if field is None or field.kind != "quantity":
         raise table.fail("parameter", "allowed: a key with a quantity")
     unit = field.unit(Structure.of(base))
     low, high = (table.quantity(key, unit) for key in ("from", "to"))
-    if not 2 <= one.points <= AXIS_POINTS.most:
-        raise table.fail("points", f"allowed: a whole number, 2 to {AXIS_POINTS.most}")
-    log = one.spacing == "log"
+    if not 2 <= one.points <= most:
+        raise table.fail("points", f"allowed: a whole number, 2 to {most}")
     if log and not min(low, high) > 0.0:
         raise table.fail("spacing", 'allowed: "log" between values above 0')
-    values = np.geomspace(low, high, one.points) if log else np.linspace(low, high, one.points)
-    texts = [f"{value:.6g}" for value in values]
+    texts = [f"{value:.6g}" for value in (np.geomspace if log else np.linspace)(low, high, one.points)]
     return tuple(float(text) if unit == "1" else f"{text} {unit}" for text in texts)
 
 
@@ -179,33 +163,6 @@ def study_of(design: Design) -> Study:
     return Study(design.name, design.title, design.description, design.origin, base, ())
 
 
-def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = False) -> Study:
-    """Build a study from its parsed tree; designs are looked for beside the file."""
-    root = Table(tree, "", where)
-    root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
-    head = root.table("study").read(_Head)
-    extra = [dict(table.data) for table in root.tables("requirement")]
-    maker = _Maker(_required(_design(head.base, folder), extra, where), where, folder, extra, keep_going)
-    variants = list[Variant]()
-    for variant in chain(maker.variants(root), maker.sweeps(root), maker.grids(root)):
-        variants.append(variant)
-        STUDY_VARIANTS.check(len(variants), where)
-    first = Variant(maker.base.name, slug(maker.base.name), maker.base)
-    for name, times in Counter(variant.name for variant in (first, *variants)).items():
-        if times > 1:
-            raise InputError(f"variant.name = {shown(name)}: twice; allowed: names that differ", where=where)
-    return Study(
-        _name(root.table("study"), maker.base.name if head.name is None else head.name),
-        head.title,
-        head.description,
-        where,
-        first,
-        tuple(variants),
-        head.validation,
-        _plan(root.table("monte_carlo")) if "monte_carlo" in root else None,
-    )
-
-
 @dataclass(frozen=True, kw_only=True)
 class _Head:
     """The table ``[study]``."""
@@ -226,6 +183,27 @@ class _Written:
     motor: str | None = None
 
 
+def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = False) -> Study:
+    """Build a study from its parsed tree; designs are looked for beside the file."""
+    root = Table(tree, "", where)
+    root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
+    head = root.table("study").read(_Head)
+    extra = [dict(table.data) for table in root.tables("requirement")]
+    base = _required(_design(head.base, folder), extra, where)
+    variants = list[Variant]()
+    for variant in _Maker(base, where, folder, extra, keep_going).made(root):
+        variants.append(variant)
+        STUDY_VARIANTS.check(len(variants), where)
+    first = Variant(base.name, slug(base.name), base)
+    for name, times in Counter(variant.name for variant in (first, *variants)).items():
+        if times > 1:
+            raise InputError(f"variant.name = {shown(name)}: twice; allowed: names that differ", where=where)
+    name = _name(root.table("study"), base.name if head.name is None else head.name)
+    plan = _plan(root.table("monte_carlo")) if "monte_carlo" in root else None
+    about = (name, head.title, head.description, where)
+    return Study(*about, first, tuple(variants), head.validation, plan)
+
+
 def _name(table: Table, name: str) -> str:
     if not 0 < len(name.strip()) <= len(name) <= LONGEST_NAME:
         raise table.fail("name", f"allowed: a text of 1 to {LONGEST_NAME} characters")
@@ -234,10 +212,8 @@ def _name(table: Table, name: str) -> str:
 
 def _plan(table: Table) -> MonteCarloPlan:
     plan = table.read(MonteCarloPlan)
-    for name, value, least, most in (
-        ("samples", plan.samples, 1, SAMPLES.most), ("seed", plan.seed, 0, 2**63 - 1),
-    ):  # fmt: skip
-        if not least <= value <= most:
+    for name, least, most in (("samples", 1, SAMPLES.most), ("seed", 0, 2**63 - 1)):
+        if not least <= getattr(plan, name) <= most:
             raise table.fail(name, f"allowed: a whole number, {least} to {most}")
     return plan
 
@@ -274,7 +250,8 @@ class _Maker:
     requirements: list[Tree]
     keep_going: bool
 
-    def variants(self, root: Table) -> Iterator[Variant]:
+    def made(self, root: Table) -> Iterator[Variant]:
+        """All of a file: variants, then sweeps, then grids; a sweep is a grid of one axis."""
         for table in root.tables("variant"):
             one = table.read(_Written, beside=("override",))
             overrides = dict(table.table("override").data)
@@ -285,28 +262,24 @@ class _Maker:
                     raise InputError(message, where=shown_path(one.motor))
                 overrides = {"motor": motor, **overrides}
             yield self._made(_name(table, one.name), overrides, one.base)
-
-    def sweeps(self, root: Table) -> Iterator[Variant]:
         for table in root.tables("sweep"):
-            axis = read_axis(table, self.base)
-            yield from (self._point((axis,), (value,)) for value in axis.values)
-
-    def grids(self, root: Table) -> Iterator[Variant]:
+            yield from self._points(table, [table])
         for table in root.tables("grid"):
             table.only(("axes",))
-            axes = tuple(read_axis(item, self.base) for item in table.tables("axes"))
-            if not axes:
-                raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", self.where)
-            GRID_AXES.check(len(axes), self.where, name=f"{table.path}.axes")
-            STUDY_VARIANTS.check(prod(len(axis.values) for axis in axes), self.where, name=table.path)
-            for point in product(*(axis.values for axis in axes)):
-                yield self._point(axes, point)
+            yield from self._points(table, table.tables("axes"))
 
-    def _point(self, axes: tuple[Axis, ...], point: tuple[Any, ...]) -> Variant:
-        overrides = {axis.parameter: value for axis, value in zip(axes, point, strict=True)}
-        return self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides, None)
+    def _points(self, table: Table, axes: list[Table]) -> Iterator[Variant]:
+        """Every combination of the values of some axes."""
+        if not axes:
+            raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", self.where)
+        GRID_AXES.check(len(axes), self.where, name=f"{table.path}.axes")
+        values = [_values(axis, self.base) for axis in axes]
+        STUDY_VARIANTS.check(prod(map(len, values)), self.where, name=table.path)
+        for point in product(*values):
+            overrides = {axis.data["parameter"]: value for axis, value in zip(axes, point, strict=True)}
+            yield self._made(", ".join(f"{key} = {value}" for key, value in overrides.items()), overrides)
 
-    def _made(self, name: str, overrides: Tree, origin: str | None) -> Variant:
+    def _made(self, name: str, overrides: Tree, origin: str | None = None) -> Variant:
         def make() -> Design:
             start = self.base
             if origin is not None:

@@ -29,28 +29,21 @@ class Asked(OnMachines):
         bool | None,
         Option("The nonlinear check of every design; as the study says.", flag="validate/--no-validate"),
     ] = None
-    example: Annotated[bool, Option("Print a study file to start from, and stop.")] = False
 
 
 def compared(
     study: Study | None, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
-) -> Comparison | str:
+) -> Comparison:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
-    Raises `InputError`: without a study, unless the example of one is asked for.
+    Raises `InputError`: without a study.
     """
-    if asked.example:
-        import textwrap
-
-        from analyses.studies import study as written
-
-        return textwrap.dedent((written.__doc__ or "").split("::", 1)[1]).strip()
     if study is None:
         raise InputError("compare: give a study file or a design; --example prints a study file")
     from analyses.comparison.variants import compare
 
     engine = asked.engine if asked.workers or asked.scheduler else None  # else one after the other
-    if engine is not None and not study.variants:
+    if engine and not study.variants:
         given = f"--workers {asked.workers}" if asked.scheduler is None else f"--scheduler {asked.scheduler}"
         raise InputError(f"{given}: computes variants, and {study.name} has none; allowed: a study, or --set")
     return compare(study, validation=asked.validate, progress=progress, engine=engine, folder=out / "designs")
@@ -63,9 +56,7 @@ def study_with(path: str, variants: dict[str, Tree]) -> Study:
     from analyses.studies.study import Variant, is_study, load_study, study_of
 
     plan = load_study(path) if is_study(path) else study_of(load_design(path))
-    assert plan.base.design is not None
-    extra = [
-        Variant(words, slug(words), with_overrides(plan.base.design, overrides), overrides)
-        for words, overrides in variants.items()
-    ]
+    base = plan.base.design
+    assert base is not None
+    extra = [Variant(words, slug(words), with_overrides(base, own), own) for words, own in variants.items()]
     return replace(plan, variants=(*plan.variants, *extra))

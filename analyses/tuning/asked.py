@@ -15,20 +15,16 @@ Aim = Literal["least-change", "reserve"]
 
 @dataclass(frozen=True)
 class TuningSettings:
-    """What tuning is to do."""
+    """What tuning is to do; the words of `Asked`, read."""
 
     # In place of those of the design on the same figure of the same loop
     requirements: tuple[Requirement, ...] = ()
-    # Round the gains to the steps of the motion controller's objects, where the drive is that controller
     rounded: bool = True
     # Whether the trade-off curve and the nonlinear check are wanted
     curve: bool = True
     check: bool = True
-    # The least change of the design that meets every requirement, or the largest common distance to all (up
-    # to 30 % of each limit)
     aim: Aim = "least-change"
-    # What may be added where gains alone do not meet the requirements: `ELEMENTS`
-    place: tuple[str, ...] = ()
+    place: tuple[str, ...] = ()  # of `analyses.tuning.start.ELEMENTS`
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,10 +70,7 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, **chosen: Any) -> TuningSettings:
-        """The settings of `analyses.tuning.tune`.
-
-        Raises `InputError`: for a requirement that cannot be read.
-        """
+        """The settings; raises `InputError` for a requirement that cannot be read."""
         from analyses.tuning.problem import read_requirement
 
         asked = cls(**chosen)

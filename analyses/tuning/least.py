@@ -1,6 +1,6 @@
 """The least change that meets the requirements: the nearest point of what is allowed to the design as it is.
 
-Minimise the change (`analyses.tuning.placing.change`: squares of ln ratios of gains, of shares fed forward)
+Minimise the change (`analyses.tuning.start.change`: squares of ln ratios of gains, of shares fed forward)
 with every requirement met at every corner of the working set: sequential quadratic programming from the
 design itself, and from gains with reserve (`solve`) where that finds nothing. As margins have kinks (another
 crossover becomes the worst) and what is allowed may fall apart, differential evolution (Storn and Price 1997)
@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from analyses.tuning.problem import Problem
-from analyses.tuning.solve import ROUNDS, Program, Solution, Spent, solve, violated
+from analyses.tuning.solve import Program, Solution, Spent, rounds, solve, violated
 
 MET = 1e-6  # relative distance that a requirement keeps, above the rounding of a margin
 GENERATIONS = 60
@@ -33,32 +33,23 @@ def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
     if result.min() >= 0.0:
         return Solution(problem.present, float(result.min()), corners[:1])
     working = np.vstack([corners[:1], violated(result, problem, problem.present, corners, corners[:1])])
-    near = _rounds(problem, None, working)
+    near = _met(problem, None, working)
     if near is not None and near.slack >= 0.0:
         return near
     firm = solve(problem, give_up=give_up)
     if firm.slack < 0.0:
         return firm
-    again = _rounds(problem, firm, firm.working)
+    again = _met(problem, firm.gains, firm.working)
     assert again is not None
     return again if again.slack >= 0.0 else _between(problem, firm, again.gains)
 
 
-def _rounds(problem: Problem, firm: Solution | None, working: np.ndarray) -> Solution | None:
-    """Nearest gains on a working set that grows by the corners that they miss; None where there are none."""
-    corners = problem.all_corners
-    gains = None if firm is None else firm.gains
+def _met(problem: Problem, firm: np.ndarray | None, working: np.ndarray) -> Solution | None:
+    """Nearest gains, the working set growing until they meet every corner; None where there are none."""
     last: Solution | None = None
-    for _ in range(ROUNDS):
-        gains = _nearest(problem, gains, None if firm is None else firm.gains, working)
-        if gains is None:
-            return None
-        result = problem.distances(gains[None, :], corners)[0]
-        last = Solution(gains, float(result.min()), working)
-        fresh = violated(result, problem, gains, corners, working)
-        if last.slack >= 0.0 or not len(fresh) or problem.spent:
+    for last in rounds(problem, working, lambda gains, corners: _nearest(problem, gains, firm, corners)):
+        if last.slack >= 0.0:
             break
-        working = np.vstack([working, fresh])
     return last
 
 
@@ -66,7 +57,7 @@ def _nearest(
     problem: Problem, start: np.ndarray | None, firm: np.ndarray | None, working: np.ndarray
 ) -> np.ndarray | None:
     """Nearest gains to home that meet the working set; those of `firm` are known to. None without any."""
-    begins = [row for row in (problem.present, start, firm) if row is not None]
+    begins = [row for row in (problem.present, firm if start is None else start, firm) if row is not None]
     best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
     if best is None:
         return None
@@ -83,13 +74,11 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     program = Program(problem, lambda x: problem.rows(x, working) - MET)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
-    met = {"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]}
-    settings = {"maxiter": 60, "ftol": 1e-10}
-    bounds = [*zip(low, high, strict=True)]
     try:
         result = minimize(
             lambda x: float(problem.change(problem.values(x)[None, :])[0]),
-            begin, method="SLSQP", bounds=bounds, constraints=met, options=settings,
+            begin, method="SLSQP", bounds=[*zip(low, high, strict=True)], constraints=program.constraints,
+            options={"maxiter": 60, "ftol": 1e-10},
         ).x  # fmt: skip
     except Spent:
         result = program.best if program.seen else begin
@@ -138,12 +127,10 @@ def _evolved(problem: Problem, best: np.ndarray, working: np.ndarray) -> np.ndar
 def _taken_back(problem: Problem, gains: np.ndarray, working: np.ndarray) -> np.ndarray:
     """Each value by itself, then all together, as far back home as the working set allows."""
     home = problem.coordinates(problem.present)
-    size = len(home)
-    for mask in (*np.eye(size, dtype=bool), np.ones(size, dtype=bool)):
+    for mask in (*np.eye(len(home), dtype=bool), np.ones(len(home), dtype=bool)):
         here = problem.coordinates(gains)
         rows = problem.values(here + BACK[:, None] * np.where(mask, home - here, 0.0))
-        rows = np.clip(rows, problem.lower, problem.upper)
-        nearer = _nearer(problem, gains, rows, working)
+        nearer = _nearer(problem, gains, np.clip(rows, problem.lower, problem.upper), working)
         assert nearer is not None
         gains = nearer
     return gains

@@ -19,7 +19,7 @@ from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
-from analyses.tuning.placing import Variable, allowed_range, change
+from analyses.tuning.start import Variable, allowed_range, change
 
 GAINS = (
     "control.current.gain",
@@ -46,42 +46,29 @@ class Problem:
     requirements: tuple[Requirement, ...]
     variables: tuple[Variable, ...]
     most: int = MOST_DESIGNS
-    evaluations: int = field(default=0)
+    evaluations: int = 0
+    # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
+    # element neutral ones), and ends of what may be set
+    paths: tuple[str, ...] = field(init=False)
+    start: np.ndarray = field(init=False)
+    present: np.ndarray = field(init=False)
+    lower: np.ndarray = field(init=False)
+    upper: np.ndarray = field(init=False)
+    _linear: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.paths = tuple(item.path for item in self.variables)
+        self.lower = np.array([item.low for item in self.variables])
+        self.upper = np.array([item.high for item in self.variables])
+        self._linear = np.array([item.linear for item in self.variables], dtype=bool)
+        home = [item.start if item.home is None else item.home for item in self.variables]
+        self.present = np.clip(home, self.lower, self.upper)
+        self.start = np.clip([item.start for item in self.variables], self.lower, self.upper)
 
     @property
     def spent(self) -> bool:
         """Whether as many designs were looked at as one search may."""
         return self.evaluations >= self.most
-
-    @property
-    def paths(self) -> tuple[str, ...]:
-        """Dotted keys of the variables."""
-        return tuple(item.path for item in self.variables)
-
-    @cached_property
-    def start(self) -> np.ndarray:
-        """Start values, SI."""
-        return np.clip([item.start for item in self.variables], self.lower, self.upper)
-
-    @cached_property
-    def present(self) -> np.ndarray:
-        """What the design has, where that may be set; an added element starts neutral."""
-        home = [item.start if item.home is None else item.home for item in self.variables]
-        return np.clip(home, self.lower, self.upper)
-
-    @cached_property
-    def lower(self) -> np.ndarray:
-        """Smallest allowed values, SI."""
-        return np.array([item.low for item in self.variables])
-
-    @cached_property
-    def upper(self) -> np.ndarray:
-        """Largest allowed values, SI."""
-        return np.array([item.high for item in self.variables])
-
-    @cached_property
-    def _linear(self) -> np.ndarray:
-        return np.array([item.linear for item in self.variables], dtype=bool)
 
     def coordinates(self, values: np.ndarray) -> np.ndarray:
         """What the search moves: ln of a value; a share itself."""
@@ -92,7 +79,7 @@ class Problem:
         return np.where(self._linear, coordinates, np.exp(np.where(self._linear, 0.0, coordinates)))
 
     def change(self, values: np.ndarray) -> np.ndarray:
-        """How far each row is from the design as it came, see `analyses.tuning.placing.change`."""
+        """How far each row is from the design as it came, see `analyses.tuning.start.change`."""
         return change(self.variables, values)
 
     @cached_property
@@ -106,11 +93,9 @@ class Problem:
         """Those whose corners are looked at: all, or the ten that move the requirements most."""
         if len(self.toleranced) <= MOST_FACTORS:
             return self.toleranced
-        nominal = np.array([f.nominal for f in self.toleranced])
-        ends = np.array([f.box for f in self.toleranced])
-        points = np.tile(nominal, (2 * len(nominal) + 1, 1))
-        for k in range(len(nominal)):
-            points[2 * k + 1 : 2 * k + 3, k] = ends[k]
+        points = np.tile([f.nominal for f in self.toleranced], (2 * len(self.toleranced) + 1, 1))
+        for k, factor in enumerate(self.toleranced):
+            points[2 * k + 1 : 2 * k + 3, k] = factor.box
         result = np.minimum(self.exact_distances(self.start[None, :], points, self.toleranced)[0], PLENTY)
         moved = np.abs(result[1:] - result[0]).max(axis=1).reshape(-1, 2).max(axis=1)
         chosen = sorted(np.argsort(-moved, kind="stable")[:MOST_FACTORS])
@@ -123,11 +108,10 @@ class Problem:
         Of correlated parameters the corners are moved as they are correlated (the root of their correlation
         matrix times the signs, within the box): two that are one go up and down together.
         """
-        nominal = np.array([[f.nominal for f in self.factors]])
-        if not self.factors:
-            return np.zeros((1, 0))
+        size, nominal = len(self.factors), np.array([[f.nominal for f in self.factors]])
+        if not size:
+            return nominal
         lower, upper = np.array([f.box for f in self.factors]).T
-        size = len(self.factors)
         bits = (np.arange(2**size)[:, None] >> np.arange(size)) & 1
         matrix = correlation_of(self.design, [f.path for f in self.factors])
         if np.array_equal(matrix, np.eye(size)):
@@ -179,17 +163,16 @@ class Problem:
         return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
 
 
-def size_of(requirement: Requirement) -> float:
-    """What a distance is measured against: the limit itself, or the usual size of such a figure."""
-    limit = limit_of(requirement)
-    return abs(limit) if limit else QUANTITIES[requirement.quantity].size
-
-
 def limit_of(requirement: Requirement) -> float:
     """The limit that a requirement states (the lower one where it has both)."""
     limit = requirement.minimum if requirement.minimum is not None else requirement.maximum
     assert limit is not None
     return limit
+
+
+def size_of(requirement: Requirement) -> float:
+    """What a distance is measured against: the limit itself, or the usual size of such a figure."""
+    return abs(limit_of(requirement)) or QUANTITIES[requirement.quantity].size
 
 
 def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
@@ -214,13 +197,12 @@ def problem_of(
     The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
     are the variables of added elements.
     """
-
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):
         home = parameter_value(design, path)
         begin = start.get(path, home)
-        low, high = allowed_range(design, path)
-        low, high = max(min(begin, home) / SPAN, low), min(max(begin, home) * SPAN, high)
+        least, largest = allowed_range(design, path)
+        low, high = max(min(begin, home) / SPAN, least), min(max(begin, home) * SPAN, largest)
         variables.append(Variable(path, begin, min(low, high), max(low, high), home))
     return Problem(design, requirements, (*variables, *placed), most)
 
@@ -238,23 +220,20 @@ def read_requirement(words: str, design: Design) -> Requirement:
     >>> result.id, result.minimum, result.unit
     ('position-bandwidth-wanted', 30.0, 'Hz')
     """
+    said = f"--require {words!r}:"
     match = _FORM.fullmatch(words)
     if match is None:
-        raise InputError(
-            f'--require {words!r}: allowed: LOOP.QUANTITY>=LIMIT, as "position.bandwidth>=30 Hz"'
-        )
+        raise InputError(f'{said} allowed: LOOP.QUANTITY>=LIMIT, as "position.bandwidth>=30 Hz"')
     loop, quantity, sign, limit = match.groups()
-    loops = (*loops_of(design), "every")
-    if loop not in loops:
-        raise InputError(f"--require {words!r}: loop {loop!r}; allowed: {', '.join(loops)}")
     known = {name: q for name, q in QUANTITIES.items() if q.scope == "loop"}
-    if quantity not in known:
-        raise InputError(f"--require {words!r}: quantity {quantity!r}; allowed: {', '.join(known)}")
+    for what, one, allowed in (("loop", loop, (*loops_of(design), "every")), ("quantity", quantity, known)):
+        if one not in allowed:
+            raise InputError(f"{said} {what} {one!r}; allowed: {', '.join(allowed)}")
     unit = known[quantity].unit_for(design.axis)
     try:
         value = parse_limit(limit, unit)
     except InputError as error:
-        raise InputError(f"--require {words!r}: {error.message}") from error
+        raise InputError(f"{said} {error.message}") from error
     return Requirement(
         id=f"{loop}-{quantity.replace('_', '-')}-wanted", quantity=quantity, unit=unit, loop=loop,
         minimum=value if sign == ">=" else None, maximum=value if sign == "<=" else None,

@@ -12,6 +12,7 @@ from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
+from analyses.comparison.found import LargeSignal
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
@@ -77,6 +78,20 @@ class NonlinearCheck:
     final_error_percent: float
     limited: str
 
+    @classmethod
+    def of(cls, corner: str, amplitude_rad: float, seen: Mapping[str, float]) -> NonlinearCheck:
+        """From the figures of a step (`analyses.monte_carlo.task.step_units`)."""
+        shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+        return cls(
+            corner=corner,
+            amplitude_rad=amplitude_rad,
+            rise_time_s=finite(seen["rise_time"]),
+            overshoot_percent=float(seen["overshoot"]),
+            settling_time_s=finite(seen["settling_time"]),
+            final_error_percent=float(seen["final_error"]),
+            limited=", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0),
+        )
+
 
 @dataclass(frozen=True)
 class TuningResult:
@@ -106,15 +121,10 @@ class TuningResult:
 
     def __str__(self) -> str:
         head = "every requirement met" if self.feasible else "REQUIREMENTS CANNOT BE MET"
+        binding = (one for one in self.requirements if one.binds and one.distance)
         lines = [f"{self.design.name}: {head} over {self.corners} corners"]
         lines += [f"{g.path} = {g.rounded:.6g} {g.unit}" for g in self.gains]
-        lines += [
-            f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in self.requirements if r.binds and r.distance
-        ]
-        return "\n".join(lines)
-
-
-_SMALL = 0.05
+        return "\n".join([*lines, *(f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in binding)])
 
 
 def confirm(
@@ -142,35 +152,14 @@ def confirm(
 
 def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
-    from analyses.comparison.variant_figures import LargeSignal
-
-    worst = int(np.argmin(result.min(axis=1)))
-    plan = LargeSignal.plan(tuned)
-    rows = {"nominal": problem.all_corners[0]}
-    if worst:
-        rows["worst corner"] = problem.all_corners[worst]
-    points = np.array(list(rows.values())).T
-    population = Population(
-        tuned, {f.path: column for f, column in zip(problem.factors, points, strict=True)}, len(rows)
+    worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
+    names = ["nominal", "worst corner"][: 2 if worst else 1]
+    points = problem.all_corners[[0, worst][: len(names)]].T
+    values = {f.path: column for f, column in zip(problem.factors, points, strict=True)}
+    population = Population(tuned, values, len(names))
+    return tuple(
+        NonlinearCheck.of(corner, size, {name.partition(".")[2]: v[k] for name, v in columns.items()})
+        for size in (0.05 * plan.deflection_rad, plan.deflection_rad)
+        for columns in [step_columns(StepCheck(size, plan.duration_s), population)]
+        for k, corner in enumerate(names)
     )
-    checks = []
-    for share in (_SMALL, 1.0):
-        step = StepCheck(share * plan.deflection_rad, plan.duration_s)
-        columns = step_columns(step, population)
-        for k, corner in enumerate(rows):
-            one = {name.partition(".")[2]: float(values[k]) for name, values in columns.items()}
-            shares = {name: one[f"{name}_limited"] for name in ("speed", "current", "voltage")}
-            checks.append(
-                NonlinearCheck(
-                    corner=corner,
-                    amplitude_rad=step.amplitude_rad,
-                    rise_time_s=finite(one["rise_time"]),
-                    overshoot_percent=one["overshoot"],
-                    settling_time_s=finite(one["settling_time"]),
-                    final_error_percent=one["final_error"],
-                    limited=", ".join(
-                        f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0
-                    ),
-                )
-            )
-    return tuple(checks)

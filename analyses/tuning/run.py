@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from itertools import combinations
 from os import PathLike
 
 import numpy as np
@@ -17,11 +18,19 @@ from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.placing import Placed, checked, neighbours, object_of, place, step_of_gain, subsets
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
-from analyses.tuning.rules import RuleGains, rule_gains
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
+from analyses.tuning.start import (
+    Placed,
+    RuleGains,
+    checked,
+    neighbours,
+    object_of,
+    place,
+    rule_gains,
+    step_of_gain,
+)
 
 Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
@@ -53,28 +62,24 @@ def tune(
     """
     design, settings = as_design(design), settings or TuningSettings()
     wanted = loop_requirements(design, settings.requirements)
-    choices = list(subsets(checked(design, settings.place)))
+    allowed = checked(design, settings.place)
+    choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]
     stages = len(choices) + 3
     tell = progress or (lambda done, total: None)
     tell(0, stages)
     rules = rule_gains(design)
-    searched = 0
-    best: Attempt | None = None
+    tried: list[tuple[Placed, Problem, Solution]] = []
     for k, elements in enumerate(choices):
-        placed = place(design, elements)
-        problem = problem_of(
-            placed.design, wanted, rules.values, placed.variables, share_of(searched, len(choices) - k)
-        )
+        placed, last = place(design, elements), k + 1 == len(choices)
+        left = MOST_DESIGNS - sum(one.evaluations for _, one, _ in tried)
+        most = max(left if last else left // 2, MOST_DESIGNS // 12)  # designs that this choice may look at
+        problem = problem_of(placed.design, wanted, rules.values, placed.variables, most)
         seek = least_change if settings.aim == "least-change" else solve
-        solution = seek(problem, give_up=k + 1 < len(choices))
-        searched += problem.evaluations
-        if best is None or solution.slack > best.solution.slack:
-            best = Attempt(placed, problem, solution, problem.evaluations)
+        tried.append((placed, problem, seek(problem, give_up=not last)))
         tell(k + 1, stages)
-        if solution.slack >= 0.0:
+        if tried[-1][2].slack >= 0.0:
             break
-    assert best is not None
-    placed, problem, solution = best.placed, best.problem, best.solution
+    placed, problem, solution = max(tried, key=lambda one: one[2].slack)
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
     result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     moved = {  # what did not move keeps its text and source
@@ -89,7 +94,6 @@ def tune(
     tell(len(choices) + 2, stages)
     checks = nonlinear_checks(tuned, problem, result) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
-    searched += problem.evaluations - best.evaluations
     tell(stages, stages)
     return TuningResult(
         feasible=bool(result.min() >= 0.0) and all(v.passes for v in confirmed),
@@ -101,28 +105,12 @@ def tune(
         corners=len(problem.all_corners),
         checks=checks,
         trade_off=curve,
-        evaluations=searched,
+        evaluations=sum(one.evaluations for _, one, _ in tried),
         notes=tuple(_notes(problem, gains, result, confirmed)),
         aim=settings.aim,
         placed=placed.elements,
         confirmed=confirmed,
     )
-
-
-def share_of(searched: int, choices: int) -> int:
-    """Designs that the next of some choices may look at: half of what is left, all of it for the last."""
-    left = MOST_DESIGNS - searched
-    return max(left if choices == 1 else left // 2, MOST_DESIGNS // 12)
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """What one choice of elements came to."""
-
-    placed: Placed
-    problem: Problem
-    solution: Solution
-    evaluations: int
 
 
 def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
@@ -153,38 +141,27 @@ def _binding(
         relative, limit = float(distances[worst]), limit_of(requirement)
         distance = relative * size_of(requirement) if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
+        value = None if distance is None else limit + way * distance
         corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
-        made.append(
-            BindingRequirement(
-                id=requirement.id,
-                label=label(requirement),
-                unit=requirement.unit,
-                value=None if distance is None else limit + way * distance,
-                limit=limit,
-                distance=distance,
-                relative=relative,
-                binds=relative <= smallest + _BINDS and not enough,
-                corner={factor.path: float(value) for factor, value in corner},
-            )
-        )
+        binds = relative <= smallest + _BINDS and not enough
+        at = {factor.path: float(here) for factor, here in corner}
+        about = (requirement.id, label(requirement), requirement.unit)
+        made.append(BindingRequirement(*about, value, limit, distance, relative, binds, at))
     return tuple(made)
 
 
 def _settings(
     problem: Problem, before: Design, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
 ) -> Iterator[GainSetting]:
-    known_before = set(paths_of(before))
+    there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
-        known, step, field = (
-            object_of(problem.design, path),
-            step_of_gain(problem.design, path),
-            field_of(path),
-        )
+        known, step = object_of(problem.design, path), step_of_gain(problem.design, path)
+        field = field_of(path)
         assert field is not None
         yield GainSetting(
             path=path,
-            unit=field.unit(Structure.of(problem.design)),
-            before=parameter_value(before, path) if path in known_before else None,
+            unit=field.unit(structure),
+            before=parameter_value(before, path) if path in there else None,
             by_rule=rules.values.get(path),
             tuned=exact,
             object=known.label if known else "",

@@ -9,9 +9,10 @@ reserve those nearest to the rules are taken: margins beyond it are not worth a 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -39,33 +40,46 @@ class Solution:
     working: np.ndarray
 
 
+Seeking = Callable[[np.ndarray | None, np.ndarray], np.ndarray | None]
+
+
+def rounds(problem: Problem, working: np.ndarray, seek: Seeking) -> Iterator[Solution]:
+    """Solutions on a working set that grows by the corners that each of them misses.
+
+    ``seek`` gives gains from those of the round before (None in the first) and the working set; None ends it.
+    """
+    corners, gains = problem.all_corners, None
+    for _ in range(ROUNDS):
+        if (gains := seek(gains, working)) is None:
+            return
+        result = problem.distances(gains[None, :], corners)[0]
+        fresh = violated(result, problem, gains, corners, working)
+        yield Solution(gains, float(result.min()), working)
+        if not len(fresh) or problem.spent:
+            return
+        working = np.vstack([working, fresh])
+
+
 def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     """Maximise the smallest relative distance to the limits over all corners.
 
     With ``give_up`` it stops where already the nominal design misses a limit.
     """
-    corners = problem.all_corners
-    working = corners[:1]
-    starts = start_points(problem, working)
-    best: Solution | None = None
-    for _ in range(ROUNDS):
+
+    def seek(gains: np.ndarray | None, working: np.ndarray) -> np.ndarray:
+        starts = start_points(problem, working) if gains is None else gains[None, :]
         rows = partial(problem.rows, corners=working)
         found = np.array([maximise(problem, start, rows) for start in starts])
         away = np.sum((problem.coordinates(found) - problem.coordinates(problem.start)) ** 2, axis=1)
         near = np.minimum(problem.distances(found, working).min(axis=(1, 2)), RESERVE) - TIE * away
-        gains = found[int(np.argmax(near))]
-        result = problem.distances(gains[None, :], corners)[0]
-        slack = float(result.min())
-        if best is None or slack > best.slack:
-            best = Solution(gains, slack, working)
-        fresh = violated(result, problem, gains, corners, working)
-        hopeless = give_up and float(problem.distances(gains[None, :], working).min()) < 0.0
-        if not len(fresh) or hopeless or problem.spent:
+        return np.asarray(found[int(np.argmax(near))])
+
+    made = []
+    for one in rounds(problem, problem.all_corners[:1], seek):
+        made.append(one)
+        if give_up and float(problem.distances(one.gains[None, :], one.working).min()) < 0.0:
             break
-        working = np.vstack([working, fresh])
-        starts = gains[None, :]
-    assert best is not None
-    return best
+    return max(made, key=lambda one: one.slack)
 
 
 def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
@@ -108,23 +122,29 @@ class Program:
     goals: Functions
     limits: Functions | None = None
     seen: list[tuple[np.ndarray, float]] = field(default_factory=list, repr=False)
-    _last: tuple[bytes, np.ndarray, np.ndarray, int] | None = field(default=None, repr=False)
+    aims: int = 0  # how many functions are goals, the first ones
+    _last: tuple[np.ndarray, np.ndarray] | None = field(default=None, repr=False)
 
-    def model(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """Values, slopes of all functions at coordinates, and how many of them are goals."""
-        key, size = x.tobytes(), len(x)
+    def model(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Values and slopes of all functions at coordinates."""
         if self.problem.spent:
             raise Spent
-        if self._last is None or self._last[0] != key:
+        if self._last is None or not np.array_equal(self.seen[-1][0], x):
+            size = len(x)
             moves = np.vstack([np.zeros(size), STEP * np.eye(size), -STEP * np.eye(size)])
             values = self.goals(x + moves)
-            aims = values.shape[1]
+            self.aims = values.shape[1]
             if self.limits is not None:
                 values = np.concatenate([values, self.limits(x + moves)], axis=1)
             slopes = (values[1 : size + 1] - values[size + 1 :]) / (2 * STEP)
-            self._last = (key, values[0], slopes.T, aims)
+            self._last = (values[0], slopes.T)
             self.seen.append((x.copy(), float(values[0].min())))
-        return self._last[1:]
+        return self._last
+
+    @property
+    def constraints(self) -> dict[str, Any]:
+        """Every function at least 0, as `scipy.optimize.minimize` takes it."""
+        return {"type": "ineq", "fun": lambda x: self.model(x)[0], "jac": lambda x: self.model(x)[1]}
 
     @property
     def best(self) -> np.ndarray:
@@ -153,8 +173,8 @@ def maximise(
     x0, rules = np.clip(problem.coordinates(start), low, high), problem.coordinates(problem.start)
     if problem.spent:
         return problem.values(x0)
-    values, _, aims = program.model(x0)
-    first, raised = float(values[:aims].min()), np.arange(len(values)) < aims
+    values = program.model(x0)[0]
+    first, raised = float(values[: program.aims].min()), np.arange(len(values)) < program.aims
     met = {  # goals less t, then limits, of y = [coordinates, t]
         "type": "ineq",
         "fun": lambda y: program.model(y[:-1])[0] - np.where(raised, y[-1], 0.0),
@@ -199,7 +219,7 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
         result.append(trade.better([*starts, *tried], wanted))
     for k in range(len(targets) - 2, -1, -1):  # what a higher bandwidth allows, a lower one does too
         result[k] = trade.better(result[k : k + 2], targets[k])
-    points = [trade.point(one[None, :]) for one in result]
+    points = (trade.point(one[None, :]) for one in result)
     return tuple(point for point in points if np.isfinite(point.bandwidth_hz))
 
 
@@ -225,8 +245,7 @@ class _TradeOff:
         width = self.width(rows)
         made = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
         if self.others:
-            distances = self.problem.distances(rows, self.working)
-            made.append(distances[:, :, self.others].reshape(len(rows), -1))
+            made.append(self.problem.distances(rows, self.working)[:, :, self.others].reshape(len(rows), -1))
         return made
 
     def better(self, candidates: list[np.ndarray], wanted_hz: float) -> np.ndarray:
@@ -238,14 +257,14 @@ class _TradeOff:
 
     def best(self, start: np.ndarray, wanted_hz: float) -> np.ndarray:
         """Largest phase margin at a bandwidth or above, other requirements kept."""
-        values = self.problem.values
-        return maximise(
-            self.problem,
-            start,
-            lambda x: np.concatenate(self.kept(values(x), wanted_hz), axis=1),
-            lambda x: self.margins(values(x)) / 45.0,
-            most_rounds=30,
-        )
+
+        def limits(x: np.ndarray) -> np.ndarray:
+            return np.concatenate(self.kept(self.problem.values(x), wanted_hz), axis=1)
+
+        def free(x: np.ndarray) -> np.ndarray:
+            return self.margins(self.problem.values(x)) / 45.0
+
+        return maximise(self.problem, start, limits, free, most_rounds=30)
 
     def point(self, row: np.ndarray) -> TradeOffPoint:
         width, margin = float(np.min(self.width(row))), float(self.margins(row).min())

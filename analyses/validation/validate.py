@@ -17,10 +17,10 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
+from analyses.friction_effects import friction_effects
 from analyses.isolation import attempt
-from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
-from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
+from analyses.large_signal.from_rest import RestSweep, free_amplitude, margins_by_amplitude, sweep_from_rest
 from analyses.large_signal.result import large_signals
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of
@@ -249,8 +249,6 @@ class _Work:
         return large_signals(self.design, self._whole, counts=self.settings.map_counts)
 
     def _friction(self) -> Any:
-        from analyses.friction_effects import friction_effects
-
         return friction_effects(self.design, self.bench.commanded, settlings=self._settled)
 
     def _specification(self) -> Any:

@@ -10,10 +10,11 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.compiled.form import number
 from actuator_lti.compiled.kernel import kernel
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.program import Program
-from actuator_lti.compiled.residual import Leftover, Residual, number
+from actuator_lti.compiled.residual import Leftover, Residual
 from actuator_lti.compiled.structs import Member, Rows, Struct, emit_structs, split_index
 from actuator_lti.compiled.unread import without_unread
 from actuator_lti.design.law import LAW_INPUTS
@@ -58,13 +59,8 @@ def controller_start(p, s):  # type: ignore[no-untyped-def]
 class Controller:
     """The controller of a design as C in double precision.
 
-    Attributes
-    ----------
-    p : ndarray
-        The parameters of the design with all that is derived from them.
-    program : Program
-    state, measured, out : Struct
-        What it remembers, is given and gives.
+    ``p``: the parameters of the design with all that is derived from them.
+    ``state``, ``measured``, ``out``: what it remembers, is given and gives.
     """
 
     design: Design

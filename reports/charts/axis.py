@@ -70,12 +70,11 @@ class Axis:
         """Give the places of values, 0 at the low end and 1 at the high one; NaN where there is none."""
         low, high = self.span()
         array = np.asarray(values, dtype=float)
+        result = (array - low) / (high - low)
         if self.log:
             with np.errstate(divide="ignore", invalid="ignore"):
                 result = np.log(array / low) / math.log(high / low)
             result = np.where(array > 0.0, result, np.where(array <= 0.0, -1e3, np.nan))
-        else:
-            result = (array - low) / (high - low)
         return np.asarray(1.0 - result if self.reversed else result)
 
     def named_ticks(self, room: int = 6) -> list[tuple[float, str]]:

@@ -234,11 +234,10 @@ class Chart:
         return made
 
     def labels(self) -> list[tuple[str, Item]]:
-        result: dict[str, Item] = {}
-        for item in (one for column in self.columns for panel in column.panels for one in panel.items):
-            if not isinstance(item, Note) and item.label:
-                result.setdefault(item.label, item)
-        return list(result.items())
+        items = [one for column in self.columns for panel in column.panels for one in panel.items]
+        named = [(one.label, one) for one in items if not isinstance(one, Note) and one.label]
+        first = dict(reversed(named))
+        return [(label, first[label]) for label in dict.fromkeys(label for label, _ in named)]
 
 
 def _shade(look: Mapping[str, Any]) -> Look:

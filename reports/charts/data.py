@@ -36,13 +36,7 @@ def chart_data(chart: Chart) -> Tree:
 
 
 def chart_of(data: Mapping[str, Any]) -> Chart:
-    """Make the chart of such data.
-
-    Raises
-    ------
-    InputError
-        For what is no chart: the first place that is wrong.
-    """
+    """Make the chart of such data; of what is none an InputError names the first place that is wrong."""
     try:
         chart = _READER.validate_python(data)
     except ValidationError as error:
@@ -73,7 +67,6 @@ def _plain(value: Any) -> Any:
 
 
 def _said(owner: Any, each: Any) -> bool:
-    """Whether a field has to be written: it is not the default."""
     value = getattr(owner, each.name)
     if each.name == "kind" or isinstance(value, np.ndarray):
         return True

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 
@@ -58,7 +59,6 @@ class Room:
             self.ink.append((start + t * (stop - start)).reshape(-1, 2))
 
     def add_points(self, x: np.ndarray, y: np.ndarray, size: float = 4.0) -> None:
-        """Keep words off markers."""
         good = np.isfinite(x) & np.isfinite(y)
         for dx, dy in ((0, 0), (size, 0), (-size, 0), (0, size), (0, -size)):
             self.ink.append(np.column_stack([x[good] + dx, y[good] + dy]))
@@ -94,14 +94,10 @@ class Room:
         outside = max(left - x0, 0) + max(x1 - right, 0) + max(top - y0, 0) + max(y1 - bottom, 0)
         cost = 1e4 + 100.0 * outside if outside > 0.5 else 0.0
         cost += COVERED * sum(x0 < a1 and a0 < x1 and y0 < b1 and b0 < y1 for a0, b0, a1, b1 in self.boxes)
-        x, y = self._points().T
+        self.ink = [np.concatenate([np.empty((0, 2)), *self.ink])] if len(self.ink) != 1 else self.ink
+        x, y = self.ink[0].T
         crossed = (x > x0 - PAD) & (x < x1 + PAD) & (y > y0 - PAD) & (y < y1 + PAD)
         return cost + CROSSED * int(crossed.sum())
-
-    def _points(self) -> np.ndarray:
-        if len(self.ink) != 1:
-            self.ink = [np.concatenate(self.ink)] if self.ink else [np.empty((0, 2))]
-        return self.ink[0]
 
 
 def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> Iterator[Box]:
@@ -109,17 +105,14 @@ def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> I
     w, h = size
     if over:
         yield (at[0] - w / 2.0, at[1] - h / 2.0, at[0] + w / 2.0, at[1] + h / 2.0)
-    for distance in DISTANCES:
-        for dx, dy in DIRECTIONS:
-            x = at[0] + distance * dx + (w / 2.0) * dx
-            y = at[1] + distance * dy + (h / 2.0) * dy
-            # the box stands beside the point, not on it
-            x = x if abs(dx) < 0.3 else at[0] + math.copysign(distance, dx) + math.copysign(w / 2.0, dx)
-            yield (x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0)
+    for far, (dx, dy) in product(DISTANCES, DIRECTIONS):
+        x, y = at[0] + far * dx + (w / 2.0) * dx, at[1] + far * dy + (h / 2.0) * dy
+        # the box stands beside the point, not on it
+        x = x if abs(dx) < 0.3 else at[0] + math.copysign(far, dx) + math.copysign(w / 2.0, dx)
+        yield (x - w / 2.0, y - h / 2.0, x + w / 2.0, y + h / 2.0)
 
 
 def distance(box: Box, at: tuple[float, float]) -> float:
-    """How far a box is from a point."""
     dx = max(box[0] - at[0], 0.0, at[0] - box[2])
     dy = max(box[1] - at[1], 0.0, at[1] - box[3])
     return math.hypot(dx, dy)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from reports.charts.axis import minor_ticks
-from reports.charts.chart import Band, Curve, Item, Note, Panel, Rule, Shape
+from reports.charts.chart import Curve, Item, Note, Panel, Rule, Shape
 from reports.charts.labels import Room, distance, text_box
 from reports.charts.paint import MARKER_PATHS
 from reports.charts.pen import FAR, Frame, Pen
@@ -25,7 +25,9 @@ def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
         world.append(drawn)
         marks.append(dots)
     clip = f"{pen.prefix}c"
-    notes = "".join(note_svg(item, panel, frame, pen, room) for item in by_need(panel.items))
+    wordy = [item for item in panel.items if isinstance(item, Rule | Note) and item.words]
+    wordy.sort(key=lambda item: not (isinstance(item, Note) and item.pinned))  # which cannot give way
+    notes = "".join(note_svg(item, panel, frame, pen, room) for item in wordy)
     inside = (
         f'<clipPath id="{clip}"><rect x="{frame.left:.1f}" y="{frame.top:.1f}" width="{frame.width:.1f}" '
         f'height="{frame.height:.1f}"/></clipPath><g clip-path="url(#{clip})">'
@@ -38,22 +40,16 @@ def panel_svg(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
 
 def _data(panel: Panel, frame: Frame, hide_x: bool) -> str:
     """Write what the script must know of the axes."""
-    parts = []
-    for key, axis, ends in (
-        ("x", panel.x, (frame.left, frame.right)),
-        ("y", panel.y, (frame.bottom, frame.top)),
-    ):
+    parts, across, up = [], (frame.left, frame.right), (frame.bottom, frame.top)
+    for key, axis, ends in (("x", panel.x, across), ("y", panel.y, up)):
         low, high = axis.span()
         a, b = ends[::-1] if axis.reversed else ends
         kind = "log" if axis.log else "days" if axis.days else "lin"
         parts.append(f' data-{key}="{kind} {low:.9g} {high:.9g} {a:.2f} {b:.2f}"')
         parts.append(f' data-{key}l="{escape(axis.name or axis.label.replace(chr(10), " "))}"')
-        if axis.ticks is not None:
-            parts.append(f' data-{key}fixed="1"')
-    parts.append(' data-hide="1"' if hide_x else "")
-    parts.append(' data-equal="1"' if panel.equal else "")
-    parts.append(' data-mode="xy"' if panel.by_point else "")
-    return "".join(parts)
+        parts.append(f' data-{key}fixed="1"' * (axis.ticks is not None))
+    said = ' data-hide="1"' * hide_x + ' data-equal="1"' * panel.equal + ' data-mode="xy"' * panel.by_point
+    return "".join(parts) + said
 
 
 def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
@@ -67,48 +63,38 @@ def _axes(panel: Panel, frame: Frame, pen: Pen, *, hide_x: bool) -> str:
     thin = pen.style(fill="none", stroke="grid", stroke_width="0.8")
     edge = pen.style(fill="none", stroke="muted", stroke_width="0.9")
     box = f"M{frame.left:.1f} {frame.top:.1f}V{frame.bottom:.1f}H{frame.right:.1f}"
-    parts = [f'<path class="grid" d="{across}{up}" {thin}/>', f'<path class="edge" d="{box}{small}" {edge}/>']
-    low = frame.bottom + 14.0
-    named = [] if hide_x else list(zip(px, xs, strict=True))
-    x_words = "".join(pen.words(words, x, low, size=TICK, anchor="middle") for x, (_, words) in named)
-    y_words = "".join(
-        pen.words(w, frame.left - 5.0, y + 3.7, size=TICK, anchor="end")
-        for y, (_, w) in zip(py, ys, strict=True)
-    )
-    parts += [f'<g class="xt">{x_words}</g>', f'<g class="yt">{y_words}</g>']
+    parts = [f'<path class="grid" d="{across}{up}" {thin}/><path class="edge" d="{box}{small}" {edge}/>']
+    shown = [] if hide_x else zip(px, xs, strict=True)
+    low, left = frame.bottom + 14.0, frame.left - 5.0
+    below = [pen.words(words, x, low, size=TICK, anchor="middle") for x, (_, words) in shown]
+    beside = [pen.words(w, left, y + 3.7, size=TICK, anchor="end") for y, (_, w) in zip(py, ys, strict=True)]
+    parts.append(f'<g class="xt">{"".join(below)}</g><g class="yt">{"".join(beside)}</g>')
+    middle: dict[str, Any] = {"size": LABEL, "anchor": "middle"}
     if panel.x.label and not hide_x:
-        middle = (frame.left + frame.right) / 2.0
         low = frame.bottom + (17.0 if xs else 3.0) + LABEL
-        parts.append(pen.words(panel.x.label, middle, low, size=LABEL, anchor="middle"))
+        parts.append(pen.words(panel.x.label, (frame.left + frame.right) / 2.0, low, **middle))
     if panel.y.label:
         rotated = (frame.top + frame.bottom) / 2.0
         turn = f' transform="rotate(-90 11 {rotated:.1f})"'
-        parts.append(pen.words(panel.y.label, 11.0, rotated, size=LABEL, anchor="middle", more=turn))
+        parts.append(pen.words(panel.y.label, 11.0, rotated, **middle, more=turn))
     if panel.title:
         parts.append(pen.words(panel.title, frame.left, frame.top - 7.0, size=TITLE, bold=True))
     return "".join(parts)
 
 
 def room_y(panel: Panel, height: float) -> int:
-    """Say how many ticks a panel of that height has room for."""
     return min(max(2, int(height / 24)), 7) if panel.y.ticks is None else 99
 
 
 def _item(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> tuple[str, str]:
     """Write what scales with the axes, and the markers, which only move."""
-    key = "" if isinstance(item, Note) or not item.label else f' data-k="{pen.keys[item.label]}"'
+    if isinstance(item, Note):
+        return "", ""
+    key = f' data-k="{pen.keys[item.label]}"' if item.label else ""
     if isinstance(item, Curve):
         return _curve(item, panel, frame, pen, room, key)
     if isinstance(item, Rule):
         return _rule(item, panel, frame, pen, room, key), ""
-    if isinstance(item, Band):
-        if item.across == "x":
-            a, b = frame.x(panel.x, [item.low, item.high])
-            path = f"M{a:.2f} -{FAR:.0f}V{FAR:.0f}H{b:.2f}V-{FAR:.0f}z"
-        else:
-            a, b = frame.y(panel.y, [item.low, item.high])
-            path = f"M-{FAR:.0f} {a:.2f}H{FAR:.0f}V{b:.2f}H-{FAR:.0f}z"
-        return pen.filled(path, item.look, key), ""
     if isinstance(item, Shape):
         rings = [(frame.x(panel.x, x), frame.y(panel.y, y)) for x, y in item.rings]
         if item.look.opacity > 0.5 or item.look.hatch:
@@ -116,7 +102,13 @@ def _item(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> tuple
                 room.add_line(np.append(x, x[0]), np.append(y, y[0]))
                 room.add_line(np.array([x.min(), x.max()]), np.array([y.mean(), y.mean()]))
         return pen.filled("".join(_path(x, y) + "z" for x, y in rings), item.look, key), ""
-    return "", ""
+    if item.across == "x":
+        a, b = frame.x(panel.x, [item.low, item.high])
+        path = f"M{a:.2f} -{FAR:.0f}V{FAR:.0f}H{b:.2f}V-{FAR:.0f}z"
+    else:
+        a, b = frame.y(panel.y, [item.low, item.high])
+        path = f"M-{FAR:.0f} {a:.2f}H{FAR:.0f}V{b:.2f}H-{FAR:.0f}z"
+    return pen.filled(path, item.look, key), ""
 
 
 def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> tuple[str, str]:
@@ -143,10 +135,9 @@ def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: s
 
 def _dots(x: np.ndarray, y: np.ndarray, item: Curve, pen: Pen, key: str) -> str:
     """Write markers: one drawn, the others refer to it."""
-    look = item.look
     if not len(x):
         return ""
-    name = f"{pen.prefix}m"
+    look, name = item.look, f"{pen.prefix}m"
     shape = f'<path id="{name}" d="{MARKER_PATHS[look.marker]}" transform="scale({look.size / 2:g})"/>'
     uses = "".join(f'<use href="#{name}" x="{a:.2f}" y="{b:.2f}"/>' for a, b in zip(x, y, strict=True))
     mute = "" if item.read and not item.line else " mute"
@@ -155,14 +146,13 @@ def _dots(x: np.ndarray, y: np.ndarray, item: Curve, pen: Pen, key: str) -> str:
 
 
 def _rule(item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, key: str) -> str:
-    axis = panel.x if item.across == "x" else panel.y
     if item.across == "x":
-        (at,) = frame.x(axis, [item.at])
+        (at,) = frame.x(panel.x, [item.at])
         path, ends = f"M{at:.2f} -{RULE_LENGTH}V{RULE_LENGTH}", ([at, at], [frame.top, frame.bottom])
     else:
-        (at,) = frame.y(axis, [item.at])
+        (at,) = frame.y(panel.y, [item.at])
         path, ends = f"M-{RULE_LENGTH} {at:.2f}H{RULE_LENGTH}", ([frame.left, frame.right], [at, at])
-    room.add_line(np.array(ends[0]), np.array(ends[1]))
+    room.add_line(*map(np.array, ends))
     return pen.line(path, item.look, f' class="rule"{key}' if pen.page else "")
 
 
@@ -182,15 +172,8 @@ NOTE = 10.5
 LEADER = 26.0  # words further away from their point are tied to it by a line
 
 
-def by_need(items: Sequence[Item]) -> list[Item]:
-    """Give what has words, the pinned ones first: they cannot give way."""
-    wordy = [item for item in items if (isinstance(item, Rule | Note) and item.words)]
-    return sorted(wordy, key=lambda item: 0 if isinstance(item, Note) and item.pinned else 1)
-
-
-def note_svg(item: Item, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
+def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
     """Write the words of a rule or note where they cover nothing."""
-    assert isinstance(item, Rule | Note)
     w, h = text_box(item.words, NOTE)
     size = (w + 6.0, h + 2.0)
     if isinstance(item, Rule):

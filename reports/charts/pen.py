@@ -111,12 +111,9 @@ class Pen:
         lines = words.split("\n")
         weight = ' font-weight="600"' if bold else ""
         side = "" if anchor == "start" else f' text-anchor="{anchor}"'
-        painted = self.style(fill=colour)
-        head = f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}"{side}{weight}{more} {painted}>'
-        if len(lines) == 1:
-            return f"{head}{escape(words)}</text>"
-        spans = "".join(
-            f'<tspan x="{x:.1f}" dy="{0 if k == 0 else LINE_EM * size:.1f}">{escape(line)}</tspan>'
-            for k, line in enumerate(lines)
-        )
-        return f"{head}{spans}</text>"
+        look, text = f"{side}{weight}{more} {self.style(fill=colour)}", escape(words)
+        if len(lines) > 1:
+            steps = [LINE_EM * size * bool(k) for k in range(len(lines))]
+            spans = zip(steps, map(escape, lines), strict=True)
+            text = "".join(f'<tspan x="{x:.1f}" dy="{dy:.1f}">{line}</tspan>' for dy, line in spans)
+        return f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size:g}"{look}>{text}</text>'

@@ -6,7 +6,7 @@ its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
 from itertools import accumulate
 
 from reports.charts.chart import Band, Chart, Column, Curve, Item, Note, Panel, Shape
@@ -47,11 +47,10 @@ def paper_svg(chart: Chart, prefix: str) -> str:
     """Write a chart as one picture with plain colours and its legend below."""
     keys = _keys(chart)
     total = sum(column.width for column in chart.columns)
-    rows = list(_key_rows(chart))
+    rows = _key_rows(chart)
     head = 18.0 if chart.title else 0.0
     foot = KEY_ROW * len(rows) + (6.0 if rows else 0.0)
     parts, left = [], 0.0
-    pen = Pen(prefix=f"{prefix}k", page=False, keys=keys)
     for k, column in enumerate(chart.columns):
         width = chart.width * column.width / total
         own = Pen(prefix=f"{prefix}{chr(97 + k)}", page=False, keys=keys)
@@ -59,8 +58,14 @@ def paper_svg(chart: Chart, prefix: str) -> str:
         parts.append(f'<g transform="translate({left:.1f} {head:g})">{body}</g>')
         left += width
     if chart.title:
+        pen = Pen(prefix="", page=False, keys=keys)
         parts.append(pen.words(chart.title, 4.0, 13.0, size=TITLE, bold=True))
-    parts += _paper_keys(rows, head + chart.height + 14.0, pen)
+    for r, row in enumerate(rows):
+        y = head + chart.height + 14.0 + KEY_ROW * r
+        for k, (label, item, x) in enumerate(row):
+            own = Pen(prefix=f"{prefix}k{r}x{k}", page=False, keys={})
+            parts.append(f'<g transform="translate({x:.1f} {y - 9:.1f})">{_swatch(item, own)}</g>')
+            parts.append(own.words(label, x + SWATCH + 5.0, y, size=TICK))
     height = head + chart.height + foot
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{0.75 * chart.width:.1f}pt" '
@@ -77,9 +82,7 @@ def _column(column: Column, width: float, height: float, pen: Pen) -> str:
     free = height - head - sum(above) - sum(below)
     tall = [free * share / sum(column.heights) for share in column.heights]
     left = max((_left(panel, high) for panel, high in zip(column.panels, tall, strict=True)), default=30.0)
-    parts = []
-    if column.title:
-        parts.append(pen.words(column.title, left, 12.0, size=TITLE, bold=True))
+    parts = [pen.words(column.title, left, 12.0, size=TITLE, bold=True)] if column.title else []
     tops = accumulate((a + t + b for a, t, b in zip(above, tall, below, strict=True)), initial=head)
     for k, (panel, top) in enumerate(zip(column.panels, tops, strict=False)):
         frame = Frame(left, top + above[k], width - GAP, top + above[k] + tall[k])
@@ -108,7 +111,6 @@ def _below(panel: Panel, hidden: bool) -> float:
 
 
 def _make_equal(panel: Panel, frame: Frame) -> None:
-    """Widen one axis so that a unit is as long on both."""
     (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
     scale = min(frame.width / (x1 - x0), frame.height / (y1 - y0))
     for axis, size, (low, high) in ((panel.x, frame.width, (x0, x1)), (panel.y, frame.height, (y0, y1))):
@@ -141,30 +143,18 @@ def _legend(chart: Chart, prefix: str) -> str:
     return f'<div class="keys">{title}<ul>{rows}</ul></div>'
 
 
-def _key_rows(chart: Chart) -> Iterator[list[tuple[str, Item, float]]]:
+def _key_rows(chart: Chart) -> list[list[tuple[str, Item, float]]]:
     """Break the legend into lines of the chart's width."""
-    row: list[tuple[str, Item, float]] = []
-    x = 4.0
+    rows: list[list[tuple[str, Item, float]]] = []
+    x = math.inf
     for label, item in _shown(chart):
         size = SWATCH + 6.0 + text_width(label, TICK) + KEY_GAP
-        if row and x + size > chart.width:
-            yield row
-            row, x = [], 4.0
-        row.append((label, item, x))
+        if x + size > chart.width:
+            rows.append([])
+            x = 4.0
+        rows[-1].append((label, item, x))
         x += size
-    if row:
-        yield row
-
-
-def _paper_keys(rows: list[list[tuple[str, Item, float]]], top: float, pen: Pen) -> list[str]:
-    parts = []
-    for r, row in enumerate(rows):
-        for k, (label, item, x) in enumerate(row):
-            own = Pen(prefix=f"{pen.prefix}{r}x{k}", page=False, keys={})
-            y = top + KEY_ROW * r
-            parts.append(f'<g transform="translate({x:.1f} {y - 9:.1f})">{_swatch(item, own)}</g>')
-            parts.append(own.words(label, x + SWATCH + 5.0, y, size=TICK))
-    return parts
+    return rows
 
 
 def _swatch(item: Item, pen: Pen) -> str:

@@ -53,8 +53,6 @@ VariantOption = Annotated[
 
 
 def command(one: Analysis) -> Callable[..., None]:
-    """The function that typer makes a command of."""
-
     usual = getattr(one.request, "design_of", lambda _given: DEFAULT_DESIGN)
 
     def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
@@ -65,32 +63,30 @@ def command(one: Analysis) -> Callable[..., None]:
             subject = load_drive(usual(given) if design is None else design, changes)
         answer(one, subject, **given)
 
-    parameters = _parameters(one)
-    run.__signature__ = Signature(  # type: ignore[attr-defined]
-        [
-            Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
-            for name, (annotation, default) in parameters.items()
-        ]
-    )
-    run.__annotations__ = {name: annotation for name, (annotation, _) in parameters.items()}
+    parameters = [
+        Parameter(name, Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+        for name, (annotation, default) in _parameters(one).items()
+    ]
+    run.__signature__ = Signature(parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
     words = one.help.replace("[", "\\[")  # of keys, no markup
     run.__doc__ = words + (f"\n\nIn the report: --also {one.name}." if one.also else "")
     return run
 
 
 def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
-    """Annotation and default of every parameter of a command, by name."""
     asked = [(name, *each, getattr(one.request, name, None)) for name, each in _options(one).items()]
     needed = any(option.argument and default is None for _, _, option, default in asked)  # so is a design
     paged = one.page and not one.alone
     made: dict[str, tuple[Any, Any]] = {}
     if one.study:
-        made = {"design": (StudyArgument, None), "changes": (VariantOption, None)}
+        made["design"] = (StudyArgument, None)
     elif hasattr(one.request, "design_of"):
-        made = {"design": (DesignOption, None), "changes": (SetOption, None)}
+        made["design"] = (DesignOption, None)
     elif not one.alone:
-        design = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
-        made = {"design": design, "changes": (SetOption, None)}
+        made["design"] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
+    if made:
+        made["changes"] = (VariantOption if one.study else SetOption, None)
     made |= {name: _option(name, kind, option, default) for name, kind, option, default in asked}
     if paged:
         made["out"] = (FolderOption, Path(one.out) if one.out else None)
@@ -135,7 +131,10 @@ def answer(
     from reports.study_pages import notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
-    values = {name: _read(name, option, chosen[name], drive) for name, (_, option) in _options(one).items()}
+    values: dict[str, Any] = {}
+    for name, (_, option) in _options(one).items():
+        of, value = f"--{option.flag or flag(name)}", chosen[name]
+        values[name] = value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
     if one.written and (as_json or out is not None):
         values[one.written] = True
     asked = one.asked(subject, values)
@@ -168,7 +167,6 @@ def answer(
 
 
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
-    """Write page and JSON."""
     from reports.cli.progress import progress
     from reports.html import write_report
     from reports.study_pages import study_document
@@ -182,7 +180,6 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 def _print(
     one: Analysis, name: str, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
-    """Print the sections, or in brief what they say."""
     from reports.terminal import print_blocks, print_section, print_verdict
 
     brief = one.shows("brief", _nothing)(result)
@@ -206,12 +203,6 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
     made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
-
-
-def _read(name: str, option: Option, value: Any, drive: Design) -> Any:
-    """The value of an option in SI, once the drive is known."""
-    of = f"--{option.flag or flag(name)}"
-    return value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
 
 
 def _nothing(*_result: Any) -> None:

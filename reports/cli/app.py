@@ -11,28 +11,23 @@ from typing import Annotated, Any
 import typer
 
 from actuator_lti.errors import InputError
-from reports.analyses import ANALYSES, COMMANDS_IN
+from reports.analyses import ANALYSES, COMMANDS_IN, DESIGNS, EXPORTS, LINEAR, NONLINEAR, RECORDS, STUDIES
 from reports.cli.analysis import command as declared
 
-
-def _declared(group: str) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == group))
-
-
 _WHOLE_BITS = 63
-# In the order in which the help lists them, by the panel that they stand in.
-PANELS: dict[str, tuple[str, ...]] = {
-    "Designs": (*_declared("Designs"), "objects"),
-    "Linear loops": (*_declared("Linear loops"), "report", "pdf"),
-    "Nonlinear checks": _declared("Nonlinear checks"),
-    "Bench records": _declared("Bench records"),
-    "Out of Python": _declared("Out of Python"),
-    "Variants and history": _declared("Variants and history"),
-}
+_APART = {DESIGNS: ("objects",), LINEAR: ("report", "pdf")}  # commands that are no declared analysis
+
+
+def _commands(panel: str) -> tuple[str, ...]:
+    declared = [one.name.split()[0] for one in ANALYSES if one.group == panel]
+    return tuple(dict.fromkeys([*declared, *_APART.get(panel, ())]))
+
+
+PANELS = {one: _commands(one) for one in (DESIGNS, LINEAR, NONLINEAR, RECORDS, EXPORTS, STUDIES)}
+"""Commands in the order in which the help lists them, by the panel that they stand in."""
 
 
 def build() -> typer.Typer:
-    """Assemble the application from its command modules."""
     app = typer.Typer(
         name="actuator-lti",
         add_completion=True,
@@ -54,7 +49,6 @@ def built() -> Any:
 
 
 def say_version(wanted: bool) -> None:
-    """Print the version and stop, where it was asked for."""
     if wanted:
         from reports.provenance import package_version
 

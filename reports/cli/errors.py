@@ -42,13 +42,7 @@ _PLAIN = {  # what typer says, and what it means
 
 
 def leave_with(passed: bool) -> None:
-    """End the command with status 1 where a requirement or verdict failed.
-
-    Raises
-    ------
-    typer.Exit
-        With status 1, if not passed.
-    """
+    """End the command with status 1 where a requirement or verdict failed."""
     if not passed:
         raise typer.Exit(VERDICT_FAILED)
 
@@ -104,7 +98,8 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
     except _USAGE_ERRORS as error:
         return _say(_usage_line(error), BAD_INPUT)
     except OSError as error:
-        return _say(_os_line(error), BAD_INPUT)
+        named = f"{error.filename}: " if error.filename else ""
+        return _say(f"{named}{error.strerror or error}", BAD_INPUT)
     except MemoryError:
         return _say("not enough memory", NO_RESULT)
     if status == INTERRUPTED:  # typer swallows the interruption and gives its status
@@ -124,7 +119,6 @@ def _by_option(error: InputError, known: Callable[[], Mapping[str, str]]) -> str
 
 
 def _say(line: str, status: int) -> int:
-    """Print one line on standard error and hand the status on."""
     words = "".join(c if c.isprintable() else "?" for c in " ".join(line.split()))
     words = words if len(words) <= _LONGEST else f"{words[: _LONGEST - 300]} ... {words[-295:]}"
     sys.stderr.write(f"actuator-lti: {words}\n")
@@ -132,19 +126,12 @@ def _say(line: str, status: int) -> int:
 
 
 def _usage_line(error: BaseException) -> str:
-    """Say what was wrong with the arguments, and where the help is."""
     context = getattr(error, "ctx", None)
     command = context.command_path if context is not None else "actuator-lti"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     for said, plain in _PLAIN.items():
         message = message.replace(said, plain)
     return f"{message or 'a command is missing'} (see {command} --help)"
-
-
-def _os_line(error: OSError) -> str:
-    """Name the file and what the system said."""
-    name = f"{error.filename}: " if error.filename else ""
-    return f"{name}{error.strerror or error}"
 
 
 def _quiet_pipe() -> int:

@@ -73,8 +73,8 @@ def export(
     notes += [f"no place for it in {into}: {label}" for label in homeless]
     if as_json:
         objects = [_plain(item) for item in result.objects.values]
-        print_json({"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes,
-                    "velocity_gain_factor": result.objects.velocity_gain_factor})  # fmt: skip
+        made = {"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes}
+        print_json({**made, "velocity_gain_factor": result.objects.velocity_gain_factor})
         return
     if out is None:
         print_line(text.rstrip())
@@ -119,12 +119,10 @@ def import_settings(
         return
     if out is None:
         print_line(text.rstrip())
-    said = [(path, result.design.parameters[path]) for path in result.changed]
-    changed_lines = [
-        f"{path} = {item.text}" + f"  ({item.source})" * bool(item.source) for path, item in said
-    ]
-    kept_lines = [f"kept: {item.label} = {item.value}" for item in result.kept]
-    for line in [*changed_lines, *kept_lines, *result.notes]:
+    for path in result.changed:
+        known = result.design.parameters[path]
+        print_note(f"{path} = {known.text}" + f"  ({known.source})" * bool(known.source))
+    for line in [*(f"kept: {item.label} = {item.value}" for item in result.kept), *result.notes]:
         print_note(line)
 
 

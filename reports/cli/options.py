@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 import tomllib
 from collections.abc import Sequence
+from contextlib import suppress
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -66,6 +67,7 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> 
 
     if words is None:
         return None
+    bare: float | None = None
     linear, factor = drive.axis == "linear", 1.0
     if kind == "output":
         unit, allowed = ("m", 'a value such as "5 mm"') if linear else ("rad", 'a value such as "2 deg"')
@@ -74,10 +76,8 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> 
     else:
         usual, factor = COMMAND_UNITS[drive.axis, drive.controller.outermost]
         unit, allowed = usual.replace("deg", "rad").replace("mm", "m"), f'"5 {usual}", or 5 in {usual}'
-    try:
+    with suppress(ValueError):
         bare = None if kind == "output" else float(words)
-    except ValueError:
-        bare = None
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:
@@ -111,17 +111,10 @@ def read_changes(changes: Sequence[str]) -> Tree:
         key, equals, value = words.partition("=")
         if not equals or not key.strip():
             raise InputError(f"--set {words!r}: allowed: KEY=VALUE, such as limits.voltage='24 V'")
-        result[key.strip()] = _value(value.strip())
+        result[key.strip()] = text = value.strip()
+        with suppress(ValueError, RecursionError):
+            result[key.strip()] = text if "\n" in text else tomllib.loads(f"v = {text}")["v"]
     return result
-
-
-def _value(words: str) -> Any:
-    if "\n" in words:
-        return words
-    try:
-        return tomllib.loads(f"v = {words}")["v"]
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError):
-        return words
 
 
 def refuse_existing(path: Path, force: bool) -> None:

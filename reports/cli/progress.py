@@ -46,7 +46,6 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Report]:
 
 
 def _rich_bar() -> Progress:
-    """Make the bar; rich is imported only when one is needed."""
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 

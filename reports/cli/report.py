@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli.options import (
@@ -52,6 +53,8 @@ AveragesOption = Annotated[
 ]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
+SHOWN = 8  # of what is not met or not proven
+
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
@@ -76,7 +79,6 @@ def report(
 
     Try: actuator-lti report joint --also corners --also failures --pdf --out out/joint
     """
-    from actuator_lti.asked.verdict import Verdict
     from actuator_lti.design.loader import design_text
     from reports import build
     from reports.cli.errors import leave_with
@@ -84,7 +86,7 @@ def report(
     from reports.cli.progress import progress
     from reports.document import dumps, load
     from reports.terminal import print_verdict
-    from reports.verdict_summary import verdict_words
+    from reports.verdict_summary import open_items, verdict_words
 
     if summary and not pdf:
         raise InputError("--summary: allowed with --pdf, of which it makes a short one")
@@ -101,16 +103,17 @@ def report(
         source=None if changes else design_text(design),
         step=partial(progress, quiet=quiet),
     )
-    written: tuple[Path, ...] = (out / "report.html", out / "report.json")
+    written = [out / "report.html", out / "report.json"]
     if pdf:
         from reports.pdf import write_pdf
 
-        written = (*written, write_pdf(made, out / "report.pdf", whole=not summary))
-    passed = bool(made["verdict"]["passed"])
+        written.append(write_pdf(made, out / "report.pdf", whole=not summary))
     if as_json:
         print_line(dumps(made).rstrip("\n"))
     else:
         first, *more = verdict_words(made["verdict"])
         print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
-        print_line("\n".join([*more, *map(str, written)]))
-    leave_with(passed)
+        open_ones = open_items(made["sections"])
+        left = [f"{len(open_ones) - SHOWN} more, see the page"] * (len(open_ones) > SHOWN)
+        print_line("\n".join([*more, *open_ones[:SHOWN], *left, *map(str, written)]))
+    leave_with(made["verdict"]["passed"])

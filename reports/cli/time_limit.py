@@ -40,7 +40,6 @@ def start(seconds: float) -> None:
 
 
 def stop() -> None:
-    """Take both limits away."""
     _struck.clear()
     while _timers:
         _timers.pop().cancel()

@@ -75,14 +75,13 @@ def _nyquist() -> Chart:
 
 def _sensitivity() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    panel = chart.panel()
+    panel = chart.panel(y="magnitude, dB")
     for name, colour, dash in (("S", style.ORANGE, 0), ("T", style.GREEN, 4)):
         for letter, pinned in PINNED:
             _empty(panel, f"{name} {letter}", colour=pinned, width=1.5, dash=dash)
         _empty(panel, f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
         _empty(panel, f"{name} as changed", colour=colour, width=2.0)
     style.frequency(panel, HERTZ)
-    panel.y.label = "magnitude, dB"
     panel.y.limits(-40.0, 15.0)
     return chart
 
@@ -101,10 +100,9 @@ def _difference() -> Chart:
 
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    panel = chart.panel()
+    panel = chart.panel("time, ms", "linear response to a unit step")
     _empty(panel, "command", colour=style.INK, width=1.0)
     _both(panel)
-    panel.x.label, panel.y.label = "time, ms", "linear response to a unit step"
     panel.x.limits(0.0, 1.0)
     panel.y.limits(-0.1, 1.5)
     return chart
@@ -130,12 +128,11 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
 
 def _border(unit: str) -> Chart:
     chart = Chart(width=style.HALF, height=265.0)
-    panel = chart.panel()
+    panel = chart.panel(y=f"command amplitude, {unit}", log="y")
     _empty(panel, "lowest, as designed", **BEFORE)
     _empty(panel, "lowest, as changed", **{**NOW, "width": 2.6})
     for name, colour in BORDERS.items():
         _empty(panel, name, colour=colour, width=1.1)
     style.frequency(panel, HERTZ)
-    panel.y.log, panel.y.label = True, f"command amplitude, {unit}"
     panel.y.limits(1e-3, 1e3)
     return chart

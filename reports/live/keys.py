@@ -48,16 +48,10 @@ class Followed:
 def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
     """Follow every numeric key of a design into its row, and into some figures of the whole drive."""
     asked = tuple(dict.fromkeys(figures))
-    free: list[Tree] = []
-    fixed: list[Tree] = []
-    for path in paths_of(design):
-        if path.startswith("validation."):
-            continue
-        reason = _reason(design, path, asked)
-        if reason:
-            fixed.append({**named(design, path), "why": reason})
-        else:
-            free.append(_slider(design, path))
+    paths = [path for path in paths_of(design) if not path.startswith("validation.")]
+    reasons = {path: _reason(design, path, asked) for path in paths}
+    free = [_slider(design, path) for path, why in reasons.items() if not why]
+    fixed = [{**named(design, path), "why": why} for path, why in reasons.items() if why]
     values = {key["path"]: key["value"] for key in free}
     made = {each: figure_statements(design, values, *each) for each in asked}
     return Followed(
@@ -69,7 +63,6 @@ def followed(design: Design, figures: Iterable[Figure] = ()) -> Followed:
 
 
 def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
-    """Say why a key has no slider; empty where it has one."""
     value, own = parameter_value(design, path), design.controller.own_law
     if own is not None and path in ("control.period", f"control.{own[0]}.every"):
         return RESAMPLED
@@ -146,7 +139,6 @@ def _range(design: Design, path: str, value: float) -> tuple[float, float]:
 
 
 def _band(value: float, tolerance: Tolerance) -> list[float] | None:
-    """Give the ends of a tolerance: its bounds, or two standard deviations."""
     width = tolerance.half_width if tolerance.kind == "uniform" else 2.0 * (tolerance.std or 0.0)
     if width is None or not math.isfinite(width):
         return None

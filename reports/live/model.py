@@ -80,15 +80,11 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
 
 def _columns() -> list[Tree]:
     """Give the columns of the table of loops; ``factor`` is from the figure's own unit to that shown."""
-    return [
-        {
-            **dict(zip(("unit", "factor"), each.shown, strict=True)),
-            **{name: getattr(each, name) for name in ("name", "label", "timed")},
-            "response": each.of_response,
-        }
-        for each in LOOP_QUANTITIES.values()
-        if each.followed
-    ]
+    made = []
+    for each in (one for one in LOOP_QUANTITIES.values() if one.followed):
+        about = {name: getattr(each, name) for name in ("name", "label", "timed")}
+        made.append({"unit": each.shown[0], "factor": each.shown[1], **about, "response": each.of_response})
+    return made
 
 
 def _point(design: Design, held: Collection[str]) -> str:
@@ -142,21 +138,20 @@ def _judged(
 
 def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    linear_axis, limits, factor = design.axis == "linear", design.limits, 1.0
+    linear_axis, limits = design.axis == "linear", design.limits
     if design.controller.outermost == "position":
         unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
-        size, of = 0.1 * design.validation.full_deflection_rad, "output"
-    elif design.controller.outermost == "velocity":
-        unit, of = "m/s" if linear_axis else "rad/s", "speed"
-        size = 0.1 * (limits.speed_rad_s if math.isfinite(limits.speed_rad_s) else 100.0) / design.total_ratio
-    else:
-        unit, of = "A", "current"
-        size = 0.1 * (limits.peak_current_A if math.isfinite(limits.peak_current_A) else 10.0)
-    return {"size": size, "unit": unit, "factor": factor, "of": of}
+        size = 0.1 * design.validation.full_deflection_rad
+        return {"size": size, "unit": unit, "factor": factor, "of": "output"}
+    if design.controller.outermost == "velocity":
+        largest = limits.speed_rad_s if math.isfinite(limits.speed_rad_s) else 100.0
+        unit, size = "m/s" if linear_axis else "rad/s", 0.1 * largest / design.total_ratio
+        return {"size": size, "unit": unit, "factor": 1.0, "of": "speed"}
+    size = 0.1 * (limits.peak_current_A if math.isfinite(limits.peak_current_A) else 10.0)
+    return {"size": size, "unit": "A", "factor": 1.0, "of": "current"}
 
 
 def _map(design: Design) -> Tree | None:
-    """Give the cells of the map of sines, and the rule that names them; none without a position loop."""
     if design.controller.position is None:
         return None
     return {

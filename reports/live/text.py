@@ -34,8 +34,7 @@ def patches(design: Design, keys: Sequence[Tree], source: str | None = None) -> 
     """
     if source is not None:
         own = [_own(design, key, source) for key in keys]
-        found = [each for each in own if each is not None]
-        if len(found) == len(own):
+        if (found := [each for each in own if each is not None]) == own:
             return source, found
     text = write_design(design)
     return text, [_patch(text, overridden_text(design, key["path"], MARK)) for key in keys]

@@ -20,6 +20,16 @@ _ALLOWED = {
 }  # fmt: skip
 
 
+JOB_MEMORY_MB = JOB_MEMORY.most // 1_000_000
+STATE = Option("History and cache; DIR.state beside the site otherwise.", "DIR")
+ANEW = Option("Begin anew where the history knows less than the site.")
+STUDY = (
+    "Study file (compare --example prints one), design file or shipped design; first 'approve' to approve."
+)
+WORDS = Option(STUDY, "[approve] STUDY", argument=True)
+ONLY = Option("Approve only this design; may be repeated.", "NAME", flag="design")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Settings(OnMachines):
     """How a night is run; without workers and scheduler in this process, without a time limit.
@@ -30,21 +40,14 @@ class Settings(OnMachines):
     build: ClassVar[str] = "reports.nightly.compute:build"
     workers: Annotated[int | None, Option("Worker processes; 2.", "N")] = 2
     time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "SECONDS")] = 900.0
-    memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = (
-        JOB_MEMORY.most // 1_000_000
-    )
+    memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = JOB_MEMORY_MB
     wait_s: Annotated[float, Option("Wait for another nightly on the same site; 0.", "SECONDS")] = 0.0
     keep: Annotated[int, Option("Nights whose reports stay on the site; 60.", "NIGHTS")] = 60
-    state: Annotated[
-        Path | None, Option("History and cache; DIR.state beside the site otherwise.", "DIR")
-    ] = None
-    accept_lost_history: Annotated[bool, Option("Begin anew where the history knows less than the site.")] = (
-        False
-    )
+    state: Annotated[Path | None, STATE] = None
+    accept_lost_history: Annotated[bool, ANEW] = False
 
     @property
     def engine(self) -> Engine:
-        """Where to compute."""
         from analyses.studies.engine import Engine
 
         return Engine(None, self.scheduler, threads=self.workers or 1, tls=self.tls)
@@ -61,27 +64,15 @@ class Asked(Settings):
     nightly approve study.toml --site site --by NAME --reason TEXT
     """
 
-    words: Annotated[
-        list[str],
-        Option(
-            "Study file (compare --example prints one), design file or shipped design; first 'approve'"
-            " to approve.",
-            "[approve] STUDY",
-            argument=True,
-        ),
-    ]
+    words: Annotated[list[str], WORDS]
     site: Annotated[Path | None, Option("Folder of the site; has to be given.", "DIR")] = None
     pdf: Annotated[bool, Option("A PDF beside each report.")] = False
     no_validation: Annotated[bool, Option("Linear reports only, no simulation.")] = False
     by: Annotated[str, Option("Who approves.", "NAME")] = ""
     reason: Annotated[str, Option("Why the night is approved.", "TEXT")] = ""
-    only: Annotated[
-        list[str] | None,
-        Option("Approve only this design; may be repeated.", "NAME", flag="design"),
-    ] = None
+    only: Annotated[list[str] | None, ONLY] = None
 
     def __post_init__(self) -> None:
-        """Refuse numbers out of range."""
         for name, (least, most) in _ALLOWED.items():
             if not least <= getattr(self, name) <= most:
                 to = "" if most == inf else f" to {most}"

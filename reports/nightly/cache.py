@@ -40,7 +40,6 @@ class Entry:
     archive: bytes
 
     def file(self, name: str) -> bytes:
-        """Content of one file of the report."""
         with zipfile.ZipFile(io.BytesIO(self.archive)) as archive:
             return archive.read(f"files/{name}")
 
@@ -52,7 +51,6 @@ class Cache:
     folder: Path
 
     def path(self, key: str) -> Path:
-        """Where an entry lies."""
         return self.folder / key[:2] / f"{key}.entry"
 
     def take(self, key: str, data: bytes) -> Entry:
@@ -87,7 +85,7 @@ class Cache:
 
     def collect_garbage(self, keep: Iterable[str], older_than_days: float) -> None:
         """Remove entries that are not in ``keep`` and have not been used for so long."""
-        kept, limit = {self.path(key) for key in keep}, time.time() - older_than_days * 86400.0
+        kept, limit = set(map(self.path, keep)), time.time() - older_than_days * 86400.0
         for path in self.folder.glob("*/*.entry"):
             if path not in kept and path.stat().st_mtime < limit:
                 path.unlink(missing_ok=True)
@@ -106,7 +104,6 @@ def sealed(key: str, meta: Mapping[str, Any], files: Mapping[str, bytes]) -> byt
 
 
 def _opened(key: str, data: bytes) -> Entry:
-    """Check an entry and read what it holds."""
     header, separator, body = data.partition(b"\n")
     if not separator or header != MAGIC + sha256(body).encode():
         raise CorruptEntry("checksum differs")

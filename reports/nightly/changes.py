@@ -1,4 +1,7 @@
-"""What changed between two results of a design, how much it matters, and what is behind it."""
+"""What changed between two results of a design, how much it matters, what is behind it, and that in words.
+
+"control.position.gain 90 → 120 1/s: phase margin of the position loop 62.1 → 55.3 deg"
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.files.tree import Tree
 from reports.nightly.figures import Figure
 from reports.nightly.history import History
+from reports.nightly.moves import WINDOW, Tolerances, flaps
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.source import commits_between
-from reports.nightly.tolerance import Tolerances
-from reports.nightly.trend import WINDOW, flaps
+from reports.nightly.text import one_line
+from reports.numbers import or_none
+
+if TYPE_CHECKING:
+    from reports.nightly.view import DesignView
 
 SHOWN_CHANGES = 100
 Differences = tuple[tuple[str, str, str], ...]  # name, before, after
@@ -38,7 +46,6 @@ class Change:
 
     @property
     def delta(self) -> float | None:
-        """How far it moved."""
         return None if self.before is None or self.after is None else self.after - self.before
 
 
@@ -64,7 +71,6 @@ class Comparison:
 
     @cached_property
     def regressions(self) -> tuple[Change, ...]:
-        """The changes for the worse."""
         return tuple(c for c in self.changes if c.worse)
 
 
@@ -88,21 +94,17 @@ class Columns:
 
     def compare(self, before: np.ndarray, after: np.ndarray) -> tuple[Change, ...]:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first."""
-        moved, allowed = np.flatnonzero(self.moved(before, after)), self.allowed(before, after)
-        changes = [_change(self.figures[k], *map(float, (before[k], after[k], allowed[k]))) for k in moved]
+        allowed, changes = self.allowed(before, after), []
+        for k in np.flatnonzero(self.moved(before, after)):
+            of = self.figures[k]
+            old, new = (float(value) if np.isfinite(value) else None for value in (before[k], after[k]))
+            about: dict[str, Any] = {"figure": of.name, "unit": of.unit, "kind": of.kind}
+            about |= {"before": old, "after": new, "tolerance": float(allowed[k])}
+            changes.append(Change(**about, worse=_worse(of, old, new)))
         return tuple(sorted(changes, key=_order))
 
 
-def _change(figure: Figure, before: float, after: float, tolerance: float) -> Change:
-    old, new = (value if math.isfinite(value) else None for value in (before, after))
-    return Change(
-        figure=figure.name, unit=figure.unit, kind=figure.kind, before=old, after=new, tolerance=tolerance,
-        worse=_worse(figure, old, new),
-    )  # fmt: skip
-
-
 def _worse(figure: Figure, old: float | None, new: float | None) -> bool | None:
-    """Whether a change is for the worse; None where no direction is known."""
     if figure.kind == "verdict":
         return new == 0.0 or (new is None and old == 1.0)
     if old is None or new is None or not figure.better:
@@ -133,13 +135,15 @@ class Between:
         earlier = [r for r in past if r.run < result.run]
         good = [r for r in earlier if r.home is not None]
         if not good:
-            return Comparison(
-                note="no earlier night has a result" if earlier else "first night of this design"
-            )
+            first = "no earlier night has a result" if earlier else "first night of this design"
+            return Comparison(note=first)
         skipped = sum(good[-1].run < night < result.run for night in self._runs)
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
         found = self._compare(good[-1], result, note if skipped else "")
-        return replace(found, changes=self._flapping(found.changes, past))
+        shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
+        courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T
+        marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]
+        return replace(found, changes=(*marked, *found.changes[SHOWN_CHANGES:]))
 
     def baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         """What changed since the approved night, else since the first that has a result."""
@@ -152,9 +156,8 @@ class Between:
         if first.run == result.run:
             note = "this is the first night: nothing to compare with"
             return Comparison(run=self.history.runs[-1], note=note)
-        return self._compare(
-            first, result, "nobody has approved a baseline yet: compared with the first night"
-        )
+        note = "nobody has approved a baseline yet: compared with the first night"
+        return self._compare(first, result, note)
 
     def _compare(self, old: Result, new: Result, note: str) -> Comparison:
         before, after = self._runs[old.run], self._runs[new.run]
@@ -164,13 +167,10 @@ class Between:
             return Comparison(run=before, note=note)
         columns = self._columns_of(old, new)
         changes = columns.compare(*self.history.matrix((old, new), columns.names))
-        inputs = [self.history.inputs(result) for result in (old, new)]
-        parameters, settings = (
-            _differences(*(each.get(kind, {}) for each in inputs)) for kind in ("parameters", "settings")
-        )
+        was, now = (self.history.inputs(result) for result in (old, new))
         cause = Cause(
-            parameters=parameters,
-            settings=settings,
+            parameters=_differences(was.get("parameters", {}), now.get("parameters", {})),
+            settings=_differences(was.get("settings", {}), now.get("settings", {})),
             libraries=_differences(before.libraries, after.libraries),
             commits=self._commits(before, after),
             code=before.code != after.code,
@@ -186,27 +186,101 @@ class Between:
             self._columns[key] = Columns(list(known.values()), self.tolerances)
         return self._columns[key]
 
-    def _flapping(self, changes: tuple[Change, ...], past: list[Result]) -> tuple[Change, ...]:
-        """Mark those of the changes that a page shows that go to and fro."""
-        shown = changes[:SHOWN_CHANGES]
-        values = self.history.matrix(past[-WINDOW:], [c.figure for c in shown])
-        marked = [
-            replace(c, flapping=flaps(column, c.tolerance)) for c, column in zip(shown, values.T, strict=True)
-        ]
-        return (*marked, *changes[SHOWN_CHANGES:])
-
     def _commits(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
         """First lines of the commits between two nights, each with where: those of the code, of the study."""
-        places = {"code": (_CODE, old.code_commit, new.code_commit)}
-        own = (old.study_commit, new.study_commit)
-        if self.origin is not None and own != places["code"][1:]:
-            places["study"] = (self.origin, *own)
-        return tuple((where, line) for where, each in places.items() for line in commits_between(*each))
+        code, own = (old.code_commit, new.code_commit), (old.study_commit, new.study_commit)
+        lines = [("code", line) for line in commits_between(_CODE, *code)]
+        if self.origin is not None and own != code:
+            lines += [("study", line) for line in commits_between(self.origin, *own)]
+        return tuple(lines)
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Differences:
     def text(value: object) -> str:
         return "(none)" if value is None else str(value)
 
-    names = [*new, *(name for name in old if name not in new)]
+    names = dict.fromkeys([*new, *old])
     return tuple((n, text(old.get(n)), text(new.get(n))) for n in names if old.get(n) != new.get(n))
+
+
+# ---- in words --------------------------------------------------------------------------------------------
+
+SHOWN = 5
+_VALUE, _DISTANCE = ": value", ": distance"
+NO_FIGURE = "no figure with a value changed"
+CODE_CHANGED = "sources of actuator-lti changed without a commit"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Headline:
+    """One cause and its gravest effect; ``designs`` are all that it changed, the gravest first."""
+
+    cause: str
+    effect: str
+    worse: bool
+    designs: tuple[DesignView, ...]
+
+
+def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
+    """Group what changed since last night by its cause; what got worse comes first."""
+    groups: dict[str, list[DesignView]] = {}
+    for design in designs:
+        if design.last_night.changes:
+            groups.setdefault(cause_words(design.last_night.cause), []).append(design)
+    made = []
+    for cause, changed in groups.items():
+        first, *more = sorted(changed, key=lambda d: (not d.last_night.regressions, d.rank))
+        shown = main_changes(first.last_night)
+        effect = change_words(shown[0], first.last_night, first.verdicts) if shown else NO_FIGURE
+        worse = bool(shown[0].worse if shown else first.last_night.regressions)
+        made.append(Headline(cause=cause, effect=effect, worse=worse, designs=(first, *more)))
+    return tuple(sorted(made, key=lambda one: not one.worse))
+
+
+def cause_words(cause: Cause) -> str:
+    values = [f"{name} {_step(old, new)}" for name, old, new in (*cause.parameters, *cause.settings)]
+    if values:
+        more = len(values) - 2
+        return one_line("; ".join(values[:2]) + (f"; {more} more values" if more > 0 else ""), 200)
+    if cause.commits:
+        more = len(cause.commits) - 1
+        return one_line(f"commit {cause.commits[0][1]}", 120) + (f" and {more} more" if more else "")
+    if cause.libraries:
+        return one_line("; ".join(f"{name} {old} → {new}" for name, old, new in cause.libraries), 200)
+    return CODE_CHANGED if cause.code else "no input differs"
+
+
+def cause_lines(cause: Cause) -> list[str]:
+    kinds = {"parameter": cause.parameters, "setting": cause.settings, "library": cause.libraries}
+    lines = [f"{kind} {name}: {old} → {new}" for kind, each in kinds.items() for name, old, new in each]
+    lines += [f"commit ({where}) {line}" for where, line in cause.commits]
+    silent = cause.code and not cause.commits and not cause.libraries
+    return [*lines, CODE_CHANGED] if silent else lines
+
+
+def _step(old: str, new: str) -> str:
+    """Write a change of a value, the unit once where it is the same."""
+    before, _, unit = old.partition(" ")
+    after, _, other = new.partition(" ")
+    return f"{before} → {after} {unit}".rstrip() if unit == other else f"{old} → {new}"
+
+
+def main_changes(comparison: Comparison) -> tuple[Change, ...]:
+    """Give the changes to read first: distances to requirements, then the rest; no figure twice."""
+    valued = [c for c in comparison.changes if c.kind not in ("verdict", "requirement", "check")]
+    ranked = sorted(valued, key=lambda c: (not c.worse, c.kind != "distance"))
+    return tuple(ranked[:SHOWN])
+
+
+def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Tree]) -> str:
+    """Say one change; of a distance to a requirement, the required figure itself."""
+    name, moved = change.figure.removesuffix(_DISTANCE), change
+    if change.kind == "distance":
+        moved = next((c for c in comparison.changes if c.figure == name + _VALUE), change)
+        label = next((v["label"] for v in verdicts if v["id"] == name), name)
+        place, colon, what = label.partition(": ")  # of "Position loop: phase margin", say
+        label = one_line(f"{what} of the {place[:1].lower()}{place[1:]}" if colon else label, 100)
+    else:
+        *_, row, column = ["", *name.split(" / ")]
+        label = one_line(f"{column[:1].lower()}{column[1:]} of {row}" if row else column, 100)
+    return f"{label} {or_none(moved.before)} → {or_none(moved.after)} {change.unit}".rstrip()

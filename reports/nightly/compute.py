@@ -19,10 +19,9 @@ if TYPE_CHECKING:
 def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     """Compute a report: what `reports.nightly.figures.digest` keeps of it, and its files.
 
-    The payload has ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``,
-    the text of a design file, or ``study``, all designs of a study as texts, which makes their comparison (no
-    figures are kept of it, as they are those of its designs); ``refused`` in place of them says why there is
-    no design.
+    The payload has ``name``, ``settings`` (``pdf``, ``validation``, ``monte_carlo``) and either ``design``, a
+    design file's text, or ``study``, all designs of a study, for their comparison (figures are kept of the
+    designs alone), or ``refused``, why there is none.
     """
     from analyses.isolation import drain
     from reports import document as doc
@@ -31,8 +30,7 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     drain()
     if "refused" in payload:
         raise InputError(str(payload["refused"]))
-    settings = payload.get("settings", {})
-    comparison = "study" in payload
+    settings, comparison = payload.get("settings", {}), "study" in payload
     made = _comparison(payload) if comparison else _report(_design(payload), settings)
     plain = doc.loads(doc.dumps(made))
     files = {"report.html": page(plain).encode(), "report.json": doc.dumps(plain).encode()}
@@ -53,7 +51,6 @@ def _design(payload: Mapping[str, Any]) -> Design:
 
 
 def _report(design: Design, settings: Mapping[str, Any]) -> Document:
-    """The report of a design, with validation and sampled tolerances where the settings ask for them."""
     from reports.build import design_report, validation_sections
 
     sections = validation_sections(design) if settings.get("validation") else []
@@ -71,26 +68,19 @@ def _report(design: Design, settings: Mapping[str, Any]) -> Document:
 
 
 def _comparison(payload: Mapping[str, Any]) -> Document:
-    """All designs of a study compared on one page."""
     from analyses.comparison.variants import compare
     from analyses.slugs import slug
     from analyses.studies.study import Study, Variant
     from reports.sections.compare import section
     from reports.study_pages import study_document
 
-    designs = [
-        Variant(
-            str(one["name"]),
-            slug(str(one["name"])),
-            _design(one) if "design" in one else None,
-            dict(one.get("overrides", {})),
-            str(one.get("refused", "")),
-        )
-        for one in payload["study"]["designs"]
-    ]
-    base = designs[0].design
-    assert base is not None
-    title = str(payload["study"]["title"])
-    plan = Study(str(payload["name"]), title, "", title, designs[0], tuple(designs[1:]))
-    subtitle = f"{designs[0].name} and {len(designs) - 1} variants"
-    return study_document(base, section(compare(plan)), title=title, subtitle=subtitle, kind="compare")
+    def variant(one: Mapping[str, Any]) -> Variant:
+        design = _design(one) if "design" in one else None
+        return Variant(one["name"], slug(one["name"]), design, one["overrides"], one.get("refused", ""))
+
+    base, *others = map(variant, payload["study"]["designs"])
+    assert base.design is not None
+    title = payload["study"]["title"]
+    parts = section(compare(Study(payload["name"], title, "", title, base, tuple(others))))
+    subtitle = f"{base.name} and {len(others)} variants"
+    return study_document(base.design, parts, title=title, subtitle=subtitle, kind="compare")

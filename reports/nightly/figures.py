@@ -61,8 +61,7 @@ def verdicts_of(document: Mapping[str, Any]) -> list[Tree]:
     for _, block in _blocks(document):
         for item in block["items"] if block["kind"] == "verdicts" else ():
             name = one_line(item["id"], 200)
-            if name not in made:
-                made[name] = _verdict(name, item, block.get("what", REQUIREMENTS))
+            made.setdefault(name, _verdict(name, item, block.get("what", REQUIREMENTS)))
     return list(made.values())
 
 
@@ -73,11 +72,12 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
     if distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met"):
         of = str(item.get("quantity", ""))
         left = distance if limit is None or value is None else reserve(of, value, limit, distance)
+    words = "" if limit is None else f"{item['comparison']} {limit:.6g}".strip()
     return {
         "id": name,
         "label": item["label"] or name,
         "what": what,
-        "limit": "" if limit is None else f"{item['comparison']} {limit:.6g}".strip(),
+        "limit": words,
         "bound": number(limit),
         "relative": left,
         "role": role(item),
@@ -92,17 +92,15 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
         name, unit = verdict["id"], verdict["unit"]
         kind = "requirement" if verdict["what"] == REQUIREMENTS else "check"
         met = {"met": 1.0, "not met": 0.0}.get(verdict["verdict"])
+        left = verdict["distance"]
         yield Figure(name=f"{name}: value", value=verdict["value"], unit=unit, kind=kind)
-        yield Figure(
-            name=f"{name}: distance", value=verdict["distance"], unit=unit, better=1, kind="distance"
-        )
+        yield Figure(name=f"{name}: distance", value=left, unit=unit, better=1, kind="distance")
         yield Figure(name=f"{name}: met", value=met, kind="verdict")
-    seen: set[str] = set()
+    first: dict[str, Figure] = {}
     for section, block in _blocks(document):
         for figure in () if section in _INPUT_SECTIONS else _of_block(section, block):
-            if figure.name not in seen:
-                seen.add(figure.name)
-                yield figure
+            first.setdefault(figure.name, figure)
+    yield from first.values()
 
 
 def _blocks(document: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
@@ -134,20 +132,16 @@ def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
         if counts[label] > 1:
             label = f"{label} ({counts[label]})"
         for column in numeric:
-            value, words = row.get(column["key"]), one_line(column["label"] or column["key"], 40)
+            value, shown = row.get(column["key"]), column
+            name = f"{section} / {caption} / {label} / {one_line(column['label'] or column['key'], 40)}"
+            if not column["unit"] and "_scale" in row:  # to the unit of the row, whichever tonight's is
+                shown = {**column, "unit": row["_unit"]}
+                value = value / row["_scale"] if _is_number(value) else value
             if value is None or _is_number(value):
-                yield _figure(f"{section} / {caption} / {label} / {words}", *_unscaled(value, row, column))
-
-
-def _unscaled(value: Any, row: Mapping[str, Any], column: Mapping[str, Any]) -> tuple[Any, Mapping[str, Any]]:
-    """A value in the one unit of its row, whatever unit it is shown in tonight."""
-    if column["unit"] or "_scale" not in row:
-        return value, column
-    return None if value is None else value / row["_scale"], {**column, "unit": row["_unit"]}
+                yield _figure(name, value, shown)
 
 
 def _figure(name: str, value: object, shown: Mapping[str, Any]) -> Figure:
-    """A number with unit and better side as the section declares them."""
     return Figure(name=name, value=number(value), unit=shown["unit"], better=shown.get("better", 0))
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, Literal, TypeVar
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
@@ -25,7 +25,7 @@ from reports.nightly.records import Baseline, Content, Index, Named, Night, Resu
 from reports.nightly.state import INDEX, NIGHTS, Memory
 from reports.nightly.text import one_line, sha256
 
-SCHEMA = "actuator-lti/nightly-history"
+SCHEMA: Final = "actuator-lti/nightly-history"
 VERSION = 1
 Shape = TypeVar("Shape")
 Reported = tuple[Sequence[Figure], dict[str, Any]]  # figures and inputs
@@ -33,9 +33,7 @@ Reported = tuple[Sequence[Figure], dict[str, Any]]  # figures and inputs
 
 @dataclass(frozen=True, kw_only=True)
 class _Head:
-    """What every version of the index begins with."""
-
-    schema: str
+    schema: Literal["actuator-lti/nightly-history"]
     version: int
 
 
@@ -61,19 +59,15 @@ class History:
 
     def start_run(self, **about: Any) -> Run:
         """Note that a night has begun (see `Run`); an earlier one that never ended is ``interrupted``."""
-        index = self.index
-        unended = [*index.interrupted, index.running] if index.running else index.interrupted
-        run = Run(id=index.begun + 1, **about)
-        self._put(replace(index, begun=run.id, running=run.started, interrupted=unended))
+        unended = [*self.index.interrupted, *filter(None, [self.index.running])]
+        run = Run(id=self.index.begun + 1, **about)
+        self._put(replace(self.index, begun=run.id, running=run.started, interrupted=unended))
         return run
 
     def finish_run(self, run: Run, finished: str, results: Iterable[tuple[Result, Reported | None]]) -> None:
         """Write a whole night: results, each with what was reported of it."""
         layouts: dict[tuple[Named, ...], int] = {}
-        stored = [
-            result if reported is None else self._stored(result, *reported, layouts)
-            for result, reported in results
-        ]
+        stored = [one if of is None else self._stored(one, *of, layouts) for one, of in results]
         night = Night(id=run.id, layouts=[list(layout) for layout in layouts], results=stored)
         data = _NIGHT.dump_json(night)
         write_bytes(self._path(run.id), data)
@@ -95,10 +89,10 @@ class History:
         place = layouts.setdefault(layout, len(layouts))
         return replace(result, home=result.run, content=Content(layout=place, values=values, inputs=inputs))
 
-    def approve(self, run: int, names: Sequence[str] | None, *, by: str, reason: str, at: str) -> None:
-        """Make a night the baseline of some designs, or of all (``None``)."""
-        every: Sequence[str | None] = [None] if names is None else names
-        more = [Baseline(run=run, at=at, by=by, reason=reason, name=name) for name in every]
+    def approve(self, run: int, names: Sequence[str] | None, **about: str) -> None:
+        """Make a night the baseline (see `Baseline`) of some designs, or of all (``None``)."""
+        every: Sequence[str | None] = names or [None]
+        more = [Baseline(run=run, name=name, **about) for name in every]
         self._put(replace(self.index, baselines=[*self.index.baselines, *more]))
 
     def claim(self, study: str) -> None:
@@ -112,7 +106,8 @@ class History:
             self._put(replace(self.index, study=study))
 
     def _put(self, index: Index) -> None:
-        sealed = _Sealed(schema=SCHEMA, version=VERSION, sha256=sha256(_INDEX.dump_json(index)), index=index)
+        checksum = sha256(_INDEX.dump_json(index))
+        sealed = _Sealed(schema=SCHEMA, version=VERSION, sha256=checksum, index=index)
         write_bytes(self.state / INDEX, _SEALED.dump_json(sealed))
         self.index = index
 
@@ -120,7 +115,6 @@ class History:
 
     @property
     def runs(self) -> list[Run]:
-        """The finished nights, oldest first."""
         return self.index.runs
 
     def memory(self) -> Memory:
@@ -162,11 +156,9 @@ class History:
         return self.night(result.home).figures[content.layout], unpacked(content.values)
 
     def inputs(self, result: Result) -> dict[str, Any]:
-        """Parameters and settings behind a result."""
         return {} if result.home is None else self._content(result).inputs
 
     def figures(self, result: Result) -> dict[str, Figure]:
-        """The figures of a result by name."""
         layout, values = self.numbers(result)
         pairs = zip(layout, values.tolist(), strict=True)
         return {figure.name: replace(figure, value=None if v != v else v) for figure, v in pairs}
@@ -195,9 +187,10 @@ def open_history(state: Path) -> History:
     if not path.exists() or not path.stat().st_size:
         return History(state, Index(id=secrets.token_hex(16)))
     data = _read(path)
-    head = _valid(_HEAD, data, path, "no history of a nightly build")
-    if head.schema != SCHEMA:
-        raise InputError("is no history of a nightly build", where=str(path))
+    try:
+        head = _HEAD.validate_json(data, strict=True)
+    except ValidationError as error:
+        raise InputError("is no history of a nightly build", where=str(path)) from error
     if head.version > VERSION:
         raise InputError(
             f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one",
@@ -218,13 +211,10 @@ def _read(path: Path) -> bytes:
         raise InputError(f"cannot be read: {error.strerror or error}", where=str(path)) from error
 
 
-def _valid(shape: TypeAdapter[Shape], data: bytes, path: Path, words: str = "") -> Shape:
-    """What a file holds, of the shape that it should have."""
+def _valid(shape: TypeAdapter[Shape], data: bytes, path: Path) -> Shape:
     try:
         return shape.validate_json(data, strict=True)
     except ValidationError as error:
-        if words:
-            raise InputError(f"is {words}", where=str(path)) from error
         first = error.errors(include_url=False, include_input=False)[0]
         at = ".".join(map(str, first["loc"]))
         raise _damaged(path, one_line(f"{at}: {first['msg']}", 200)) from error

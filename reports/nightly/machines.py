@@ -7,8 +7,7 @@ from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
 from actuator_lti.files.tree import Tree
-from reports.nightly.changes import Change, Comparison
-from reports.nightly.headline import cause_lines
+from reports.nightly.changes import Comparison, cause_lines
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import STATES, DesignView, Overview
 from reports.numbers import or_none
@@ -23,7 +22,6 @@ _OF_CHANGE = ("figure", "unit", "before", "after", "tolerance", "worse", "flappi
 
 
 def summary(night: Overview) -> Tree:
-    """What came of a night, as plain JSON."""
     return {
         "schema": SCHEMA,
         "version": VERSION,
@@ -46,7 +44,6 @@ def summary(night: Overview) -> Tree:
 
 
 def summary_text(night: Overview) -> str:
-    """The same as text."""
     return json.dumps(summary(night), ensure_ascii=True, allow_nan=False, indent=1) + "\n"
 
 
@@ -86,35 +83,29 @@ def junit(night: Overview) -> str:
             timestamp=night.run.started.rstrip("Z"),
         )  # fmt: skip
         _cases(suite, design)
-        _count(suite)
-    _count(top)
-    return f'<?xml version="1.0" encoding="UTF-8"?>\n{Xml.tostring(top, encoding="unicode")}\n'
-
-
-def _count(element: Xml.Element) -> None:
     tags = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
-    for name, tag in tags.items():
-        element.set(name, str(sum(1 for _ in element.iter(tag))))
+    for element in (*top, top):
+        for name, tag in tags.items():
+            element.set(name, str(len(element.findall(f".//{tag}"))))
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{Xml.tostring(top, encoding="unicode")}\n'
 
 
 def _cases(suite: Xml.Element, design: DesignView) -> None:
     def case(name: str, tag: str = "", message: str = "", kind: str = "", text: str = "") -> None:
         one = Xml.SubElement(suite, "testcase", classname=_line(design.name), name=_line(name))
         if tag:
-            about = {"type": kind, "message": _line(message)} if kind else {"message": _line(message)}
-            Xml.SubElement(one, tag, about).text = visible(text)[:_MAX_TEXT]
+            about = {"type": kind} if kind else {}
+            Xml.SubElement(one, tag, about, message=_line(message)).text = visible(text)[:_MAX_TEXT]
 
     if design.broken:
         case("is built", "error", design.why, design.result.status, design.result.message.partition("\n")[2])
         return
     case("is built")
-    if worse := design.regressions:
-        lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
-        text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
-        message = f"{len(worse)} figure(s) worse than the baseline"
-        case("no unapproved regression", "failure", message, "regression", text)
-    else:
-        case("no unapproved regression")
+    worse = design.regressions
+    lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
+    text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
+    message = f"{len(worse)} figure(s) worse than the baseline"
+    case("no unapproved regression", "failure" * bool(worse), message, "regression", text)
     for v in design.verdicts:
         name = f"{v['id']} {v['label']}" if v["label"] != v["id"] else v["id"]
         if v["verdict"] == "met":
@@ -147,13 +138,12 @@ def markdown(night: Overview) -> str:
     if notable:
         lines += ["| design | state | worst requirement | distance | moved since last night |"]
         lines += ["|---|---|---|---:|---:|", *map(_row, notable[:_LISTED])]
-        if len(notable) > _LISTED:
-            lines.append(f"| and {len(notable) - _LISTED} more | | | | |")
+        lines += [f"| and {len(notable) - _LISTED} more | | | | |"] if len(notable) > _LISTED else []
     else:
         lines.append("Nothing moved since last night.")
     for design in notable[:_LISTED]:
         lines += _details(design)
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, ""])
 
 
 def _row(design: DesignView) -> str:
@@ -164,14 +154,12 @@ def _row(design: DesignView) -> str:
 
 
 def _details(design: DesignView) -> list[str]:
-    lines = [_moved(c) for c in design.last_night.changes[:8]]
+    lines = []
+    for change in design.last_night.changes[:8]:
+        marks = " (worse)" * bool(change.worse) + " (flapping)" * change.flapping
+        values = f"{or_none(change.before)} → {or_none(change.after)} {markdown_cell(change.unit)}"
+        lines.append(f"- {markdown_cell(change.figure, 120)}: {values}{marks}")
     lines += [f"- {markdown_cell(line, 200)}" for line in cause_lines(design.last_night.cause)[:8]]
     if design.broken:
         lines.append(f"- {design.result.status}: {markdown_cell(design.why, 200)}")
     return ["", f"**{markdown_cell(design.name)}**", "", *lines] if lines else []
-
-
-def _moved(change: Change) -> str:
-    marks = (" (worse)" if change.worse else "") + (" (flapping)" if change.flapping else "")
-    values = f"{or_none(change.before)} → {or_none(change.after)} {markdown_cell(change.unit)}"
-    return f"- {markdown_cell(change.figure, 120)}: {values}{marks}"

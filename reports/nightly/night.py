@@ -7,7 +7,7 @@ import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
@@ -25,15 +25,14 @@ from reports.nightly.view import Overview, overview
 from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
-Progress = Callable[[int, int], None]
-Say = Callable[[str], None]
+Outcome = tuple[Result, Reported | None]  # of a job; what the history keeps of its report, where it has one
 
 
 def _nobody(*_said: object) -> None:
     """Whom nothing is told."""
 
 
-def nightly(asked: Asked, progress: Progress) -> Overview:
+def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     """Build a night, or approve the last one, and publish the site."""
     import typer
 
@@ -43,8 +42,8 @@ def nightly(asked: Asked, progress: Progress) -> Overview:
     def say(line: str) -> None:
         print_note(f"actuator-lti: {line}")
 
-    need("filelock", "nightly", "a nightly build")
-    need("ruptures", "nightly", "a nightly build")
+    for package in ("filelock", "ruptures"):
+        need(package, "nightly", "a nightly build")
     approving = len(asked.words) == 2 and asked.words[0] == "approve"
     if len(asked.words) != 1 + approving or asked.site is None:
         raise InputError(
@@ -61,21 +60,13 @@ def nightly(asked: Asked, progress: Progress) -> Overview:
         raise typer.Exit(VERDICT_FAILED) from lost
 
 
-class Outcome(NamedTuple):
-    """What came of a job; what its report says and what the history keeps, where there is one."""
-
-    result: Result
-    meta: Mapping[str, Any]
-    reported: Reported | None
-
-
 def run_night(
     study: Study,
     site: Path,
     settings: Settings | None = None,
     *,
-    progress: Progress = _nobody,
-    say: Say = _nobody,
+    progress: Callable[[int, int], None] = _nobody,
+    say: Callable[[str], None] = _nobody,
     code: CodeVersion | None = None,
     clock: Callable[[], str] = now,
 ) -> Overview:
@@ -107,8 +98,8 @@ def run_night(
             host=socket.gethostname(),
         )
         outcomes = _outcomes(run, jobs, cache, use, progress, say)
-        history.finish_run(run, clock(), [(one.result, one.reported) for one in outcomes])
-        return publish(study, site, history, cache, use, {one.result.key: one.meta for one in outcomes})
+        history.finish_run(run, clock(), outcomes)
+        return _published(study, site, history, cache, use)
 
 
 def approve(
@@ -134,25 +125,17 @@ def approve(
         last = history.runs[-1]
         for name in names:
             if history.first(name, [last]) is None:
-                raise InputError(
-                    f"{one_line(name, 80)!r} has no result in the last night: nothing to approve",
-                    where=study.name,
-                )
+                shown = repr(one_line(name, 80))
+                raise InputError(f"{shown} has no result in the last night: nothing to approve", study.name)
         about = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last.id, list(names) or None, at=clock(), **about)
-        return publish(study, site, history, cache, use, {})
+        return _published(study, site, history, cache, use)
 
 
-def publish(
-    study: Study, site: Path, history: History, cache: Cache, settings: Settings,
-    metas: Mapping[str, Mapping[str, Any]],
-) -> Overview:  # fmt: skip
-    """Make the site of the last finished night anew from history and cache.
-
-    ``metas`` holds what is known already of the results, by content address; the rest is read.
-    """
-    view = overview(history, cache, study, metas, site)
-    site_files.publish(site, view, history, cache, keep_reports=settings.keep)
+def _published(study: Study, site: Path, history: History, cache: Cache, use: Settings) -> Overview:
+    """The last finished night, its site made anew from history and cache."""
+    view = overview(history, cache, study, site)
+    site_files.publish(site, view, history, cache, keep_reports=use.keep)
     return view
 
 
@@ -175,20 +158,24 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
 
 
 def _outcomes(
-    run: Run, jobs: Sequence[Job], cache: Cache, use: Settings, progress: Progress, say: Say
-) -> list[Outcome]:
-    """Take from the cache what is there, build the rest."""
+    run: Run, jobs: Sequence[Job], cache: Cache, use: Settings, progress: Callable[[int, int], None],
+    say: Callable[[str], None],
+) -> list[Outcome]:  # fmt: skip
+    """What came of each job; in the cache is then what the pages need of it."""
     done: dict[str, Outcome] = {}
     todo: dict[str, Job] = {}
+    tasks: list[Task] = []
     for job in jobs:
         key, corrupt = job.key(run.code), list[str]()
         entry = cache.whole(key, corrupt.append)
         for why in corrupt:
             say(f"cache entry of {one_line(job.name, 60)!r} is corrupt ({why}): built again")
-        if entry is None:
-            todo[key] = job
-        else:
+        if entry is not None:
             done[job.name] = _reported(run, job, key, entry.meta, cached=True)
+        else:
+            todo[key] = job
+            designs = len(job.payload["study"]["designs"]) if "study" in job.payload else 1
+            tasks.append(Task(key, job.payload, limits=-(-designs // DESIGNS_A_LIMIT)))
 
     def take(task: Task, answer: Answer) -> None:
         job = todo[task.key]
@@ -197,15 +184,8 @@ def _outcomes(
 
     progress(len(done), len(jobs))
     limits = Limits(use.build, use.time_limit_s, use.memory_limit * 1_000_000)
-    engine = use.engine if use.workers or use.scheduler else None
-    build_each([_task(key, job) for key, job in todo.items()], limits, engine, take)
+    build_each(tasks, limits, use.engine if use.workers or use.scheduler else None, take)
     return [done[job.name] for job in jobs]
-
-
-def _task(key: str, job: Job) -> Task:
-    """What a job asks for; a comparison takes as long as the designs that it holds."""
-    designs = len(job.payload["study"]["designs"]) if "study" in job.payload else 1
-    return Task(key, job.payload, limits=-(-designs // DESIGNS_A_LIMIT))
 
 
 def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcome:
@@ -219,15 +199,14 @@ def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcom
         except InputError as error:
             raise InputError(f"result of {one_line(job.name, 60)!r} cannot be kept: {error}") from error
     said: dict[str, Any] = {"status": status, "seconds": answer.seconds, "message": visible(message)}
-    return Outcome(Result(run=run.id, name=job.name, kind=job.kind, **said), {}, None)
+    return Result(run=run.id, name=job.name, kind=job.kind, **said), None
 
 
 def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
     """What came of a job that has a report: its result, its figures and what is behind them."""
-    failing = meta["failed"] or meta["failed_sections"]
+    failing, sections = meta["failed"] or meta["failed_sections"], ", ".join(meta["failed_sections"])
     ranked = [v for v in meta["verdicts"] if v["relative"] is not None]
     worst: Mapping[str, Any] = min(ranked, key=lambda v: v["relative"], default={"relative": None, "id": ""})
-    sections = ", ".join(meta["failed_sections"])
     result = Result(
         run=run.id,
         name=job.name,
@@ -248,4 +227,4 @@ def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any
         "design_hash": job.design_hash,
         "revision": job.revision,
     }
-    return Outcome(result, meta, ([Figure(**f) for f in meta["figures"]], inputs))
+    return result, ([Figure(**f) for f in meta["figures"]], inputs)

@@ -7,7 +7,6 @@ Its result comes home as an entry of the cache; a lost Dask worker's jobs are do
 
 from __future__ import annotations
 
-import importlib
 import os
 import pickle
 import signal
@@ -19,9 +18,10 @@ import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
 from functools import partial
+from pkgutil import resolve_name
 from queue import SimpleQueue
 from threading import Lock, Thread, Timer, get_ident
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 from actuator_lti.errors import InputError
 from analyses.studies.engine import Engine
@@ -71,10 +71,11 @@ def build_each(
     Without an engine they are built in this process: with no limit, and in the order of the tasks.
     """
     if engine is None:
-        function = _resolved(limits.build)
+        function = resolve_name(limits.build)
         for task in tasks:
             start = time.monotonic()
-            sink(task, _since(start, execute(function, task.key, task.payload)))
+            answer = execute(function, task.key, task.payload)
+            sink(task, answer._replace(seconds=time.monotonic() - start))
     elif engine.distributed:
         engine.map(partial(build_apart, limits), tasks, sink)
     else:
@@ -83,13 +84,8 @@ def build_each(
 
 
 def build_apart(limits: Limits, task: Task) -> Answer:
-    """Build one task in a process of its own."""
     with closing(_Child(limits)) as child:
         return child.build(task)
-
-
-def _since(start: float, answer: Answer) -> Answer:
-    return answer._replace(seconds=time.monotonic() - start)
 
 
 # ---- the side of the night -----------------------------------------------------------------------------
@@ -158,20 +154,17 @@ class _Child:
                 answer = Answer("timeout", self._end(limit_s))
             elif answer is None:
                 answer = Answer("crash", self._end(limit_s), self._last_words(said))
-            return _since(start, answer)
+            return answer._replace(seconds=time.monotonic() - start)
 
     def _answer(self, limit_s: float, question: Any = None) -> Any:
         """What the process says within the limit; None where it ends instead."""
-        ask, listen = self._process.stdin, self._process.stdout
-        assert ask is not None
-        assert listen is not None
         clock = Timer(limit_s, self._too_late)
         clock.daemon = True
         clock.start()
         try:
             if question is not None:
-                _say(ask, question)
-            return pickle.load(listen)
+                _say(self._process.stdin, question)
+            return pickle.load(self._process.stdout)  # type: ignore[arg-type]
         except (EOFError, OSError, pickle.UnpicklingError, ValueError):
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(END_S)  # it ends by itself, and its status says why
@@ -187,7 +180,6 @@ class _Child:
         self._process.kill()
 
     def _end(self, limit_s: float) -> str:
-        """In words how the process ended."""
         if self._late:
             return f"did not end within {limit_s:g} s"
         code = self._process.returncode
@@ -214,14 +206,27 @@ class _Child:
 
 def main(build: str, memory_bytes: int) -> None:
     """Read ``(key, payload, limit)`` from standard input, build, answer on standard output; never returns."""
-    _die_with_parent()
+    if sys.platform == "linux":  # the system ends this process with its parent, in whatever build it is
+        import ctypes
+
+        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a build prints is no answer
     _limit_memory(memory_bytes)
     questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
-    Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), questions), daemon=True).start()
-    function = _resolved(build)
+    source = os.fdopen(os.dup(0), "rb")
+
+    def listen() -> None:
+        """Hand on what is asked; the end of the pipe is that of the parent."""
+        try:
+            while True:
+                questions.put(pickle.load(source))
+        except EOFError:
+            os._exit(0)
+
+    Thread(target=listen, daemon=True).start()
+    function = resolve_name(build)
     _say(answers, READY)
     while True:
         key, payload, time_limit_s = questions.get()
@@ -250,21 +255,6 @@ def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) 
         return Answer("error", f"result is no JSON: {one_line(str(error), 300)}")
 
 
-def _resolved(name: str) -> Callable[..., Any]:
-    """Return the function that ``package.module:function`` names."""
-    module, _, function = name.partition(":")
-    return getattr(importlib.import_module(module), function)
-
-
-def _listen(source: BinaryIO, questions: SimpleQueue[Any]) -> None:
-    """Hand on what is asked; the end of the pipe is that of the parent."""
-    while True:
-        try:
-            questions.put(pickle.load(source))
-        except EOFError:
-            os._exit(0)
-
-
 def _say(pipe: Any, what: Any) -> None:
     pickle.dump(what, pipe)
     pipe.flush()
@@ -287,11 +277,3 @@ def _limit_memory(limit_bytes: int) -> None:
         hard = resource.getrlimit(resource.RLIMIT_DATA)[1]
         most = limit_bytes if hard == resource.RLIM_INFINITY else min(limit_bytes, hard)
         resource.setrlimit(resource.RLIMIT_DATA, (most, hard))
-
-
-def _die_with_parent() -> None:
-    """Let the system end this process with its parent, also where a build never lets go (Linux)."""
-    if sys.platform == "linux":
-        import ctypes
-
-        ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG

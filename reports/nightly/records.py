@@ -27,7 +27,6 @@ def packed(figures: Iterable[Figure]) -> str:
 
 
 def unpacked(text: str) -> np.ndarray:
-    """The numbers of `packed`."""
     return np.frombuffer(b64decode(text), dtype="<f8")
 
 
@@ -48,7 +47,7 @@ class Run:
 
 @dataclass(frozen=True, kw_only=True)
 class Content:
-    """The figures of a result, as `packed`, in one of the layouts of its night; parameters and settings."""
+    """Of a result: its figures as `packed` in one of the layouts of the night; parameters and settings."""
 
     layout: int
     values: str
@@ -89,12 +88,10 @@ class Night:
 
     @cached_property
     def by_name(self) -> dict[str, Result]:
-        """The results by their designs."""
         return {result.name: result for result in self.results}
 
     @cached_property
     def figures(self) -> list[tuple[Figure, ...]]:
-        """The lists of figures, without values."""
         return [
             tuple(Figure(name=n, value=None, unit=u, better=b, kind=k) for n, u, b, k in one)
             for one in self.layouts

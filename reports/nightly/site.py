@@ -12,7 +12,6 @@ import os
 import re
 import secrets
 import shutil
-import stat
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
@@ -56,7 +55,6 @@ def mark(site: Path) -> None:
 
 
 def remove_leftovers(*folders: Path) -> None:
-    """Delete the half-written files that a killed run left."""
     for folder in folders:
         for leftover in folder.rglob(".*.part"):
             leftover.unlink(missing_ok=True)
@@ -65,7 +63,10 @@ def remove_leftovers(*folders: Path) -> None:
 def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep_reports: int) -> None:
     """Lay out a night and switch to it; where the site cannot be written it stays as it was."""
     folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
-    kept = _reports_to_keep(history, night, keep_reports)
+    wanted = {run.id for run in night.runs[-max(1, keep_reports) :]}  # the last nights, and the approved ones
+    wanted |= {d.approval.run for d in night.designs if d.approval is not None}
+    results = (result for run in wanted for result in history.night(run).results)
+    kept = {report_folder(result) for result in results if result.key}
     write_together(file for design in night.designs for file in _lacking(site, design, cache))
     available = {path for path in kept if (site / path / "report.html").exists()}
     laid_out = pages.of_night(night, history, available)
@@ -76,7 +77,11 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
         shutil.rmtree(site / folder, ignore_errors=True)
         raise
     write_together((site / name, text(night).encode()) for name, text in _FOR_MACHINES.items())
-    _collect_garbage(site, folder, kept)
+    nights = sorted(path for path in (site / "nights").iterdir() if _NIGHT.match(path.name))
+    old = [path for path in nights if path != site / folder][:-KEPT_NIGHTS]
+    reports = [path for path in (site / "reports").glob("*/*") if _CONTENT.match(path.name)]
+    for path in (*old, *(p for p in reports if p.relative_to(site).as_posix() not in kept)):
+        shutil.rmtree(path, ignore_errors=True)
     cache.collect_garbage({d.result.key for d in night.designs}, KEPT_CACHE_DAYS)
 
 
@@ -87,10 +92,13 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
     for part in (folder, folder.parent) if wanted else ():
         if part.is_symlink():
             raise InputError("is a symbolic link: a site holds its reports itself", where=str(part))
-    for name in wanted:
-        if os.path.lexists(folder / name) and not stat.S_ISREG((folder / name).lstat().st_mode):
-            raise InputError("is no regular file: a site holds its reports itself", where=str(folder / name))
-    missing = [name for name, digest in wanted.items() if not _is_there(folder / name, digest)]
+    missing = []
+    for name, digest in wanted.items():
+        path = folder / name
+        if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
+            raise InputError("is no regular file: a site holds its reports itself", where=str(path))
+        if not path.exists() or sha256(path.read_bytes()) != digest:
+            missing.append(name)
     entry = cache.whole(design.result.key) if missing else None
     for name in missing:
         if entry is None:
@@ -98,27 +106,3 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
                 f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
             )
         yield folder / name, entry.file(name)
-
-
-def _is_there(path: Path, digest: str) -> bool:
-    try:
-        return sha256(path.read_bytes()) == digest
-    except OSError:
-        return False
-
-
-def _reports_to_keep(history: History, night: Overview, nights: int) -> set[str]:
-    """Folders of the reports of the last nights and of the approved ones."""
-    wanted = {run.id for run in night.runs[-max(1, nights) :]}
-    wanted |= {d.approval.run for d in night.designs if d.approval is not None}
-    kept = (result for run in wanted for result in history.night(run).results)
-    return {report_folder(result) for result in kept if result.key}
-
-
-def _collect_garbage(site: Path, current: str, kept: set[str]) -> None:
-    """Remove the pages of nights long past, and the reports that no kept night refers to."""
-    nights = sorted(path for path in (site / "nights").iterdir() if _NIGHT.match(path.name))
-    old = [path for path in nights if path != site / current][:-KEPT_NIGHTS]
-    reports = [path for path in (site / "reports").glob("*/*") if _CONTENT.match(path.name)]
-    for path in (*old, *(p for p in reports if p.relative_to(site).as_posix() not in kept)):
-        shutil.rmtree(path, ignore_errors=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import platform
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -26,12 +27,11 @@ from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
+from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.text import one_line, sha256
-from reports.nightly.tolerance import Tolerances, read_tolerances
-from reports.provenance import git, package_version
+from reports.provenance import LIBRARIES, git, package_version
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
-LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2", "typst")
 COMMITS = 8  # named at most between two nights
 MAX_NAME = 20_000
 _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
@@ -41,8 +41,8 @@ _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 class Job:
     """One report to build: a design or variant (any text is a name), or the comparison of a whole study.
 
-    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters`` are dotted
-    keys with texts as written: what is shown when a figure has moved.
+    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters``, dotted keys
+    with texts as written, are shown when a figure has moved.
     """
 
     name: str
@@ -87,7 +87,7 @@ def code_version(root: Path | None = None) -> CodeVersion:
     folder = Path(__file__).resolve().parents[2] if root is None else root
     return CodeVersion(
         sources=sha256(canonical([hash_of(folder / package, _SUFFIXES) for package in PACKAGES])),
-        libraries={name: package_version(name, "absent") for name in LIBRARIES},
+        libraries={name: package_version(name, "absent") for name in (*LIBRARIES, "typst")},
         commit=commit_of(folder),
     )
 
@@ -116,29 +116,23 @@ def check_jobs(jobs: tuple[Job, ...], where: str) -> tuple[Job, ...]:
     if not jobs:
         raise InputError("nothing to build: no design and no variant", where=where)
     NIGHTLY_JOBS.check(len(jobs), where)
-    seen: set[str] = set()
+    counts = Counter(job.name for job in jobs)
     for job in jobs:
-        if len(job.name) > MAX_NAME:
-            raise InputError(
-                f"name {one_line(job.name, 40)!r} has {len(job.name)} characters: at most {MAX_NAME} allowed",
-                where=where,
-            )
-        if not one_line(job.name) or any("\ud800" <= sign <= "\udfff" for sign in job.name):
-            raise InputError(
-                f"name {job.name[:40]!a}: a name needs at least one sign, all in valid Unicode",
-                where=where,
-            )
-        if job.name in seen:
-            raise InputError(f"name {one_line(job.name, 80)!r} is used twice: names must differ", where=where)
-        seen.add(job.name)
-        JOB_BYTES.check(len(canonical(job.payload)), where, name=repr(one_line(job.name, 80)))
+        name, shown, wrong = job.name, one_line(job.name, 80), ""
+        if len(name) > MAX_NAME:
+            wrong = f"{one_line(name, 40)!r} has {len(name)} characters: at most {MAX_NAME} allowed"
+        elif not shown or any("\ud800" <= sign <= "\udfff" for sign in name):
+            wrong = f"{name[:40]!a}: a name needs at least one sign, all in valid Unicode"
+        elif counts[name] > 1:
+            wrong = f"{shown!r} is used twice: names must differ"
+        if wrong:
+            raise InputError(f"name {wrong}", where=where)
+        JOB_BYTES.check(len(canonical(job.payload)), where, name=repr(shown))
     return jobs
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Nightly:
-    """The table ``[nightly]``; beside it stands ``tolerance``."""
-
     pdf: bool = False
 
 
@@ -177,17 +171,13 @@ def _design_job(variant: Variant, settings: Mapping[str, Any]) -> Job:
     name, design = variant.name, variant.design
     if design is None:
         return Job(name=name, payload={"name": name, "refused": variant.error}, parameters=_texts(variant))
-    return Job(
-        name=name,
-        payload={"name": name, "design": write_design(design), "settings": dict(settings)},
-        design_hash=design_hash(design),
-        parameters={path: parameter.text for path, parameter in design.parameters.items()},
-        revision=design.revision,
-    )
+    payload = {"name": name, "design": write_design(design), "settings": dict(settings)}
+    parameters = {path: parameter.text for path, parameter in design.parameters.items()}
+    about = {"design_hash": design_hash(design), "revision": design.revision}
+    return Job(name=name, payload=payload, parameters=parameters, **about)
 
 
 def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:
-    """The job that compares all designs of a study on one page."""
     name = "Comparison of all variants"
     while name in {job.name for job in jobs}:
         name += " (study)"
@@ -197,11 +187,8 @@ def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str
         for job, variant in zip(jobs, study.all, strict=True)
     ]
     whole = {"title": study.title or study.name, "designs": designs}
-    return Job(
-        name=name,
-        kind="compare",
-        payload={"name": name, "study": whole, "settings": {"pdf": settings["pdf"]}},
-    )
+    payload = {"name": name, "study": whole, "settings": {"pdf": settings["pdf"]}}
+    return Job(name=name, kind="compare", payload=payload)
 
 
 def _texts(variant: Variant) -> dict[str, str]:

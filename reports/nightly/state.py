@@ -11,11 +11,10 @@ import json
 import os
 import socket
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-
-from pydantic import TypeAdapter, ValidationError
+from typing import Any
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
@@ -30,26 +29,23 @@ def state_of(site: Path, state: Path | None = None) -> Path:
 
     Refused is what is no folder, leads elsewhere or lies inside the site.
     """
-    place = Path(os.path.abspath(site))  # "." and ".." have names, too
-    if state is None and not place.name:
-        raise InputError("is the root of the disk: --site takes a folder below it", where=shown_path(site))
-    if state is not None and Path(os.path.realpath(state)).is_relative_to(os.path.realpath(site)):
-        raise InputError(
-            "lies inside the site and would be published with it: --state takes a folder elsewhere",
-            where=shown_path(state),
-        )
-    state = place.with_name(f"{place.name}.state") if state is None else state
+    if state is None:
+        place = Path(os.path.abspath(site))  # "." and ".." have names, too
+        if not place.name:
+            raise InputError("is the root of the disk: --site takes a folder below it", shown_path(site))
+        state = place.with_name(f"{place.name}.state")
+    elif Path(os.path.realpath(state)).is_relative_to(os.path.realpath(site)):
+        why = "lies inside the site and would be published with it: --state takes a folder elsewhere"
+        raise InputError(why, shown_path(state))
     folders = (state, state / CACHE, state / NIGHTS)
     for folder in folders:
         if os.path.lexists(folder) and not folder.is_dir():
-            raise InputError("is no folder; allowed: a folder, or none yet", where=shown_path(folder))
+            raise InputError("is no folder; allowed: a folder, or none yet", shown_path(folder))
     inside = [path for folder in folders if folder.is_dir() for path in folder.iterdir()]
     for path in (state, *inside):
         if path.is_symlink():
-            raise InputError(
-                "is a symbolic link: history and cache are kept in the state folder itself",
-                where=shown_path(path),
-            )
+            why = "is a symbolic link: history and cache are kept in the state folder itself"
+            raise InputError(why, shown_path(path))
     return state
 
 
@@ -66,8 +62,11 @@ def hold(state: Path, wait_s: float = 0.0) -> Iterator[None]:
     try:
         lock.acquire(timeout=wait_s)
     except Timeout as error:
+        holder = "a process that has just started or ended"
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            holder = "process {pid} on {host} since {since}".format(**json.loads(note.read_text("utf-8")))
         raise InputError(
-            f"another nightly holds the lock: {_holder(note)}; wait for it with --wait SECONDS",
+            f"another nightly holds the lock: {one_line(holder, 200)}; wait for it with --wait SECONDS",
             where=str(state),
         ) from error
     try:
@@ -77,14 +76,6 @@ def hold(state: Path, wait_s: float = 0.0) -> Iterator[None]:
     finally:
         note.unlink(missing_ok=True)
         lock.release()
-
-
-def _holder(note: Path) -> str:
-    try:
-        who = json.loads(note.read_text(encoding="utf-8"))
-        return one_line(f"process {who['pid']} on {who['host']} since {who['since']}", 200)
-    except (OSError, ValueError, KeyError, TypeError):
-        return "a process that has just started or ended"
 
 
 class HistoryLost(Exception):
@@ -103,19 +94,20 @@ class Memory:
         return f"{self.nights} night(s) and {self.approvals} approval(s)"
 
 
-_MEMORY = TypeAdapter(Memory)
-
-
 def remembered(site: Path) -> Memory | None:
-    """What a site remembers; ``None`` where nothing was ever published there."""
+    """What a site remembers, at least one night; ``None`` where nothing was ever published there.
+
+    Of a summary by an older version, or a damaged one, every field that is as it should be counts.
+    """
     if not any((site / name).exists() for name in ("index.html", "summary.json")):
         return None
-    try:
-        known = read_json(site / "summary.json", "summary.json").get("history")
-        found = _MEMORY.validate_python(known)
-    except (InputError, AttributeError, ValidationError):
-        return Memory("", 1)  # published by an older version, or damaged: at least one night
-    return replace(found, nights=max(found.nights, 1), approvals=max(found.approvals, 0))
+    history: Any = None
+    with suppress(InputError, AttributeError):
+        history = read_json(site / "summary.json", "summary.json").get("history")
+    known = history if isinstance(history, dict) else {}
+    kinds = {"id": str, "nights": int, "approvals": int}
+    of = Memory(**{name: known[name] for name, kind in kinds.items() if type(known.get(name)) is kind})
+    return replace(of, nights=max(of.nights, 1), approvals=max(of.approvals, 0))
 
 
 def check_memory(site: Path, now: Memory, state: Path) -> None:
@@ -129,14 +121,11 @@ def check_memory(site: Path, now: Memory, state: Path) -> None:
     before = remembered(site)
     if before is None:
         return
-    if now.nights == 0:
-        what = "is missing or empty"
-    elif before.id and now.id != before.id:
-        what = "is that of another site"
-    elif now.nights < before.nights or now.approvals < before.approvals:
-        what = f"holds {now}"
-    else:
+    other = before.id and now.id != before.id
+    if not other and now.nights >= before.nights and now.approvals >= before.approvals:
         return
+    what = "is that of another site" if other else f"holds {now}"
+    what = what if now.nights else "is missing or empty"
     raise HistoryLost(
         f"{state / INDEX}: {what}, but the site knows of {before}: regressions cannot be determined."
         " Restore the state folder from a copy, or begin anew on purpose with --accept-lost-history"

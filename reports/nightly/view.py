@@ -15,10 +15,10 @@ from analyses.slugs import hashed
 from reports.nightly.cache import Cache
 from reports.nightly.changes import Between, Change, Comparison
 from reports.nightly.history import History
+from reports.nightly.moves import WINDOW, missing_nights
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.source import Study
 from reports.nightly.state import Memory
-from reports.nightly.trend import WINDOW, missing_nights
 
 BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
 STRIP = 30
@@ -47,17 +47,14 @@ class DesignView:
 
     @property
     def name(self) -> str:
-        """Name as in the study."""
         return self.result.name
 
     @property
     def slug(self) -> str:
-        """Name as a file."""
         return hashed(self.result.name)
 
     @property
     def broken(self) -> bool:
-        """Whether there is no result tonight."""
         return self.result.status in BROKEN
 
     @property
@@ -73,17 +70,14 @@ class DesignView:
 
     @property
     def verdicts(self) -> list[Tree]:
-        """Requirements of tonight's report (`reports.nightly.figures.verdicts_of`)."""
         return list(self.meta.get("verdicts", ()))
 
     @property
     def regressions(self) -> tuple[Change, ...]:
-        """Changes for the worse that nobody has approved."""
         return self.baseline.regressions
 
     @property
     def state(self) -> str:
-        """One of `STATES`."""
         if self.broken:
             return "broken"
         if self.result.status != "pass":
@@ -92,7 +86,6 @@ class DesignView:
 
     @property
     def report(self) -> str:
-        """Folder of its report on the site."""
         return report_folder(self.result)
 
     @property
@@ -118,7 +111,6 @@ class Overview:
 
     @property
     def run(self) -> Run:
-        """This night."""
         return self.runs[-1]
 
     @property
@@ -127,12 +119,10 @@ class Overview:
         return tuple(d for d in self.designs if d.result.kind == "design")
 
     def count(self, state: str) -> int:
-        """How many designs are in a state (see `DesignView.state`)."""
         return sum(d.state == state for d in self.alone)
 
     @property
     def counts(self) -> str:
-        """How many designs are in each state, in words."""
         counted = ((self.count(state), words) for state, (_, words) in STATES.items())
         return ", ".join(f"{count} {words}" for count, words in counted if count)
 
@@ -147,14 +137,12 @@ def report_folder(result: Result) -> str:
     return f"reports/{hashed(result.name)}/{result.key[:16]}"
 
 
-def overview(
-    history: History, cache: Cache, study: Study, metas: Mapping[str, Mapping[str, Any]], site: Path
-) -> Overview:
+def overview(history: History, cache: Cache, study: Study, site: Path) -> Overview:
     """Put together what the site says about the last finished night."""
     runs = history.runs
     between = Between(history, study.tolerances, study.origin)
     tonight = history.night(runs[-1].id).by_name
-    designs = [_design(result, between, cache, metas) for result in tonight.values()]
+    designs = [_design(result, between, cache) for result in tonight.values()]
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
         study=study,
@@ -169,31 +157,24 @@ def overview(
     )
 
 
-def _design(
-    result: Result, between: Between, cache: Cache, metas: Mapping[str, Mapping[str, Any]]
-) -> DesignView:
+def _design(result: Result, between: Between, cache: Cache) -> DesignView:
     history = between.history
     past = history.results(result.name, last=2 * STRIP)
-    approval, known = _approval(history, result.name), outcomes(past)
-    meta = metas.get(result.key)
-    if meta is None and result.key and (entry := cache.whole(result.key)):
-        meta = entry.meta
+    runs, known = {run.id: run for run in history.runs}, outcomes(past)
+    own = (
+        one for one in history.index.baselines[::-1] if one.name in (None, result.name) and one.run in runs
+    )
+    approval = next((one for one in own if history.first(result.name, [runs[one.run]])), None)
+    entry = cache.whole(result.key) if result.key else None
     return DesignView(
         result=result,
-        meta=meta or {},
+        meta=entry.meta if entry else {},
         last_night=between.last_night(result, past),
         baseline=between.baseline(result, approval),
         approval=approval,
         strip=tuple((run, known.get(run.id, "absent")) for run in history.runs[-STRIP:]),
         status_flaps=sum(a.status != b.status for a, b in pairwise(past[-WINDOW:])) >= 3,
     )
-
-
-def _approval(history: History, name: str) -> Baseline | None:
-    """The last approval of a design whose night has a result of it."""
-    runs = {run.id: run for run in history.runs}
-    own = (one for one in history.index.baselines[::-1] if one.name in (None, name) and one.run in runs)
-    return next((one for one in own if history.first(name, [runs[one.run]])), None)
 
 
 def outcomes(past: list[Result]) -> dict[int, str]:

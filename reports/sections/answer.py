@@ -46,9 +46,9 @@ def section(
     margins over the operating points, ``bounds`` the corners, between which each requirement's figure lies.
     """
     linear = next((part.get("result", "") for part in sections if part["id"] == "limits"), "")
-    result = [item for item in gathered(sections) if item["text"] != linear]
+    found = [item for item in gathered(sections) if item["text"] != linear]
     apart: dict[str, doc.Finding] = {}  # the same seen by two margins stands once on the first screen
-    for item in result:
+    for item in found:
         apart.setdefault(item["text"].partition(";")[0], item)
     bars = _bars(items, bounds)
     glance: GlanceBlock = {
@@ -60,13 +60,10 @@ def section(
         "bars": bars[:MOST_BARS],
         "more_bars": max(len(bars) - MOST_BARS, 0),
         "findings": [*apart.values()][:SHOWN],
-        "more": len(result) - min(len(apart), SHOWN),
+        "more": len(found) - min(len(apart), SHOWN),
     }
-    status = worst_status([one.sound for one in figures.values()])
-    if any(item["verdict"] == "not met" for item in items) or any(
-        item["severity"] == "fail" for item in result
-    ):
-        status = "fail"
+    failed = "not met" in [item["verdict"] for item in items] or "fail" in [one["severity"] for one in found]
+    status = "fail" if failed else worst_status([one.sound for one in figures.values()])
     return doc.section("answer", "At a glance", [glance, *_pictures(figures, point)], status=status)
 
 
@@ -76,17 +73,10 @@ def believed(sections: Sequence[doc.Section]) -> str:
     checks = doc.judged(block for block in blocks if block.get("what") == "checks")
     if not checks:
         return "Not checked by simulation."
-    errors = [
-        error
-        for part in sections
-        if part["id"] == "validation"
-        for block in doc.walk(part)
-        if block["kind"] == "table"
-        for row in block["rows"]
-        if isinstance(error := row.get("error"), float)
-        and row.get("predicted") is None
-        and not row.get("unit")
-    ]
+    tested = [block for part in sections if part["id"] == "validation" for block in doc.walk(part)]
+    rows = [row for block in tested if block["kind"] == "table" for row in block["rows"]]
+    relative = [row.get("error") for row in rows if row.get("predicted") is None and not row.get("unit")]
+    errors = [error for error in relative if isinstance(error, float)]
     count = tally(checks)
     words = [f"Linear equals simulated to {power_above(max(errors))}"] if errors and max(errors) > 0.0 else []
     words += [f"{count.met} of {count.total} checks by simulation met"]
@@ -109,7 +99,6 @@ def power_above(value: float) -> str:
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
-    """Give each requirement with a figure and a limit, the one with least left first."""
     known = [item for item in items if item["value"] is not None and item["limit"] is not None]
     found: dict[tuple[str, str | None], list[float]] = {}
     for corner in bounds.corners if bounds else ():
@@ -142,11 +131,11 @@ def move_words(design: Design, move: Move) -> str:
 def _loop(
     name: str, figures: LoopFigures, items: Sequence[doc.VerdictItem], ranges: Mapping[str, Spread]
 ) -> GlanceLoop:
-    """Give the chosen figures of a loop, each with the requirement that is nearest to it."""
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
         own = [item for item in items if item.get("quantity") == quantity.name and item.get("loop") == name]
         nearest = min(own, key=_nearness, default=None)
+        over = ranges.get(quantity.name)
         cells.append(
             {
                 "label": quantity.label,
@@ -157,20 +146,14 @@ def _loop(
                 "comparison": nearest["comparison"] if nearest else "",
                 "distance": nearest["distance"] if nearest else None,
                 "verdict": nearest["verdict"] if nearest else None,
-                "spread": range_words(ranges[quantity.name], quantity.name)
-                if quantity.name in ranges
-                else "",
+                "spread": range_words(over, quantity.name) if over else "",
             }
         )
     stable = margin_row(figures.judged)["stable"]
     if figures.held is not None:
         stable = {**stable, "text": f"{stable['text']}, {HELD[name]}"}
-    return {
-        "loop": loop_words(name, figures.rotor),
-        "anchor": f"loop-{name}",
-        "stable": stable,
-        "figures": cells,
-    }
+    words = loop_words(name, figures.rotor)
+    return {"loop": words, "anchor": f"loop-{name}", "stable": stable, "figures": cells}
 
 
 def weakest(point: WeakPoint) -> Weakest:
@@ -191,7 +174,6 @@ def weakest(point: WeakPoint) -> Weakest:
 
 
 def weakest_label(view: View) -> str:
-    """Name a view: loop, operating point or corner, break point."""
     loop = loop_words(view.loop, view.rotor) if view.loop else ""
     cut = f"cut at the {POINTS.get(view.cut, view.cut)}" if view.cut else ""
     return capital(", ".join(filter(None, (loop, view.place, cut))))

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.conditional import Conditional, Prediction
+from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
@@ -29,22 +29,18 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
         "A limit reduces the effective gain. A loop with a lower gain margin can then become unstable at "
         "large commands, although every linear margin is sufficient. Steps are simulated with dry friction."
     )
-    status: doc.Status = "fail" if conditional.diverges else "pass"
     return doc.section(
         "conditional", "Large commands and conditional stability", blocks, result=result, intro=intro,
-        status=status, findings=findings_of(conditional, axis),
+        status="fail" if conditional.diverges else "pass", findings=findings_of(conditional, axis),
     )  # fmt: skip
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    if not conditional.diverges:
-        return []
     text = _words(conditional, *output_unit(axis))[0]
-    return [doc.Finding(severity="fail", text=text, where="conditional")]
+    return [doc.Finding(severity="fail", text=text, where="conditional")] if conditional.diverges else []
 
 
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
-    """Say in some sentences what was found, the result first."""
     full = f"{conditional.full_deflection_rad * scale:.4g} {unit}"
     if not conditional.diverges:
         return [f"No step from rest up to full deflection ({full}) is made to oscillate by a limit."]
@@ -54,23 +50,18 @@ def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
     words += ", although every loop is stable by its linear margins" if conditional.hidden else ""
     words += f": {_ending(conditional, scale, unit)}." if conditional.ending else "."
     made = [words]
-    if conditional.oscillation_hz is not None and conditional.oscillation_rad is not None:
-        size = f"{conditional.oscillation_rad * scale:.3g} {unit}"
-        made.append(
-            f"At the threshold the output nears a limit cycle of {size} at "
-            f"{conditional.oscillation_hz:.3g} Hz."
-        )
+    hz, swing = conditional.oscillation_hz, conditional.oscillation_rad
+    if hz is not None and swing is not None:
+        size = f"{swing * scale:.3g} {unit}"
+        made.append(f"At the threshold the output nears a limit cycle of {size} at {hz:.3g} Hz.")
         best = next((one for one in conditional.predictions if not one.antiwindup), None)
         if best is not None:
-            made.append(
-                f"The describing function of the {best.limiter} limit predicts "
-                f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz."
-            )
+            size = f"{best.output_rad * scale:.3g} {unit} at {best.frequency_hz:.3g} Hz"
+            made.append(f"The describing function of the {best.limiter} limit predicts {size}.")
     return made
 
 
 def _ending(conditional: Conditional, scale: float, unit: str) -> str:
-    """Say what the smallest step that does not settle ends in, and which limit acts."""
     swing = f"{(conditional.end_rad or 0.0) * scale:.3g} {unit}"
     words = {
         "diverges": "the output diverges",
@@ -206,21 +197,20 @@ def _chart(sweep: RestSweep) -> style.Chart:
     top, bottom, off = chart.column(3, 3, 2)
     moves = np.abs(sweep.measured) > 0.0
     points: style.Style = {"colour": style.BLUE, "marker": "o", "size": 6.0, "hollow": True, "line": False}
-    lines = {
-        "simulated from rest": sweep.measured,
-        "sliding loop": sweep.sliding,
-        "describing function of dry friction": sweep.described,
-    }
+    lines = (
+        ("simulated from rest", sweep.measured, points),
+        ("sliding loop", sweep.sliding, style.series(1)),
+        ("describing function of dry friction", sweep.described, style.series(2)),
+    )
     phases = []
-    for k, (label, values) in enumerate(lines.items()):
-        look = points if k == 0 else style.series(k)
+    for label, values, look in lines:
         size = np.abs(values)
         decibel = 20.0 * np.log10(np.where(size > 0.0, size, np.nan))
         phase = np.degrees(np.unwrap(np.angle(values)))
         phases += phase[np.isfinite(phase)].tolist()
         top.curve(sweep.frequency_hz, decibel, label, **look)
         bottom.curve(sweep.frequency_hz, phase, label, **look)
-        if k:
+        if look is not points:
             seen = np.where(moves, np.abs(sweep.measured), 1.0)
             ratio = np.where(moves & (size > 0.0), size, np.nan) / seen
             off.curve(sweep.frequency_hz, 20.0 * np.log10(ratio), label, **look)

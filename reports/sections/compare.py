@@ -11,7 +11,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
-from analyses.comparison.variant_figures import FigureName
+from analyses.comparison.found import FigureName
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
@@ -45,12 +45,7 @@ def section(comparison: Comparison) -> list[doc.Section]:
     return [*made, *ledger(shown), *compare_figures.sections(shown)]
 
 
-def text(comparison: Comparison | str) -> str | None:
-    return comparison if isinstance(comparison, str) else None
-
-
 def brief(comparison: Comparison) -> Brief:
-    """Which designs meet their requirements, and what moved in their loops."""
     shown = compare_best.choice(comparison)
     kept = ("design", "met", "missed", "unproven")
     block = doc.with_columns(compare_best.designs(shown, note=""), kept)
@@ -83,7 +78,6 @@ def result(comparison: Comparison) -> str:
 
 
 def _first_of(what: str, names: Sequence[str]) -> str:
-    """Name the first, and count the others; nothing where there is none."""
     more = f", and {len(names) - 1} more" if len(names) > 1 else ""
     return f" {what}: {names[0]}{more}." if names else ""
 
@@ -145,7 +139,6 @@ def _with_change(value: float, change: float) -> str:
 
 
 def figures(comparison: Comparison) -> doc.Section:
-    """Every figure of every design, a table a group; best and worst marked."""
     heads = [doc.of(lambda name: capital(name.label), "figure", "Figure"), _unit_of(comparison)]
     blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
@@ -194,48 +187,44 @@ def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:
 
 
 def differences(comparison: Comparison) -> doc.Section:
-    """What changed in each variant, and which key moved which figure."""
     blocks: list[doc.Block] = []
     for one in comparison.variants:
         keys = "; ".join(f"{c.path}: {c.base} → {c.text}" for c in one.changed)
-        if one.changed or one.differences:
-            blocks.append(doc.details(f"{one.variant.name}: {keys}"[:400], [_moved_table(one, comparison)]))
-        else:
-            blocks.append(doc.text(f"{one.variant.name}: equal to the base."))
+        heading = f"{one.variant.name}: {keys}"[:400]
+        same = not (one.changed or one.differences)
+        equal = doc.text(f"{one.variant.name}: equal to the base.")
+        blocks.append(equal if same else doc.details(heading, [_moved_table(one, comparison)]))
     intro = (
         "Each changed key is applied alone to the base, over the exact sampled loops. What the keys do not "
         "explain is their interaction. Large-signal figures are not taken apart."
     )
     variants = comparison.everything.variants
-    result = (
-        f"{sum(bool(one.changed) for one in variants)} of {len(variants)} variants change a key of the base."
-    )
+    changed = sum(bool(one.changed) for one in variants)
+    result = f"{changed} of {len(variants)} variants change a key of the base."
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
 def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
+    def movers(name: FigureName) -> str:
+        parts = one.moved_by.get(name.key, ())[:_MOST_MOVERS]
+        return ", ".join(f"{part.path} {_signed(part.amount)}" for part in parts)
+
+    def interaction(name: FigureName) -> float | None:
+        parts, total = one.moved_by.get(name.key, ()), one.differences[name.key]
+        rest = total - sum(part.amount for part in parts)
+        return rest if parts and abs(rest) > 1e-3 * abs(total) else None
+
     columns = [
         _OF_GROUP,
         doc.of("unit", "unit", "Unit"),
         doc.of(lambda name: comparison.base.figures[name.key], "base", "Base", format="sig:4"),
         doc.of(lambda name: one.figures[name.key], "value", "Variant", format="sig:4"),
         doc.of(lambda name: one.differences[name.key], "difference", "Difference", format="sig:3"),
-        doc.of(lambda name: _movers(one, name), "moved", "Cause"),
-        doc.of(lambda name: _interaction(one, name), "rest", "Interaction", format="sig:2"),
+        doc.of(movers, "moved", "Cause"),
+        doc.of(interaction, "rest", "Interaction", format="sig:2"),
     ]
     names = [name for name in comparison.names if name.key in one.differences]
     return doc.listing(f"{one.variant.name} against the base", names, columns)
-
-
-def _movers(one: Compared, name: FigureName) -> str:
-    parts = one.moved_by.get(name.key, ())[:_MOST_MOVERS]
-    return ", ".join(f"{part.path} {_signed(part.amount)}" for part in parts)
-
-
-def _interaction(one: Compared, name: FigureName) -> float | None:
-    parts, total = one.moved_by.get(name.key, ()), one.differences[name.key]
-    rest = total - sum(part.amount for part in parts)
-    return rest if parts and abs(rest) > 1e-3 * abs(total) else None
 
 
 def _signed(value: float) -> str:

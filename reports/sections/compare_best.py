@@ -44,16 +44,14 @@ def section(comparison: Comparison) -> doc.Section:
 
 
 def _result(comparison: Comparison, met: Sequence[Compared]) -> str:
-    """Say how many designs meet everything, and which has the most room."""
     count = len(comparison.all)
     if not met:
         return f"None of the {count} designs meets every requirement."
     best = max(met, key=lambda one: weakest(one)[0])
-    nearness, verdict = weakest(best)
-    room = "" if verdict is None else f": {100.0 * nearness:.0f} % to its nearest limit ({label(verdict)})"
-    return (
-        f"{len(met)} of {count} designs meet every requirement; {best.variant.name} has the most room{room}."
-    )
+    near, verdict = weakest(best)
+    room = "" if verdict is None else f": {100.0 * near:.0f} % to its nearest limit ({label(verdict)})"
+    most = f"{best.variant.name} has the most room{room}"
+    return f"{len(met)} of {count} designs meet every requirement; {most}."
 
 
 def failed(one: Compared) -> int:
@@ -123,14 +121,11 @@ def _percent(part: float, *, signed: bool = False) -> str:
 
 
 def _best(comparison: Comparison) -> doc.Block:
-    """One row a requirement: the design with the most room, beside the base."""
+    heads = {"what": "Requirement", "limit": "Limit", "best": "Best", "value": "Value", "base": "Base"}
+    heads["worst"] = "Worst"
     columns = [
-        doc.column("what", "Requirement"),
-        doc.column("limit", "Limit"),
-        doc.column("best", "Best"),
-        doc.column("value", "Value", align="right"),
-        doc.column("base", "Base", align="right"),
-        doc.column("worst", "Worst"),
+        doc.column(key, words, align="right" if key in ("value", "base") else "left")
+        for key, words in heads.items()
     ]
     rows = []
     for wanted in comparison.base.verdicts:
@@ -152,12 +147,10 @@ def _best(comparison: Comparison) -> doc.Block:
 
 
 def _judged(comparison: Comparison, wanted: RequirementVerdict) -> list[tuple[Compared, RequirementVerdict]]:
-    """Every design with its verdict on a requirement."""
     return [(one, v) for one in comparison.all for v in one.verdicts if v.id == wanted.id]
 
 
 def number(value: float | None) -> str | None:
-    """Write a value that may have no bound."""
     if value is None:
         return None
     return significant(value, 4) if math.isfinite(value) else "unlimited"
@@ -179,7 +172,6 @@ def choice(comparison: Comparison) -> Comparison:
 
 
 def _ends(comparison: Comparison) -> Iterator[int]:
-    """Places of the variants that matter, the most important first."""
     variants = comparison.variants
     room = sorted(range(len(variants)), key=lambda k: (failed(variants[k]), -weakest(variants[k])[0]))
     yield room[0]
@@ -203,20 +195,18 @@ def worst(comparison: Comparison) -> list[doc.Block]:
     if whole is None:
         return []
     count, items = len(whole.all), list[doc.VerdictItem]()
+
+    def rank(pair: tuple[Compared, RequirementVerdict]) -> tuple[int, float]:
+        near = nearness(pair[1])
+        return _ORDER[pair[1].verdict], math.inf if near is None else near
+
     for wanted in whole.base.verdicts:
         found = _judged(whole, wanted)
-        one, verdict = min(found, key=lambda pair: _rank(pair[1]))
-        made: doc.VerdictItem = item(verdict)
-        met = tally(v for _, v in found).met
-        label = f"{made['label']}: met by {met} of {count} designs; the worst is {one.variant.name}"
-        made["id"], made["label"] = f"worst/{made['id']}", label
-        items.append(made)
+        one, verdict = min(found, key=rank)
+        made, met = item(verdict), tally(v for _, v in found).met
+        words = f"{made['label']}: met by {met} of {count} designs; the worst is {one.variant.name}"
+        items.append({**made, "id": f"worst/{made['id']}", "label": words})
     return [doc.verdicts(items)]
-
-
-def _rank(verdict: RequirementVerdict) -> tuple[int, float]:
-    near = nearness(verdict)
-    return _ORDER[verdict.verdict], math.inf if near is None else near
 
 
 def shown_words(comparison: Comparison) -> str:
@@ -231,7 +221,6 @@ def shown_words(comparison: Comparison) -> str:
 
 
 def table_text(comparison: Comparison) -> str:
-    """A row for each design with every figure and every value of a requirement, as CSV."""
     header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]

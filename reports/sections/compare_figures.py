@@ -30,16 +30,13 @@ def overlays(comparison: Comparison) -> doc.Section:
     drawn = comparison.all[:MOST_CURVES]
     blocks: list[doc.Block] = []
     for name, title in LOOPS.items():
-        if name not in comparison.base.loops:
-            continue
-        blocks += _bode(name, title, drawn, closed=False) + _bode(name, title, drawn, closed=True)
-        blocks += _step(name, title, drawn)
+        if name in comparison.base.loops:
+            blocks += _bode(name, title, drawn, closed=False) + _bode(name, title, drawn, closed=True)
+            blocks += _step(name, title, drawn)
     left_out = len(comparison.everything.all) - len(drawn)
     intro = f"{left_out} more designs are in the tables only." if left_out else ""
     result = f"Open loop, closed loop and step of {len(drawn)} designs; the base is black."
-    return doc.section(
-        "overlays", "Responses of all designs", [b for b in blocks if b], result=result, intro=intro
-    )
+    return doc.section("overlays", "Responses of all designs", blocks, result=result, intro=intro)
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[doc.Block]:
@@ -98,20 +95,13 @@ def tornadoes(comparison: Comparison) -> doc.Section:
         "Each parameter alone at both ends of its tolerance, or ±10 % where it has none. Slopes are central "
         "differences of 0.1 % over the exact sampled loops."
     )
-    return doc.section(
-        "sensitivities", "Sensitivities", blocks, result=_strongest(comparison, wanted), intro=intro
-    )
-
-
-def _strongest(comparison: Comparison, wanted: dict[str, float | None]) -> str:
-    """Say which parameter changes the first required figure most."""
-    for key in wanted:
-        bars = comparison.sensitivities.tornado(key)
-        if bars:
-            name = next((n.label for n in comparison.names if n.key == key), key)
-            place = LOOPS.get(key.partition(".")[0], "drive").lower()
-            return f"The {name} of the {place} depends most on {bars[0].path}."
-    return "No figure depends on a parameter with a tolerance."
+    result = "No figure depends on a parameter with a tolerance."
+    if shown:
+        key, bars, _ = shown[0]
+        name = next((n.label for n in comparison.names if n.key == key), key)
+        place = LOOPS.get(key.partition(".")[0], "drive").lower()
+        result = f"The {name} of the {place} depends most on {bars[0].path}."
+    return doc.section("sensitivities", "Sensitivities", blocks, result=result, intro=intro)
 
 
 def _wanted(comparison: Comparison) -> dict[str, float | None]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from analyses.corners.run import Corner, Corners
 from reports import document as doc
@@ -28,14 +26,12 @@ def section(result: Corners) -> doc.Section:
         doc.figure("corners", chart(result), caption=caption, alt=alt),
         doc.details("Every loop at every corner", [_loop_table(result), *words]),
     ]
-    told: Literal["info", "warn"] = "info" if result.passed else "warn"
-    return doc.section(
-        "corners", "Corners", blocks, result=summary(result), intro=intro, status=told, told=told
-    )
+    told: doc.Severity = "info" if result.passed else "warn"
+    words = summary(result)
+    return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=told, told=told)
 
 
 def summary(result: Corners) -> str:
-    """Say at which corners the drive does not do."""
     failed = [corner.name for corner in result.corners if not corner.passed]
     open_ones = [one.id for one in result.left_out if not one.passes]
     more = f" Not judged at corners: {', '.join(open_ones)}." if open_ones else ""
@@ -47,10 +43,6 @@ def summary(result: Corners) -> str:
     names = "" if everywhere else f" ({'; '.join(failed)})"
     what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))
     return f"The drive fails at {where} corners{names}: {', '.join(what)}.{more}"
-
-
-def unmet(corner: Corner) -> str:
-    return ", ".join(_failings(corner))
 
 
 def _failings(corner: Corner) -> list[str]:
@@ -113,7 +105,8 @@ def _summary_table(result: Corners) -> doc.Block:
             found = worst(corner, QUANTITIES[name])
             of = found and loop_words(found[1], corner.figures[found[1]].rotor)
             row |= {name: found and found[0], f"{name}_loop": of or ""}
-        rows.append({**row, "unmet": unmet(corner), "_status": None if corner.passed else "fail"})
+        unmet = ", ".join(_failings(corner))
+        rows.append({**row, "unmet": unmet, "_status": None if corner.passed else "fail"})
     note = "The least margin is that of the stable loops; others are named under what is not met."
     return doc.table("Corners", columns, rows, note)
 

@@ -25,19 +25,14 @@ def section(result: LimitCycles) -> doc.Section:
         "size, then the simulator is started in its shape at many sizes. Cycles of dry friction alone stand "
         "under Dry friction at small signals."
     )
-    blocks: list[doc.Block] = []
-    if result.confirmations:
-        blocks.append(_predicted(result, fine, small))
-    else:
-        causes = (
-            " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
-        )
-        blocks.append(doc.text(f"No limit cycle of {causes} is predicted."))
-    blocks.append(_rests(result, fine, small))
-    severity: Any = "info" if _judged(result) is Verdict.MET else "warn"
+    causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
+    none = doc.text(f"No limit cycle of {causes} is predicted.")
+    predicted = _predicted(result, fine, small) if result.confirmations else none
+    told: doc.Severity = "info" if verdict_of(result.design, result.hunting) is Verdict.MET else "warn"
     return doc.section(
-        "cycles", "Limit cycles", blocks, result=summary(result), intro=intro, status=severity, told=severity
-    )
+        "cycles", "Limit cycles", [predicted, _rests(result, fine, small)], result=summary(result),
+        intro=intro, status=told, told=told,
+    )  # fmt: skip
 
 
 def summary(result: LimitCycles) -> str:
@@ -54,30 +49,20 @@ def summary(result: LimitCycles) -> str:
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",
         Verdict.NOT_PROVEN: "is not known to come to rest",
-    }[_judged(result)]
+    }[verdict_of(result.design, swing)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
     return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
 
 
-def _judged(result: LimitCycles) -> Verdict:
-    return verdict_of(result.design, result.hunting)
-
-
 def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
-    size: dict[str, Any] = {"unit": small, "format": "sig:3"}
+    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
     columns = [
         doc.of(lambda one: CAUSES[one.cycle.cause], "cause", "Cause"),
         doc.of(lambda one: "in it" if one.cycle.with_friction else "left out", "friction", "Dry friction"),
         doc.of(lambda one: "stable" if one.cycle.stable else "unstable", "kind", "Kind"),
-        doc.of("cycle.output_rad", "size", "Predicted, peak", scale=fine, **size, better=-1),
+        doc.of("cycle.output_rad", "size", "Predicted, peak", **size, better=-1),
         doc.of("cycle.frequency_hz", "hz", "at", "Hz", format="sig:3"),
-        doc.of(
-            lambda one: one.ratio and one.ratio * one.cycle.output_rad,
-            "seen",
-            "Simulated",
-            scale=fine,
-            **size,
-        ),
+        doc.of(lambda one: one.ratio and one.ratio * one.cycle.output_rad, "seen", "Simulated", **size),
         doc.of("frequency_hz", "seen_hz", "at", "Hz", format="sig:3"),
         doc.of("verdict", "verdict", "Verdict"),
     ]

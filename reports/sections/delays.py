@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from actuator_lti.loops.delay_budget import DelayBudget
 from reports import document as doc
@@ -24,15 +25,14 @@ def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
     def part(key: str, label: str) -> doc.Shown:
         return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, "deg", format="fix:2")
 
+    left: dict[str, Any] = {"unit": "deg", "format": "fix:2"}
     columns = [
         doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
         doc.of(lambda one: hertz(one[1].frequency_rad_s), "crossover_hz", "Crossover", "Hz", format="sig:4"),
         *(part(key, label.capitalize()) for key, label in _parts(budgets).items()),
         doc.of(lambda one: one[1].total_deg, "total", "Phase in all", "deg", format="fix:2"),
-        doc.of(
-            lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", "deg", format="fix:2", better=1
-        ),
-        doc.of(lambda one: one[1].one_more_sample_deg, "one_more", "One more sample", "deg", format="fix:2"),
+        doc.of(lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", **left, better=1),
+        doc.of(lambda one: one[1].one_more_sample_deg, "one_more", "One more sample", **left),
     ]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "
@@ -82,7 +82,6 @@ def _bar(panel: style.Panel, row: float, parts: Mapping[str, float], names: list
 
 
 def _result(budgets: Mapping[str, DelayBudget]) -> str:
-    """Say which loop loses most phase to sampling, hold and computing delay."""
     digital = ("measurement", "hold", "computing delay", "sampling")
     lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
     name = max(lost, key=lambda key: lost[key])
@@ -96,6 +95,5 @@ def _result(budgets: Mapping[str, DelayBudget]) -> str:
 def _parts(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
     """Every item that occurs, with its words: the filters between the plant and the measurement."""
     filters = dict.fromkeys(name for budget in budgets.values() for name in budget.filters_deg)
-    parts = dict(PARTS)
-    after = {key: parts.pop(key) for key in list(parts) if key not in ("controller", "plant")}
-    return parts | {name: name for name in filters} | after
+    before = {key: PARTS[key] for key in ("controller", "plant")}
+    return before | {name: name for name in filters} | PARTS

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Literal
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.duty.run import Duty, Heating
+from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import load_unit, output_unit
@@ -26,17 +25,11 @@ def section(result: Duty) -> doc.Section:
     if result.overload is None:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
-    does = result.verdict is Verdict.MET and not result.limited
-    severity: Literal["info", "warn"] = "info" if does else "warn"
+    told: doc.Severity = "info" if result.verdict is Verdict.MET and not result.limited else "warn"
     return doc.section(
-        "duty",
-        "Duty cycle",
-        [table, _figure(result)],
-        result=summary(result),
-        intro=intro,
-        status=severity,
-        told=severity,
-    )
+        "duty", "Duty cycle", [table, _figure(result)], result=summary(result), intro=intro, status=told,
+        told=told,
+    )  # fmt: skip
 
 
 RATED = {
@@ -64,7 +57,6 @@ def asked_words(result: Duty) -> str:
 
 
 def summary(result: Duty) -> str:
-    """Say whether the drive may do it without end, and whether it follows at all."""
     known = math.isfinite(result.continuous_A)
     part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
     limits = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
@@ -109,12 +101,9 @@ def _figure(result: Duty) -> doc.Block:
     caption = "Motor current over one period of the motion."
     if result.heating is not None:
         caption += " Right: the winding from ambient."
-        _winding(chart.panel(y="winding, °C", title="Winding"), result.heating)
+        panel, heat = chart.panel(y="winding, °C", title="Winding"), result.heating
+        scale = style.time_axis(panel, float(heat.time_s[-1]))
+        panel.curve(heat.time_s * scale, heat.temperature_degC, "winding", **style.series(1))
+        if math.isfinite(heat.limit_degC):
+            panel.rule_y(heat.limit_degC, "limit", seen=True, colour=style.RED, dash=1)
     return doc.figure("duty", chart, caption)
-
-
-def _winding(panel: style.Panel, heat: Heating) -> None:
-    scale = style.time_axis(panel, float(heat.time_s[-1]))
-    panel.curve(heat.time_s * scale, heat.temperature_degC, "winding", **style.series(1))
-    if math.isfinite(heat.limit_degC):
-        panel.rule_y(heat.limit_degC, "limit", seen=True, colour=style.RED, dash=1)

@@ -45,14 +45,12 @@ def section(result: Failures) -> doc.Section:
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load), *map(doc.text, left)]
-    severity: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
-    return doc.section(
-        "failures", "Failure cases", blocks, result=summary(result), intro=intro, told=severity
-    )
+    told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
+    words = summary(result)
+    return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, told=told_as)
 
 
 def summary(result: Failures) -> str:
-    """Say which failure reaches the stop first, undetected, or else moves the output most until detected."""
     scale, unit = output_unit(result.design.axis)
     detection = result.asked.detection_s
     stopped = {case.name: case.to_stop_s for case in result.cases if case.to_stop_s is not None}
@@ -75,14 +73,13 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
     time: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
     has_current = result.design.motor.has_electrical_dynamics
+    current = "peak_current_A" if has_current else lambda _case: None
     columns = [
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
         doc.of("to_deflection_s", "near", f"To {near}", **time),
         doc.of("to_stop_s", "stop", "To the stop", **time),
         doc.of("at_detection_rad", "seen", "Until detected", unit, scale=scale, **most),
-        doc.of(
-            lambda case: case.peak_current_A if has_current else None, "current", "Peak current", "A", **most
-        ),
+        doc.of(current, "current", "Peak current", "A", **most),
         doc.of("peak_moment_Nm", "moment", f"Peak {_push(result.design)}", load_unit(result.design), **most),
         doc.of("protected_s", "protected", "I²t acts at", **time),
         doc.of("words", "words", "What happens"),

@@ -53,7 +53,6 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
 
 
 def _result(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Say which loop loses most phase margin against the ideal form."""
     costs = [row for row in rows if row["form"] == FORMS["sampled"] and row["phase_cost_deg"] is not None]
     if not costs:
         return "No phase margin is known in both the sampled and the ideal form."
@@ -98,6 +97,15 @@ BREAK_COLUMNS = [
     doc.column("others", "Other loops"),
     *(c for c in MARGIN_COLUMNS if c["key"] not in ("loop", "delay_margin_samples", "disk_margin")),
 ]
+PERIODIC = (
+    "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
+    "fundamental. The exact stability limits follow from the eigenvalues over one period."
+)
+EXACT = "Stability limits of periodic loops"
+EXACT_NOTE = (
+    "A dash: none within a factor of 10⁴. The delay is that of the computing, which acts at the voltage "
+    "alone."
+)
 EXACT_COLUMNS = [
     doc.of(lambda pair: POINTS.get(pair[0], pair[0]), "point", "Cut at"),
     doc.of(lambda pair: pair[1].gain_upper, "gain_upper", "Gain may grow by", "×", format="sig:4"),
@@ -121,16 +129,7 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
     blocks += map(doc.text, [*reasons, *evidence_notes(there)])
     exact = [(name, point.exact) for name, point in points.items() if point.exact is not None]
     if exact:
-        words = (
-            "A fast loop cut inside slower ones is periodically time-varying; the rows above describe its "
-            "fundamental. The exact stability limits follow from the eigenvalues over one period."
-        )
-        note = (
-            "A dash: none within a factor of 10⁴. The delay is that of the computing, which acts at the "
-            "voltage alone."
-        )
-        title = "Stability limits of periodic loops"
-        blocks += [doc.text(words), doc.listing(title, exact, EXACT_COLUMNS, note)]
+        blocks += [doc.text(PERIODIC), doc.listing(EXACT, exact, EXACT_COLUMNS, EXACT_NOTE)]
     intro = (
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
         "The matrix shows what the drive tolerates at each point."
@@ -142,7 +141,6 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
 
 
 def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Say where the finished drive tolerates least."""
     closed = [row for row in rows if row["others"] == "all closed" and row.get("s_peak_db") is not None]
     if not closed:
         return "No margin of the finished drive is known."
@@ -161,7 +159,6 @@ def _break_point(name: str, others: str, figures: LoopFigures | None) -> doc.Row
 
 
 def operating_points(points: Sequence[OperatingPointFigures], design: Design) -> doc.Section:
-    """Make the section; one line an operating point, three figures a loop."""
     names = list(dict.fromkeys(name for point in points for name in point.figures))
     linear = design.axis == "linear"
     columns = [
@@ -194,24 +191,15 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
 
 
 def _spread(points: Sequence[OperatingPointFigures]) -> str:
-    """Say the smallest phase margin over all operating points."""
     for sound, words in ((False, "Unstable"), (None, "Stability is not known")):
         here = [p.place or p.label for p in points if any(f.sound is sound for f in p.figures.values())]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
-    result = [
-        (row["phase_margin_deg"], name, point.place or point.label)
-        for point in points
-        for name, figures in point.figures.items()
-        if (row := margin_row(figures))["phase_margin_deg"] is not None
-    ]
-    if not result:
-        return f"Stable at all {len(points)} operating points."
-    deg, name, label = min(result, key=lambda each: float(each[0]))
-    return (
-        f"Stable at all {len(points)} operating points; the smallest phase margin is {deg:.1f} deg "
-        f"({name} loop, {label})."
-    )
+    rows = [(margin_row(f), f"{n} loop, {p.place or p.label}") for p in points for n, f in p.figures.items()]
+    known = [(row["phase_margin_deg"], words) for row, words in rows if row["phase_margin_deg"] is not None]
+    deg, where = min(known, key=lambda each: float(each[0]), default=(None, ""))
+    least = "" if deg is None else f"; the smallest phase margin is {deg:.1f} deg ({where})"
+    return f"Stable at all {len(points)} operating points{least}."
 
 
 def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:

@@ -48,17 +48,15 @@ def section(result: FrictionEffects) -> doc.Section:
 def _cycle_verdict(
     design: Design, point: FrictionPoint, fine: float, small: str, load: str
 ) -> doc.VerdictItem:
-    """Say whether friction keeps the drive hunting, and whether that was predicted."""
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
-    predicted = _predicted_words(cycles, fine, small) + "; stick-slip analysis: none"
+    slip = "none"
     if (one := cycles.stick_slip) is not None:
         size, kind = fine * one.output_amplitude_rad, "" if one.stable else ", unstable"
-        predicted = predicted.removesuffix("none") + f"±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
-    if swing is None:
-        sizes = len(cycles.settlings)
-        result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
-    else:
-        result = told(design, swing, fine, small)
+        slip = f"±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
+    predicted = f"{_predicted_words(cycles, fine, small)}; stick-slip analysis: {slip}"
+    sizes = len(cycles.settlings)
+    result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
+    result = result if swing is None else told(design, swing, fine, small)
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
@@ -75,7 +73,6 @@ def _cycle_verdict(
 
 
 def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    """Say what the describing function predicts and what the simulator makes of it."""
     parts = []
     for item in cycles.confirmations:
         one = item.cycle
@@ -103,12 +100,11 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         doc.of("hysteresis.largest_rad", "largest", f"Largest effect of {_cause(result)}", **size),
     ]
     note = (
-        f"The {result.integrator} controller integrates: a step below the threshold {_below(result)}, and "
-        f"motion lost in front of its sensor is recovered{_behind(result)}. The effect "
-        "is largest just after a reversal."
+        f"{_integrates(result)}: a step below the threshold {_below(result)}, and motion lost in front of "
+        f"its sensor is recovered{_behind(result)}. The effect is largest just after a reversal."
         if result.integrator
-        else f"No controller integrates: a step below the threshold {_below(result)}. Each reversal "
-        f"loses the torque that sliding takes, both ways, over the stiffness{_behind(result)}."
+        else f"{_integrates(result)}: a step below the threshold {_below(result)}. Each reversal loses the "
+        f"torque that sliding takes, both ways, over the stiffness{_behind(result)}."
     )
     if not any(point.threshold for point in result.points):
         note = "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
@@ -116,13 +112,15 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         note += " A load without figures gives a forward step no threshold."
     if result.design.command != Command():
         note += " Steps as they come behind the profile and filter of the command."
-    return doc.listing(
-        "Threshold of motion, and motion lost at a reversal of the command", result.points, columns, note
-    )
+    title = "Threshold of motion, and motion lost at a reversal of the command"
+    return doc.listing(title, result.points, columns, note)
+
+
+def _integrates(result: FrictionEffects) -> str:
+    return f"{f'The {result.integrator}' if result.integrator else 'No'} controller integrates"
 
 
 def _below(result: FrictionEffects) -> str:
-    """What a step below the threshold does: now, later or never."""
     kicks = result.design.controller.position_loop.kicks
     if not result.integrator:
         return "moves the output by its own kick or never" if kicks else "never moves the output"
@@ -134,13 +132,11 @@ def _below(result: FrictionEffects) -> str:
 
 
 def _cause(result: FrictionEffects) -> str:
-    """What loses motion at a reversal."""
     coupling = result.design.coupling
     return "friction" if coupling is None or coupling.play_rad == 0.0 else "friction and play"
 
 
 def _behind(result: FrictionEffects) -> str:
-    """What is lost behind the sensor of the motor."""
     design = result.design
     if design.coupling is None or design.controller.position_loop.sensor == "output":
         return ""
@@ -193,9 +189,8 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
 def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> list[doc.Block]:
     points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
     loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
-    waits = [
-        (label, one.threshold.waiting) for label, one in points if one.threshold and one.threshold.waiting
-    ]
+    known = [(label, one.threshold.waiting) for label, one in points if one.threshold]
+    waits = [(label, waiting) for label, waiting in known if waiting]
     if not loops:
         return []
     chart = style.Chart(width=style.WIDE, height=330.0)
@@ -223,19 +218,19 @@ def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> list
 
 
 def _summary(result: FrictionEffects, fine: float, small: str) -> str:
-    """Say what becomes of the steady-state error, as the steps show it."""
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = noticed(result.design, settlings)
     if swing is not None:
-        return f"Friction keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
+        ends = told(result.design, swing, fine, small)
+        return f"Friction alone keeps the drive from rest after a step: {ends}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
-    does = f"{f'The {result.integrator}' if result.integrator else 'No'} controller integrates"
     if left:
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
-        return f"{does}; an error of up to {fine * abs(most.rest.error):.3g} {small} is left at rest{under}."
+        size = f"{fine * abs(most.rest.error):.3g} {small}"
+        return f"{_integrates(result)}; an error of up to {size} is left at rest{under}."
     if not result.integrator:
-        return f"{does}; the steps leave no error at rest."
+        return f"{_integrates(result)}; the steps leave no error at rest."
     return (
         f"After steps dry friction alone leaves no steady-state error and causes no hunting: the "
         f"{result.integrator} integrator removes the error."

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.large_signal.by_amplitude import AmplitudeMargin
+from analyses.large_signal.from_rest import AmplitudeMargin
 from analyses.validation import Validation
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
@@ -31,14 +31,13 @@ def sections(validation: Validation) -> list[doc.Section]:
 
 
 def _injection(sweeps: Sequence[BenchSweep]) -> doc.Section:
-    """What an analyser on the bench would see of every loop."""
-    blocks = [_sweep(sweep) for sweep in sweeps]
     intro = (
         "A sine is added at the break point of the simulated drive, which starts in the steady state of that "
         "sine; fundamentals are correlated over whole periods."
     )
     words = f"Every open loop as an analyser sees it; simulated and linear agree to {_largest(sweeps):.1e}."
-    return doc.section("injection", "Frequency response by injection", blocks, result=words, intro=intro)
+    title = "Frequency response by injection"
+    return doc.section("injection", title, list(map(_sweep, sweeps)), result=words, intro=intro)
 
 
 def _sweep(sweep: BenchSweep) -> doc.Block:
@@ -61,7 +60,6 @@ def _sweep(sweep: BenchSweep) -> doc.Block:
 
 
 def _largest(sweeps: Sequence[BenchSweep]) -> float:
-    """Largest relative difference of simulated and linear."""
     return float(max(np.nanmax(np.abs(one.open_loop / one.linear - 1.0)) for one in sweeps))
 
 
@@ -72,13 +70,14 @@ def _in_time(validation: Validation) -> doc.Section:
             blocks.append(_step(validation.steps[name]))
         if name in validation.margins:
             blocks.append(_margin(validation.margins[name]))
-    blocks += by_amplitude(validation.amplitude_margins)
-    said = remarks(validation.amplitude_margins)
+    amplitudes = validation.amplitude_margins
+    said = remarks(amplitudes)
+    if amplitudes:
+        blocks += [_amplitudes(amplitudes), *map(doc.text, said), _amplitude_table(amplitudes)]
     findings = [doc.Finding(severity="warn", text=words, where="confirmation") for words in said]
     rows = [shown.row for shown in validation.steps.values()]
     rows += [row for shown in validation.margins.values() for row in shown.rows]
     met = sum(row.verdict is Verdict.MET for row in rows)
-    status: doc.Status = "pass" if met == len(rows) else "fail"
     intro = (
         "On the operating motion: one small step, sample by sample, and the drive started on its critical "
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
@@ -86,8 +85,8 @@ def _in_time(validation: Validation) -> doc.Section:
     )
     result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *said[:1]])
     return doc.section(
-        "confirmation", "Predictions in time", blocks, result=result, intro=intro, status=status,
-        findings=findings,
+        "confirmation", "Predictions in time", blocks, result=result, intro=intro,
+        status="pass" if met == len(rows) else "fail", findings=findings,
     )  # fmt: skip
 
 
@@ -130,12 +129,6 @@ WORTH_SAYING = 0.9  # of the linear margin: what takes less is not said
 LOWEST = 0.02  # of the linear margin: what lies below is drawn here
 
 
-def by_amplitude(items: Sequence[AmplitudeMargin]) -> list[doc.Block]:
-    if not items:
-        return []
-    return [_amplitudes(items), *(doc.text(words) for words in remarks(items)), _amplitude_table(items)]
-
-
 def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
     """Say where large motion takes more than a tenth of a margin, worst case of each loop and kind."""
     worst: dict[tuple[str, str], AmplitudeMargin] = {}
@@ -150,7 +143,6 @@ def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
 
 
 def remark(item: AmplitudeMargin) -> str:
-    """Say from where on a large motion keeps oscillating."""
     value, linear = _text(item.value or 0.0, item), _text(item.linear, item)
     if _already(item):
         cause = "as designed"

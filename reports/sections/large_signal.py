@@ -44,11 +44,10 @@ def section(result: LargeSignals) -> doc.Section:
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
         "model holds. Above them the limit that is reached first determines the output."
     )
-    words = _result(result.bode, scale, unit, _linear(design))
-    status: doc.Status = tally(items).role if items else "info"
     return doc.section(
-        "large-signal", "Large signals", blocks, result=words, intro=intro, status=status, told="info"
-    )
+        "large-signal", "Large signals", blocks, result=_result(result.bode, scale, unit, _linear(design)),
+        intro=intro, status=tally(items).role if items else "info", told="info",
+    )  # fmt: skip
 
 
 def _linear(design: Design) -> str:
@@ -63,7 +62,6 @@ def _linear(design: Design) -> str:
 
 
 def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str = "linear") -> str:
-    """Say how far the bandwidth falls with the amplitude."""
     largest, fraction = max(
         zip(amplitude_bode.amplitude_rad, amplitude_bode.fractions, strict=True), default=(math.nan, 0.0)
     )
@@ -73,19 +71,18 @@ def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str =
     if linear is None or not math.isfinite(linear):
         return "The linear loop has no −3 dB bandwidth in the range of the map."
     value = amplitude_bode.minus3db_hz[place]
+    found, falls = f"{value:.3g} Hz", value < linear
     if not math.isfinite(value):
-        found = _between(amplitude_bode, place)
-        if amplitude_bode.below_from_start[place]:
-            return f"The −3 dB bandwidth falls from {linear:.3g} Hz ({model}) to {found} at {size}."
-        return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
-    if f"{value:.3g}" == f"{linear:.3g}":
+        found, falls = _between(amplitude_bode, place), amplitude_bode.below_from_start[place]
+        if not falls:
+            return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
+    if found == f"{linear:.3g} Hz":
         return f"The −3 dB bandwidth stays at {linear:.3g} Hz up to {size}."
-    does = "falls" if value < linear else "rises"
-    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {value:.3g} Hz at {size}."
+    does = "falls" if falls else "rises"
+    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {found} at {size}."
 
 
 def _between(amplitude_bode: AmplitudeBode, place: int) -> str:
-    """Say as much of a bandwidth as the steady points tell."""
     low, high = amplitude_bode.minus3db_range_hz[place]
     if amplitude_bode.below_from_start[place]:
         return f"below {high:.3g} Hz"
@@ -116,7 +113,6 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
 
 
 def _map_figure(result: LargeSignals, scale: float, unit: str) -> doc.Block:
-    """Make the map with the linear onset lines, and where limits are first reached with friction."""
     caption = (
         "What limits a sine command, at no load, with friction. Colour: limit that acts longest. Marks: "
         "waveform of the output; a sine has none. Lines: amplitude at which the linear loop reaches each "
@@ -162,13 +158,12 @@ def _shift_table(shift: LimitShift, design: Design, scale: float, unit: str) -> 
 def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: float) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=440.0)
     gain, phase = chart.column(1.0, 1.0, width=1.45, title="Output over command")
-    both = (
-        (gain, amplitude_bode.linear_db, amplitude_bode.gain_db),
-        (phase, amplitude_bode.linear_deg, amplitude_bode.phase_deg),
-    )
     sizes = zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True)
     labels = [f"{100.0 * fraction:g} % ({scale * amplitude:.3g} {unit})" for fraction, amplitude in sizes]
-    for panel, linear, values in both:
+    for panel, linear, values in (
+        (gain, amplitude_bode.linear_db, amplitude_bode.gain_db),
+        (phase, amplitude_bode.linear_deg, amplitude_bode.phase_deg),
+    ):
         look: style.Style = {"colour": style.MUTED, "width": 4.2, "opacity": 0.45}
         panel.curve(amplitude_bode.frequency_hz, linear, "linear", **look)
         for k, label in enumerate(labels):
@@ -183,7 +178,7 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     gain.y.label, phase.y.label = "gain of the fundamental, dB", "phase, deg"
     size = f"command amplitude, {unit} (dotted: full deflection)"
     panel = chart.panel(size, "frequency, Hz", "xy", title="Bandwidth against amplitude")
-    _bandwidths(panel, amplitude_bode, scale, unit, full)
+    _bandwidths(panel, amplitude_bode, scale, full)
     caption = (
         "Fundamental of the output relative to the command at several amplitudes, simulated at no load with "
         "friction and limits. Right: frequencies of −3 dB and −90° against amplitude. Gaps: not steady."
@@ -191,12 +186,11 @@ def _bode_figure(amplitude_bode: AmplitudeBode, scale: float, unit: str, full: f
     return doc.figure("amplitude_bode", chart, caption)
 
 
-def _bandwidths(panel: style.Panel, result: AmplitudeBode, scale: float, unit: str, full: float) -> None:
-    pairs = (
+def _bandwidths(panel: style.Panel, result: AmplitudeBode, scale: float, full: float) -> None:
+    for values, level, label, colour, marker, dash in (
         (result.minus3db_hz, result.linear_minus3db_hz, "−3 dB", style.GREEN, "o", 0),
         (result.minus90deg_hz, result.linear_minus90deg_hz, "−90°", style.PURPLE, "D", 1),
-    )
-    for values, level, label, colour, marker, dash in pairs:
+    ):
         sizes = scale * result.all_amplitude_rad
         panel.curve(sizes, values, label, colour=colour, marker=marker, size=5.0, dash=dash)
         if level is not None and math.isfinite(level):
@@ -213,15 +207,14 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, design: 
         doc.column("note", "Note"),
     ]
     rows: list[tuple[object, ...]] = []
-    for fraction, amplitude in zip(amplitude_bode.fractions, amplitude_bode.amplitude_rad, strict=True):
-        k = int(np.argmin(np.abs(amplitude_bode.all_amplitude_rad - amplitude)))
-        note = "" if math.isfinite(amplitude_bode.minus3db_hz[k]) else f"−3 dB {_between(amplitude_bode, k)}"
-        if amplitude_bode.below_from_start[k]:
-            note = f"below −3 dB at {amplitude_bode.frequency_hz[0]:.3g} Hz and above"
-        corners = (amplitude_bode.minus3db_hz[k], amplitude_bode.minus90deg_hz[k])
-        rows.append((100.0 * fraction, scale * amplitude, *corners, note))
-    corners = (amplitude_bode.linear_minus3db_hz, amplitude_bode.linear_minus90deg_hz)
-    rows.append((None, None, *corners, _linear(design)))
+    of = amplitude_bode
+    for fraction, amplitude in zip(of.fractions, of.amplitude_rad, strict=True):
+        k = int(np.argmin(np.abs(of.all_amplitude_rad - amplitude)))
+        note = "" if math.isfinite(of.minus3db_hz[k]) else f"−3 dB {_between(of, k)}"
+        if of.below_from_start[k]:
+            note = f"below −3 dB at {of.frequency_hz[0]:.3g} Hz and above"
+        rows.append((100.0 * fraction, scale * amplitude, of.minus3db_hz[k], of.minus90deg_hz[k], note))
+    rows.append((None, None, of.linear_minus3db_hz, of.linear_minus90deg_hz, _linear(design)))
     left_out = sorted({*design.validation.amplitude_fractions} - {*amplitude_bode.fractions})
     shares = ", ".join(f"{100.0 * fraction:g} %" for fraction in left_out)
     note = f"Not on the coarser grid of the map: {shares}." if left_out else ""
@@ -229,7 +222,6 @@ def _bode_table(amplitude_bode: AmplitudeBode, scale: float, unit: str, design: 
 
 
 def _sawtooth_blocks(sawtooth: Sawtooth, design: Design, scale: float, unit: str) -> list[doc.Block]:
-    """Make the sawtooth, or say why there is none."""
     if not sawtooth.runs:
         return [doc.text(f"Sawtooth: not applicable, {sawtooth.reason}.")]
     limit = scale * sawtooth.rate_limit_rad_s

@@ -38,16 +38,16 @@ def section(design: Design, border: Onset) -> doc.Section:
     blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption)]
     blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words = _result(rows, unit) if rows else _least(border, scale, unit)
-    return doc.section(
-        "limits", "Validity of the linear model", blocks, result=words, intro=intro, told="info"
+    words, title = (
+        _result(rows, unit) if rows else _least(border, scale, unit),
+        "Validity of the linear model",
     )
+    return doc.section("limits", title, blocks, result=words, intro=intro, told="info")
 
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
-    chart = style.Chart(
-        width=style.WIDE, height=370.0, legend=True, legend_title="limit reached at this amplitude"
-    )
+    title = "limit reached at this amplitude"
+    chart = style.Chart(width=style.WIDE, height=370.0, legend=True, legend_title=title)
     panel = chart.panel(y=f"command amplitude, {unit}", log="y")
     hertz = border.omega_rad_s / (2.0 * np.pi)
     lowest = scale * border.amplitude_rad
@@ -74,7 +74,6 @@ def _full(design: Design) -> float:
 
 
 def _result(rows: Sequence[_Linear], unit: str) -> str:
-    """Say how far the largest command of the table stays linear."""
     row = max(rows, key=lambda row: row.amplitude)
     part = "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
     size = f"{part} ({row.amplitude:.3g} {unit})"
@@ -84,7 +83,6 @@ def _result(rows: Sequence[_Linear], unit: str) -> str:
 
 
 def _least(border: Onset, scale: float, unit: str) -> str:
-    """Say of a drive whose command is no position where the least command reaches a limit."""
     if not np.isfinite(border.amplitude_rad).any():
         return "No limit is reached by a sine command over the whole frequency range."
     k = int(np.argmin(border.amplitude_rad))
@@ -105,8 +103,6 @@ def words_of(limiter: str) -> str:
 
 @dataclass(frozen=True)
 class _Linear:
-    """Up to which frequency one command amplitude passes unlimited."""
-
     amplitude: float
     fraction: float
     hz: float | None
@@ -114,7 +110,6 @@ class _Linear:
 
 
 def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
-    """List the highest frequency at which each command amplitude still passes unlimited."""
     rows: list[_Linear] = []
     for fraction in design.validation.amplitude_fractions if _full(design) else ():
         amplitude = fraction * _full(design)

@@ -60,7 +60,6 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
 
 
 def result(figures: LoopFigures) -> str:
-    """Say in one sentence what the loop is like."""
     row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
     parts = [
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
@@ -88,10 +87,12 @@ def _intro(name: str, figures: LoopFigures) -> str:
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
-    known = [(each, _short(shown(each, figures), each.at_a_glance)) for each in AT_A_GLANCE]
-    chosen = [doc.fact(of.label, value, of.shown[0], better=of.direction) for of, value in known]
+    items = []
+    for of in AT_A_GLANCE:
+        value = _short(shown(of, figures), of.at_a_glance)
+        items.append(doc.fact(of.label, value, of.shown[0], better=of.direction))
     crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
-    return doc.facts([*chosen, doc.fact("Gain crossover", crossover, "Hz")])
+    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
 
 
 def _short(value: float | None, format: str) -> float | None:
@@ -106,10 +107,8 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
     """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
-    asked = [item for item in design.requirements if item.quantity == "sensitivity_peak"]
-    limits = [
-        item.maximum for item in asked if item.loop in (name, "every", None) and item.maximum is not None
-    ]
+    asked = [one for one in design.requirements if one.quantity == "sensitivity_peak"]
+    limits = style.known(one.maximum for one in asked if one.loop in (name, "every", None))
     grid_hz, values = grid / (2.0 * np.pi), []
     chart = style.Chart(width=style.HALF, height=225.0, loop=name)
     panel = chart.panel(y="magnitude, dB")
@@ -146,9 +145,9 @@ def step(
     title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
 ) -> doc.Block:
     """Draw the step responses, as stairs where sampled, and the figures read from the first."""
-    figures = loop_figures.step
+    figures, end = loop_figures.step, None
     assert figures is not None
-    end, drawn = None, {"rotor free" if locked else "closed loop": loop_figures}
+    drawn = {"rotor free" if locked else "closed loop": loop_figures}
     if locked is not None and locked.step is not None:
         end = 4.0 * float(locked.step.settling_time_s)  # the motor's own motion goes on for much longer
         drawn["rotor locked"] = locked

@@ -103,7 +103,6 @@ def both(
     top_room: float = 0.06,
     look: Callable[[int], style.Style] = style.series,
 ) -> None:
-    """Draw magnitude and phase of every curve, with axes and the Nyquist line."""
     for k, (label, one) in enumerate(curves):
         top.curve(one.frequency_hz, one.magnitude_db, label, **look(k))
         bottom.curve(one.frequency_hz, one.phase_deg, label, **look(k))
@@ -120,7 +119,6 @@ def both(
 def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> doc.Block:
-    """Draw the closed loop and mark both bandwidths and the resonance."""
     other, band = figures.reference, figures.bandwidth
     first = "rotor free" if locked else "to the command" if other else "closed loop"
     curves = [(first, answer_curve(figures, grid))]

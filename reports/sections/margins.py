@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
@@ -43,7 +44,6 @@ def _at(name: str) -> Callable[[LoopFigures], float | None]:
 
 
 def _state(figures: LoopFigures) -> doc.State:
-    """Say whether a loop is stable, or unstable only by itself."""
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
     return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
@@ -58,13 +58,14 @@ def _samples(figures: LoopFigures) -> float | None:
     return delay.samples if delay and figures.margins.stable else None
 
 
+HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
     doc.of(_evidence, "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
-    doc.of(_at("gain_margin"), "gain_margin_hz", "at", "Hz", format="sig:4"),
+    doc.of(_at("gain_margin"), "gain_margin_hz", "at", **HERTZ),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
-    doc.of(_at("phase_margin"), "crossover_hz", "at", "Hz", format="sig:4"),
+    doc.of(_at("phase_margin"), "crossover_hz", "at", **HERTZ),
     _figure("delay_margin", "delay_margin_ms", "ms:3"),
     doc.of(_samples, "delay_margin_samples", "", "samples", format="sig:3", better=1),
     _figure("modulus_margin", "modulus_margin", "fix:3"),
@@ -75,13 +76,7 @@ RESPONSES = [
     _figure("bandwidth", "minus3db_hz", "sig:4"),
     _figure("bandwidth_90deg", "minus90deg_hz", "sig:4"),
     _figure("resonance_peak", "resonance_db", "fix:2"),
-    doc.of(
-        lambda f: (f.bandwidth and f.bandwidth.resonance_hz) or None,
-        "resonance_hz",
-        "at",
-        "Hz",
-        format="sig:4",
-    ),
+    doc.of(lambda f: (f.bandwidth and f.bandwidth.resonance_hz) or None, "resonance_hz", "at", **HERTZ),
     doc.of("peaks.complementary_db", "t_peak_db", "Peak of T", "dB", format="fix:2", better=-1),
     _figure("rise_time", "rise_ms", "ms:3"),
     _figure("overshoot", "overshoot_percent", "fix:1"),
@@ -111,7 +106,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}. {judged['result']}"
+    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
     said += _below_custom(result)
@@ -119,7 +114,6 @@ def section(result: Margins) -> list[doc.Section]:
 
 
 def brief(result: Margins) -> Brief:
-    """The tables as one, a column a loop."""
     first, judged = section(result)
     known = _named(result)
     every, own = with_held(known), with_own_margins(with_held(known))
@@ -162,18 +156,33 @@ def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
-    """Say which loops are not stable; or that all are, and which only with the rotor or load held."""
-    unstable = [name for name, one in named.items() if one.sound is False]
-    unknown = [name for name, one in named.items() if one.sound is None]
-    if unstable or unknown:
-        words = f"not stable: {', '.join(unstable)}" if unstable else ""
-        return words or f"stability not known: {', '.join(unknown)}"
+    for words, sound in (("not stable", False), ("stability not known", None)):
+        if names := [name for name, one in named.items() if one.sound is sound]:
+            return f"{words}: {', '.join(names)}"
     held = [
         f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
         for label, one in named.items()
         if one.held is not None
     ]
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
+
+
+def _elsewhere(result: Margins) -> str:
+    """Name the operating points at which a loop that is stable as asked for is not."""
+    places: dict[str, list[str]] = {}
+    for point in result.operating_points:
+        for name, one in point.figures.items():
+            if one.sound is False and name in result.loops and result.loops[name].sound:
+                places.setdefault(point.place or "sliding", []).append(LOOPS[name])
+    return "".join(f"; not stable {place}: {', '.join(names)}" for place, names in places.items())
+
+
+def _cogging(result: Margins) -> str:
+    """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
+    away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
+    unstable = any(one.sound is False for one in result.loops.values())
+    words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
+    return words if unstable and away else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
@@ -244,7 +253,6 @@ def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
 
 
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
-    """Give the reason of every loop whose margins are not certified."""
     known = [(name, one.margins) for name, one in named.items()]
     return [f"{name}, {m.evidence}: {m.evidence_reason}." for name, m in known if m.evidence != "certified"]
 
@@ -359,7 +367,6 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def response_row(figures: LoopFigures) -> Tree:
-    """Give bandwidth, resonance and step of one loop by column."""
     return {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
 
 
@@ -398,11 +405,9 @@ def worst_status(stable: Iterable[bool | None]) -> doc.Status:
 
 
 def finite(value: float | None) -> float | None:
-    """Give a number, or nothing where there is none or no bound."""
     return None if value is None or not math.isfinite(value) else float(value)
 
 
 def times(value: float | None, factor: float) -> float | None:
-    """Give a number in another unit, or nothing."""
     known = finite(value)
     return None if known is None else known * factor

@@ -12,7 +12,7 @@ from reports.sections.names import LOOPS, hertz
 
 if TYPE_CHECKING:
     from actuator_lti.margins.results import StabilityMargins
-    from analyses.margins.measured import Measured
+    from analyses.margins.run import Measured
 
 
 def words(one: Measured) -> str:

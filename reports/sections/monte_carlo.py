@@ -10,9 +10,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.statistics import ColumnStatistics
-from analyses.specification.requirements import RequirementVerdict
+from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, or_none
@@ -26,7 +24,10 @@ _SHOWN = (1, 5, 50, 95, 99)  # per cent
 
 def section(result: MonteCarloResult) -> doc.Section:
     items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
-    items += [_not_sampled(one) for one in result.left_out]
+    for one in result.left_out:  # not sampled
+        words, waiver = f"{label(one)}: met within the tolerances", one.waiver.words if one.waiver else ""
+        id = f"tolerance/{one.id}"
+        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
     blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
@@ -59,7 +60,6 @@ def text(result: MonteCarloResult | Design) -> str | None:
 
 
 def _result(result: MonteCarloResult) -> str:
-    """Say how many samples meet everything, and which requirement fails most often."""
     words = f"{result.tally.words('requirements')} under tolerances"
     each = {odds.id: odds for odds in result.odds}
     if (every := each.pop("all", None)) is None:
@@ -76,27 +76,14 @@ def _result(result: MonteCarloResult) -> str:
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     wanted = 1.0 if result.at_least is None else result.at_least
-    passed = result.judged(odds) is Verdict.MET
+    passed, share = result.judged(odds) is Verdict.MET, odds.probability
     reason = "" if passed else _why(odds, result.case(odds))
     if result.at_least is not None:
-        reason = f"{100 * odds.low:.3f} % with 95 % confidence"
+        share, reason = odds.low, f"{100 * odds.low:.3f} % with 95 % confidence"
     return doc.verdict(
-        f"tolerance/{odds.id}",
-        f"{capital(odds.label)}: met within the tolerances",
-        value=100.0 * odds.probability,
-        limit=100.0 * wanted,
-        unit="%",
-        distance=100.0 * ((odds.low if result.at_least is not None else odds.probability) - wanted),
-        passed=passed,
-        reason=reason,
-        comparison=">=",
-    )
-
-
-def _not_sampled(one: RequirementVerdict) -> doc.VerdictItem:
-    return doc.verdict(
-        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", passed=None, reason=one.reason,
-        waiver=one.waiver.words if one.waiver else "",
+        f"tolerance/{odds.id}", f"{capital(odds.label)}: met within the tolerances", unit="%",
+        value=100.0 * odds.probability, limit=100.0 * wanted, distance=100.0 * (share - wanted),
+        passed=passed, reason=reason, comparison=">=",
     )  # fmt: skip
 
 
@@ -233,15 +220,11 @@ def _driver(place: int, item: tuple[str, list[Driver]]) -> str:
 
 
 def _worst_table(result: MonteCarloResult) -> doc.Block:
-    columns = [
-        doc.of("requirement", "requirement", "Worst case for"),
-        doc.of(lambda case: "" if case.file is None else case.file.name, "file", "Design file"),
-    ]
-    for k, path in enumerate(result.paths):
-        columns.append(doc.of(partial(_parameter, path), f"p{k}", path, format="sig:5"))
+    columns = [doc.column("requirement", "Worst case for"), doc.column("file", "Design file")]
+    columns += [doc.column(f"p{k}", path, format="sig:5") for k, path in enumerate(result.paths)]
+    rows = []
+    for case in result.worst:
+        values = (case.parameters[path] for path in result.paths)
+        rows.append((case.requirement, "" if case.file is None else case.file.name, *values))
     note = "Each is saved as a design that `report` opens."
-    return doc.listing("Worst designs, SI values", result.worst, columns, note)
-
-
-def _parameter(path: str, case: WorstCase) -> float:
-    return case.parameters[path]
+    return doc.table("Worst designs, SI values", columns, rows, note)

@@ -20,7 +20,6 @@ QUANTITIES = {name: quantity.words for name, quantity in REGISTRY.items()}
 
 
 def loop_words(name: str, rotor: str = "free") -> str:
-    """Name a loop; of the current loop there are two."""
     return f"{LOOPS[name]}, rotor {rotor or 'free'}" if name == "current" else LOOPS[name]
 
 

@@ -16,6 +16,7 @@ GRADES = (
     "Grades: A maker's document or standard text; B file of a real device or a consistent second source; "
     "C community transcription; D derived; X assumed, to be replaced by whoever has the figure."
 )
+NO_RECORD = "The design carries no record of where its values come from."
 COLUMNS = [
     doc.of("path", "path", "Key"),
     doc.of("symbol", "symbol", "Symbol"),
@@ -46,21 +47,16 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
     if design.facts:
         facts = doc.listing("Facts", design.facts, FACTS)
         blocks.append(doc.details("Facts that enter no equation", [facts]))
-    status: doc.Status = "warn" if warnings else "info"
     findings = [doc.Finding(severity="warn", text=f"{words}.", where="parameters") for words in warnings]
-    ungraded = sum(not item.grade for item in parameters)
-    result = (
-        f"{len(parameters)} values; {assumed} of them assumed (grade X), {ungraded} without a grade."
-        if parameters
-        else "The design carries no record of where its values come from."
-    )
+    ungraded, result = sum(not item.grade for item in parameters), NO_RECORD
+    if parameters:
+        result = f"{len(parameters)} values; {assumed} of them assumed (grade X), {ungraded} without a grade."
     if assumed:
         told = f"{assumed} of {len(parameters)} values are assumed."
         findings.append(doc.Finding(severity="info", text=told, where="parameters"))
     return doc.section(
         "parameters", "Parameters and their sources", blocks, result=result,
-        intro=GRADES if parameters else "",
-        status=status, findings=findings,
+        intro=GRADES if parameters else "", status="warn" if warnings else "info", findings=findings,
     )  # fmt: skip
 
 
@@ -97,21 +93,20 @@ def provenance(
     design: Mapping[str, Any], head: Mapping[str, Any], findings: Sequence[doc.Finding] = ()
 ) -> doc.Section:
     """Make the section of provenance from the document's own head."""
-    rows = [
-        ("design", f"{design['name']}, revision {design['revision'] or 'none'}"),
-        ("design file", design["origin"] or "none"),
-        ("hash of the design (SHA-256)", head["design_hash"]),
-        ("actuator-lti", head["version"]),
-        ("commit", head["commit"] or "not built from a git tree"),
-        ("built", head["time"]),
-        ("Python", f"{head['python']}, {head['platform']}"),
-        *head["libraries"].items(),
-    ]
+    rows = {
+        "design": f"{design['name']}, revision {design['revision'] or 'none'}",
+        "design file": design["origin"] or "none",
+        "hash of the design (SHA-256)": head["design_hash"],
+        "actuator-lti": head["version"],
+        "commit": head["commit"] or "not built from a git tree",
+        "built": head["time"],
+        "Python": f"{head['python']}, {head['platform']}",
+        **head["libraries"],
+    }
     columns = [doc.column("what", "What"), doc.column("value", "Value")]
-    blocks = [
-        doc.details("To build this report again", [doc.table("Design, program and libraries", columns, rows)])
-    ]
-    result = (
+    table = doc.table("Design, program and libraries", columns, rows.items())
+    words = (
         f"Computed by actuator-lti {head['version']} from the design with hash {head['design_hash'][:12]}."
     )
-    return doc.section("provenance", "Provenance", blocks, result=result, findings=findings)
+    blocks = [doc.details("To build this report again", [table])]
+    return doc.section("provenance", "Provenance", blocks, result=words, findings=findings)

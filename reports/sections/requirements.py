@@ -32,7 +32,6 @@ def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> d
 
 
 def result(verdicts: Sequence[RequirementVerdict]) -> str:
-    """Say how many requirements are met, and which are not, or not proven."""
     said = [f"{tally(verdicts).words('requirements')}."]
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         names = [label(one) + (" (waived)" if one.waiver else "") for one in verdicts if one.verdict == word]
@@ -46,24 +45,16 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
+    waiver = verdict.waiver.words if verdict.waiver else ""
     made = doc.verdict(
-        verdict.id,
-        label(verdict, load_unit),
-        value=verdict.value,
-        limit=limit,
-        comparison=comparison,
-        unit=unit_words(requirement.unit),
-        distance=verdict.distance,
-        passed=None,
-        source=source,
-        reason=verdict.reason or unlimited,
-        waiver=verdict.waiver.words if verdict.waiver else "",
-    )
+        verdict.id, label(verdict, load_unit), value=verdict.value, limit=limit, comparison=comparison,
+        unit=unit_words(requirement.unit), distance=verdict.distance, passed=None, source=source,
+        reason=verdict.reason or unlimited, waiver=waiver,
+    )  # fmt: skip
     return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
 
 
 def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
-    """Say what is required of what, in words."""
     requirement = verdict.requirement
     what = QUANTITIES.get(requirement.quantity, requirement.quantity)
     if verdict.loop is not None:
@@ -82,7 +73,6 @@ def limit_words(of: Requirement | Odds) -> str:
 
 
 def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:
-    """Give the limit that is nearer, and the side that is good."""
     low, high = verdict.requirement.minimum, verdict.requirement.maximum
     if low is None:
         return high, "<="

@@ -14,7 +14,7 @@ from actuator_lti.files.tree import Tree
 from analyses.motion.run import Motion
 from analyses.motion.settling import conduct, summary
 from nonlinear import Trajectory
-from nonlinear.runs.trajectory import COMMAND_UNITS, LimitUse
+from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
 from reports.charts.svg import paper_svg
@@ -56,8 +56,7 @@ def _table(run: Trajectory) -> doc.Block:
         elif isinstance(value, float):
             rows += _in_words(name, value)
     events = f"stick-slip events (at most {run.events_per_tick} in one tick)"
-    rows.append({"what": events, "value": run.events, "unit": ""})
-    return doc.table("What happened", COLUMNS, rows)
+    return doc.table("What happened", COLUMNS, [*rows, {"what": events, "value": run.events, "unit": ""}])
 
 
 COLUMNS = [
@@ -86,17 +85,18 @@ def _in_words(name: str, value: float) -> list[doc.Row]:
 
 
 def _limits(run: Trajectory) -> doc.Block:
-    def stated(pair: tuple[str, LimitUse]) -> bool:
-        return bool(np.isfinite(pair[1].limit))
-
     columns = [
-        doc.of(lambda pair: pair[0], "name", "Limit"),
-        doc.of(lambda pair: pair[1].limit if stated(pair) else "none", "limit", "Value", format="short:6"),
-        doc.of(lambda pair: pair[1].unit if stated(pair) else "", "unit", "Unit"),
-        doc.of(lambda pair: 100.0 * pair[1].fraction, "share", "Acts, of the time", "%", format="short:3"),
-        doc.of(lambda pair: pair[1].first_time_s, "first", "First at", "s", format="short:6"),
+        doc.column("name", "Limit"),
+        doc.column("limit", "Value", format="short:6"),
+        doc.column("unit", "Unit"),
+        doc.column("share", "Acts, of the time", "%", format="short:3"),
+        doc.column("first", "First at", "s", format="short:6"),
     ]
-    return doc.listing("Limits", run.limits.items(), columns)
+    rows = []
+    for name, use in run.limits.items():
+        value = (use.limit, use.unit) if np.isfinite(use.limit) else ("none", "")
+        rows.append((name, *value, 100.0 * use.fraction, use.first_time_s))
+    return doc.table("Limits", columns, rows)
 
 
 def _energy(run: Trajectory) -> doc.Block:
@@ -142,8 +142,13 @@ def chart_of(run: Trajectory) -> style.Chart:
         # the command lies under the response: drawn last in the list, first on the paper
         for k, (name, values) in reversed(list(enumerate(signals))):
             panel.curve(time, values[rows], name, width=2.0 if k == 0 else 1.5, **style.series(k))
-        if limiters and np.isfinite(limit := run.limits[limiters[0].name].limit):
-            _limit(panel, limit, max(np.abs(v[rows]).max() for _, v in signals))
+        limit = run.limits[limiters[0].name].limit if limiters else np.inf
+        if limit <= 4.0 * max(np.abs(v[rows]).max() for _, v in signals):  # within reach of the signals
+            panel.y.see([-limit, limit])
+            for sign in (1.0, -1.0):
+                panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
+        elif np.isfinite(limit):
+            panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
     panels[-1].x.limits(time[0], time[-1])
     return chart
 
@@ -155,16 +160,6 @@ def _limiters(*signals: str) -> Acting:
 
 def _scaled(signals: Signals, factor: float) -> Signals:
     return [(name, factor * values) for name, values in signals]
-
-
-def _limit(panel: style.Panel, limit: float, peak: float) -> None:
-    """Draw both signs of the limit where it lies within reach of the signals."""
-    if limit > 4.0 * peak:
-        panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
-        return
-    panel.y.see([-limit, limit])
-    for sign in (1.0, -1.0):
-        panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
 
 
 def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> list[list[float]]:

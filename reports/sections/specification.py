@@ -32,14 +32,11 @@ def section(result: Specification) -> doc.Section:
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
         "with it. Output side unless a column says motor."
     )
-    findings = _findings(result)
-    return doc.section(
-        "specification", "Actuator figures", blocks, result=_result(result), intro=intro, findings=findings
-    )
+    words, told = _result(result), _findings(result)
+    return doc.section("specification", "Actuator figures", blocks, result=words, intro=intro, findings=told)
 
 
 def _result(result: Specification) -> str:
-    """Say what the drive can do at the largest load."""
     scale, unit = output_unit(result.design.axis)
     one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
     if one is None:
@@ -48,26 +45,17 @@ def _result(result: Specification) -> str:
         (one.figures.output_rate_rad_s, one.simulated_rate_rad_s, f"{unit}/s"),
         (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, f"{unit}/s²"),
     )
-    parts = [
-        f"{significant(scale * value)} {per}{_unlike(value, found, scale)}"
-        for value, found, per in both
-        if value is not None and math.isfinite(value)
-    ]
-    return (
-        f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the output reaches "
-        f"{' and '.join(parts)}.{_commanded(result.design)}"
-    )
-
-
-def _unlike(value: float, simulated: float | None, scale: float) -> str:
-    """What the simulation shows, where it is not the closed form."""
-    if simulated is None or abs(simulated - value) <= ALIKE * abs(value):
-        return ""
-    return f" (simulated {significant(scale * simulated)})"
+    parts = []
+    for value, found, per in both:
+        if value is not None and math.isfinite(value):
+            unlike = found is not None and abs(found - value) > ALIKE * abs(value)
+            also = f" (simulated {significant(scale * found)})" if found is not None and unlike else ""
+            parts.append(f"{significant(scale * value)} {per}{also}")
+    load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
+    return f"At {load} load the output reaches {' and '.join(parts)}.{_commanded(result.design)}"
 
 
 def _commanded(design: Design) -> str:
-    """What the profile of the command asks for at most."""
     scale, unit = output_unit(design.axis)
     limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
     parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
@@ -75,14 +63,13 @@ def _commanded(design: Design) -> str:
 
 
 def _findings(result: Specification) -> list[doc.Finding]:
-    """Name the loads at which the drive cannot run without pause."""
-    words = [
-        f"At {one.figures.load_Nm:g} {load_unit(result.design)} load the continuous current allows a duty of "
-        f"{100.0 * one.duty:.0f} %."
-        for one in result.capabilities
-        if one.duty is not None and one.duty < 0.995
-    ]
-    return [doc.Finding(severity="warn", text=text, where="specification") for text in words]
+    made = []
+    for one in result.capabilities:
+        if one.duty is not None and one.duty < 0.995:
+            load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
+            text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
+            made.append(doc.Finding(severity="warn", text=text, where="specification"))
+    return made
 
 
 def _capability_table(result: Specification) -> doc.Block:
@@ -127,7 +114,9 @@ def _planes(result: Specification) -> list[doc.Block]:
         title = f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}"
         chart = style.Chart(width=style.WIDE, height=400.0, title=title, legend=True)
         panel = chart.panel(speed_label, torque_label, by_point=True)
-        widest, top = fast * _fastest(result, moves), strong * _top(result, moves)
+        level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
+        top = strong * float(max([*level, *(move.peak_torque_Nm for move in moves)], default=1.0))
+        widest = fast * _fastest(result, moves)
         panel.x.limits(-0.02 * widest, widest)
         panel.y.limits(-1.12 * top, 1.25 * top)
         panel.rule_y(0.0)
@@ -172,11 +161,6 @@ def _bound(
     if seen.size:
         k = seen[seen.size // 2]
         panel.note(name, (float(speed[k]), float(torque[k])), colour=look["colour"])
-
-
-def _top(result: Specification, moves: list[Any]) -> float:
-    level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
-    return float(max([*level, *(move.peak_torque_Nm for move in moves)], default=1.0))
 
 
 def _fastest(result: Specification, moves: list[Any]) -> float:

@@ -47,7 +47,6 @@ def _push(result: Stiffness) -> str:
 
 
 def _result(result: Stiffness, unit: str) -> str:
-    """Say the static stiffness, where the drive is weakest, and what was compared with the simulator."""
     powered = result.curves[0]
     words = f"A load {_push(result)} does not move the output of this drive"
     if np.isfinite(powered.stiffness_Nm_rad).any():
@@ -60,7 +59,6 @@ def _result(result: Stiffness, unit: str) -> str:
 
 
 def _compared(result: Stiffness) -> str:
-    """What was put to the simulator, and how far it is off; or why it could not be."""
     if not result.checks:
         return f"nothing is compared: {result.unproven}" if result.unproven else ""
     most = max(check.difference for check in result.checks)
@@ -91,13 +89,12 @@ def _table(result: Stiffness, unit: str) -> doc.Block:
     infinite = any(math.isinf(value) for one in result.curves for value in (one.static_Nm_rad, one.least[0]))
     note = "Infinite: the output comes back to its place, or does not move at all." if infinite else ""
     static: dict[str, Any] = {"unit": unit, "format": "sig:4", "better": 1}
+    hertz: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
     columns = [
         doc.of(lambda one: STATES[one.state], "state", "State"),
         doc.of(lambda one: _or_infinite(one.static_Nm_rad), "static", "Static", **static),
         doc.of(lambda one: _or_infinite(one.least[0]), "least", "Least", **static),
-        doc.of(
-            lambda one: one.least[1] if one.least[0] < math.inf else None, "at", "at", "Hz", format="sig:4"
-        ),
+        doc.of(lambda one: one.least[1] if one.least[0] < math.inf else None, "at", "at", **hertz),
     ]
     return doc.listing("Stiffness by state", result.curves, columns, note)
 
@@ -129,10 +126,9 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
     )
+    of_load = load_unit(result.design)
     columns = [
-        doc.of(
-            "moment_Nm", "moment", f"Load {_push(result)}, peak", load_unit(result.design), format="sig:3"
-        ),
+        doc.of("moment_Nm", "moment", f"Load {_push(result)}, peak", of_load, format="sig:3"),
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
     ]
@@ -145,12 +141,11 @@ def _checks(result: Stiffness, unit: str) -> doc.Block:
         "friction by load: predicted here is the linear stiffness of that drive, without that "
         "friction, which the curves have."
     )
+    size: dict[str, Any] = {"unit": unit, "format": "sig:6"}
     columns = [
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:4"),
-        doc.of(
-            lambda one: _or_infinite(abs(one.foreseen_Nm_rad)), "foreseen", "Predicted", unit, format="sig:6"
-        ),
-        doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", unit, format="sig:6"),
+        doc.of(lambda one: _or_infinite(abs(one.foreseen_Nm_rad)), "foreseen", "Predicted", **size),
+        doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", **size),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
     ]
     return doc.listing("Small loads", result.checks, columns, note)

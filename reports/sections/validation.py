@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any, cast
 
@@ -42,29 +42,28 @@ NOISE = 1e-9  # of the value: a smaller error changes with the order in which su
 
 
 def section(validation: Validation) -> list[doc.Section]:
-    made = [summary(validation), *in_time.sections(validation)]
+    made, axis = [summary(validation), *in_time.sections(validation)], validation.design.axis
     if validation.rest_sweep is not None:
-        made += beyond.from_rest(validation.rest_sweep, validation.design.axis)
+        made += beyond.from_rest(validation.rest_sweep, axis)
     if validation.conditional is not None:
-        made.append(beyond.large_commands(validation.conditional, validation.design.axis))
+        made.append(beyond.large_commands(validation.conditional, axis))
     if validation.counts:
-        made.append(beyond.counts(validation.counts, validation.design.axis))
-    shown: list[tuple[Callable[[Any], doc.Section], Any]] = [
-        (large_signal.section, validation.large_signals),
-        (friction_effects.section, validation.friction),
-        (specification.section, validation.specification),
-    ]
-    return [*made, *(make(result) for make, result in shown if result is not None)]
+        made.append(beyond.counts(validation.counts, axis))
+    if validation.large_signals is not None:
+        made.append(large_signal.section(validation.large_signals))
+    if validation.friction is not None:
+        made.append(friction_effects.section(validation.friction))
+    if validation.specification is not None:
+        made.append(specification.section(validation.specification))
+    return made
 
 
 def brief(validation: Validation) -> Brief:
     """The verdict, why it is none where it is none, and every check by loop."""
     made = section(validation)
     shown = ("quantity", "predicted", "found", "unit", "error", "allowed", "verdict")
-    items = [item for part in made for item in doc.judged(part["blocks"])]
-    said = [
-        f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items if item["verdict"] != "met"
-    ]
+    items = [item for part in made for item in doc.judged(part["blocks"]) if item["verdict"] != "met"]
+    said = [f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items]
     large = [part["result"] for part in made if part["id"] == "conditional"]
     grouped = by_loop(validation.rows).items()
     tables = [doc.with_columns(table(rows, loop_name(name)), shown) for name, rows in grouped]
@@ -92,7 +91,6 @@ def summary(validation: Validation) -> doc.Section:
 
 
 def result(validation: Validation) -> str:
-    """Say how many predictions are met, and what the drive does that it must not."""
     words = [validation.tally.words("predictions"), *validation.failures]
     words += [f"stability of the {name} loop not known" for name in validation.undecided]
     words += [validation.rest_words] if validation.rest is not Verdict.NOT_MET else []
@@ -100,29 +98,27 @@ def result(validation: Validation) -> str:
 
 
 def findings(validation: Validation) -> list[doc.Finding]:
-    """Name what has to be watched, the gravest first."""
-    made = [
-        doc.Finding(severity="fail", text=f"{loop_words(name)}: not stable.", where="validation")
-        for name in validation.unstable
-    ]
+    def finding(severity: doc.Severity, text: str) -> doc.Finding:
+        return doc.Finding(severity=severity, text=text, where="validation")
+
+    made = [finding("fail", f"{loop_words(name)}: not stable.") for name in validation.unstable]
     for row in validation.rows:
         if row.verdict is not Verdict.MET:
             grave = row.verdict is Verdict.NOT_MET
             says = "is contradicted by the simulation" if grave else f"is not proven: {row.because}"
             text = f"{loop_name(row.loop)}: {quantity_name(row)} {says}."
-            open_one: doc.Severity = "info" if validation.waived(f"{row.loop}/{row.name}") else "warn"
-            made.append(doc.Finding(severity="fail" if grave else open_one, text=text, where="validation"))
+            waived = validation.waived(f"{row.loop}/{row.name}")
+            made.append(finding("fail" if grave else "info" if waived else "warn", text))
     if validation.rest_words:
         waived = validation.rest is Verdict.MET or waiver_of_rest(validation.design) is not None
-        told: doc.Severity = "fail" if validation.rest is Verdict.NOT_MET else "info" if waived else "warn"
-        made.insert(
-            0, doc.Finding(severity=told, text=f"{capital(validation.rest_words)}.", where="validation")
-        )
+        grave = validation.rest is Verdict.NOT_MET
+        text = f"{capital(validation.rest_words)}."
+        made.insert(0, finding("fail" if grave else "info" if waived else "warn", text))
     if validation.conditional is not None:
         made += beyond.findings_of(validation.conditional, validation.design.axis)
     if validation.design.coupling is None:
         text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
-        made.append(doc.Finding(severity="info", text=text, where="validation"))
+        made.append(finding("info", text))
     return made
 
 
@@ -133,10 +129,8 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
         items.append(_item("judged", "Predictions", None, "; ".join(validation.notes), value=0.0))
     for k, failure in enumerate(validation.failures):
         items.append(_item(f"drive-{k}", "Stable, and comes to rest", False, failure))
-    items += [
-        _item(f"stable-{name}", f"{loop_name(name)}: stable", None, "not known")
-        for name in validation.undecided
-    ]
+    open_ones = [(f"stable-{name}", f"{loop_name(name)}: stable") for name in validation.undecided]
+    items += [_item(*one, None, "not known") for one in open_ones]
     if validation.rest is Verdict.NOT_PROVEN:
         waiver = waiver_of_rest(validation.design)
         item = _item("rest", "Comes to rest after a step", None, validation.rest_words)
@@ -171,8 +165,6 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
-    """Lay checks out as a table."""
-
     def error(row: Check) -> float:
         return max(row.error, NOISE * abs(row.predicted or 1.0))  # no digits that are noise of the last bit
 

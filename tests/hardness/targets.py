@@ -160,7 +160,7 @@ def record(path: Path) -> None:
 def report(path: Path) -> None:
     from reports.document import dumps, load
     from reports.html import page
-    from reports.pdf.printable import printable
+    from reports.pdf import printable
 
     made = load(path)
     dumps(made)

@@ -18,7 +18,7 @@ from nightly_fakes import CODE, Fakes, job, study
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.monte_carlo import SampleTask
-from analyses.studies import cluster as clusters
+from analyses.studies import engine as clusters
 from analyses.studies import proof
 from analyses.studies.engine import Engine
 from reports.cli.main import main
@@ -291,7 +291,7 @@ def test_an_engine_that_cannot_be_is_refused(options, words) -> None:
 
 
 def test_a_scheduler_that_is_not_there_is_a_clear_failure(monkeypatch):
-    monkeypatch.setattr("analyses.studies.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("analyses.studies.engine.CONNECT_S", 0.5)
     with pytest.raises(NumericalError, match="127"):
         Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
 
@@ -309,7 +309,7 @@ def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
             sink(part, work(part))
 
     monkeypatch.setattr(Engine, "_client", slow_to_close)
-    monkeypatch.setattr("analyses.studies.cluster.submit", in_place)
+    monkeypatch.setattr("analyses.studies.engine.submit", in_place)
     sums = {}
     Engine(workers=1).map(sum, [(1, 2), (3, 4)], sums.__setitem__)
     assert sums == {(1, 2): 3, (3, 4): 7}

@@ -94,6 +94,8 @@ def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(sit
         summary.write_text(text)
         result = remembered(site)
         assert result == Memory("", 1, 0), text
+    summary.write_text('{"history": {"id": 3, "nights": 7, "approvals": "many"}}')
+    assert remembered(site) == Memory("", 7, 0)  # one wrong field takes none of the others along
     summary.unlink()
     assert remembered(site) == Memory("", 1, 0)
     LOSSES["the index"](site)

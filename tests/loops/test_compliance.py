@@ -11,7 +11,7 @@ from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.loops import assemble_loops
-from actuator_lti.loops.stiffness import compliance, stiffness_figures
+from actuator_lti.loops.stiffness import StiffnessFigures, compliance
 from analyses.specification.requirements import evaluate_requirements
 from nonlinear import commands, simulate
 from tests.loops.two_mass import drive_e
@@ -54,7 +54,7 @@ def test_static_stiffness_by_hand() -> None:
     """P on the motor's sensor with an integral in the velocity loop: the spring alone, 400 N m/rad; a rigid
     one comes back."""
     assert drive_figure(drive_e(), "static_stiffness") == pytest.approx(400.0, rel=1e-6)
-    assert stiffness_figures(replace(drive_e(), coupling=None)).static_stiffness_Nm_rad == np.inf
+    assert StiffnessFigures(replace(drive_e(), coupling=None)).static_stiffness_Nm_rad == np.inf
 
 
 def test_requirements_on_stiffness_and_lost_motion() -> None:

@@ -15,7 +15,7 @@ from actuator_lti.design import Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.linear.code_check import check_code
 from analyses.linear.loop_survey import survey_loops
-from analyses.tuning.rules import rule_gains
+from analyses.tuning.start import rule_gains
 from analyses.validation import validate
 from reports.live.model import live_model
 

@@ -8,6 +8,7 @@ import control
 import numpy as np
 import pytest
 from margin_truth import behind_delay, facts, unlike
+from scipy.optimize import brentq
 
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.delays.form import delay_form
@@ -60,6 +61,15 @@ def test_nested_loops_with_delays_have_as_many_unstable_poles_as_collocation_fin
         verdicts.append(m.stable)
     assert True in verdicts
     assert False in verdicts
+
+
+def test_a_far_crossing_is_listed_beside_an_end_on_the_negative_real_axis() -> None:
+    """-0.3 exp(-0.3 s)/((s + 1)(1e-8 s + 1)): at rest, and once round at w by hand, 34 dB from one."""
+    w = brentq(lambda w: 0.3 * w + math.atan(w) + math.atan(1e-8 * w) - 2.0 * math.pi, 10.0, 20.0)
+    m = stability_margins(control.tf([-0.3], np.polymul([1.0, 1.0], [1e-8, 1.0])), delay_s=0.3)
+    expected = [1.0 / 0.3, math.hypot(1.0, w) * math.hypot(1.0, 1e-8 * w) / 0.3]
+    assert [g.ratio for g in m.gain_margins] == pytest.approx(expected, rel=1e-9)
+    assert not any("left out" in note for note in m.notes)
 
 
 def test_default_band_ends_where_the_gain_stays_below_minus_40_db() -> None:

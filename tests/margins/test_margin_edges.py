@@ -6,7 +6,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
-from margin_truth import difference, truth_of
+from margin_truth import difference, towards_the_border, truth_of
 
 from actuator_lti import load_design
 from actuator_lti.batch import Population, linear_figures
@@ -150,6 +150,18 @@ def test_on_the_border_is_what_lies_there_exactly() -> None:
     assert answers[:2] == [("on the border", False, 2)] * 2
     assert answers[2:6] == [("undecided", True, 0)] * 4
     assert answers[6:] == [("unstable", False, 0)] * 2 + [("stable", False, 0)] * 2
+
+
+@pytest.mark.parametrize("k", [np.nextafter(2.0, 3.0), np.nextafter(2.0, 1.0), 2.0 - 1e-15])
+def test_a_loop_that_is_unstable_in_any_case_is_said_to_be(k: float) -> None:
+    """1 + L has the zeros of (s - 3) (s^3 + 2 s^2 + s + k): a pair on the axis for k = 2, and 3 for any k."""
+    loop = control.tf([-2.0, -6.0, k - 4.0, -3.0 * k - 1.0], [1.0, 1.0, 1.0, 1.0, 1.0])
+    for certify in (False, True):
+        m = stability_margins(loop, certify=certify)
+        assert (m.verdict, m.evidence) == ("unstable", "certified")
+        assert difference(m, truth_of(loop)) is None
+        told = {truth_of(near).unstable for near in (loop, towards_the_border(loop))}
+        assert len(told) == 2  # how many there are the data do not determine
 
 
 def test_the_sensitivity_of_an_unstable_loop_has_no_peak() -> None:

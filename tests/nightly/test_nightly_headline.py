@@ -6,8 +6,15 @@ from pathlib import Path
 import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 
-from reports.nightly.changes import Cause, Change, Comparison
-from reports.nightly.headline import cause_words, change_words, headlines, main_changes
+from reports.nightly.changes import (
+    Cause,
+    Change,
+    Comparison,
+    cause_words,
+    change_words,
+    headlines,
+    main_changes,
+)
 from reports.nightly.night import run_night
 
 
@@ -33,6 +40,8 @@ def test_the_cause_comes_first_then_the_required_figure_in_words() -> None:
     assert words == (
         "control.position.gain 90 → 120 1/s: phase margin of the position loop 62.10 → 55.30 deg"
     )
+    of_a_table = change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
+    assert of_a_table == "gain margin of Position loop 20.00 → 5.000 dB"
 
 
 def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> None:
@@ -58,11 +67,6 @@ def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
     assert cause_words(cause) == words
 
 
-def test_a_figure_of_a_table_is_named_by_column_and_row() -> None:
-    words = change_words(COMPARISON.changes[0], COMPARISON, [])
-    assert words == "gain margin of Position loop 20.00 → 5.000 dB"
-
-
 @pytest.fixture(scope="module")
 def nights(tmp_path_factory):
     """Two nights: one gain falls in two designs alike, one rises, one stays."""
@@ -77,12 +81,10 @@ def nights(tmp_path_factory):
 
 def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
     night, _ = nights
-    result = headlines(night.designs)
-    assert [len(h.designs) for h in result] == [2, 1]
-    assert result[0].worse
-    assert result[0].cause == "control.position.gain 12 → 10 1/s"
-    assert result[0].effect == "gain margin 12.00 → 10.00 dB"
-    assert not result[1].worse
+    first, second = headlines(night.designs)
+    assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
+    assert first.cause == "control.position.gain 12 → 10 1/s"
+    assert first.effect == "gain margin 12.00 → 10.00 dB"
 
 
 def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
@@ -95,14 +97,11 @@ def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
     assert "control.position.gain 12 → 10 1/s: gain margin 12.00 → 10.00 dB" in " ".join(text.split())
 
 
-def test_a_night_that_came_closer_to_a_limit_is_marked(nights) -> None:
+def test_a_night_that_came_closer_to_a_limit_is_marked_and_counted(nights) -> None:
     night, _ = nights
     strips = {d.name: [state for _, state in d.strip] for d in night.designs}
-    assert strips["one"] == ["pass", "regressed"]
-    assert strips["better"] == ["pass", "pass"]
-    assert strips["same"] == ["pass", "pass"]
-
-
-def test_counts_count_designs(nights) -> None:
-    night, _ = nights
+    assert strips == {
+        "one": ["pass", "regressed"], "two": ["pass", "regressed"], "better": ["pass"] * 2,
+        "same": ["pass"] * 2,
+    }  # fmt: skip
     assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4

@@ -16,10 +16,10 @@ from analyses.validation.row import judged
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, digest, figures_of
+from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.source import code_version, commits_between
 from reports.nightly.state import hold
 from reports.nightly.text import csv_cell, one_line
-from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
 from reports.sections.validation import table
 
@@ -124,14 +124,9 @@ def test_a_tolerance_that_is_none_is_refused(value: object) -> None:
         read_tolerances({"x": value}, "study.toml")
 
 
-def test_the_second_nightly_says_who_holds_the_lock(tmp_path) -> None:
+def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(tmp_path) -> None:
     told = pytest.raises(InputError, match=r"process \d+ on .+ since 20\d\d-.*--wait")
     with hold(tmp_path), told, hold(tmp_path):  # by another handle, as another process has
-        pass
-
-
-def test_the_lock_is_free_again_and_waiting_gets_it(tmp_path) -> None:
-    with hold(tmp_path):
         pass
     with hold(tmp_path, wait_s=5.0):
         assert (tmp_path / "holder.json").exists()

@@ -47,24 +47,19 @@ def test_every_design_gets_its_own_end(troubled) -> None:
     ends = {d.name: d.result.status for d in night.designs}
     took_s = {d.name: d.result.seconds for d in night.designs}
     assert 6.0 <= took_s["never ends"] < 15.0
-    assert ends.pop("raises") == "error"
-    assert ends.pop("never ends") == "timeout"
-    assert ends.pop("is killed") == "crash"
-    assert ends.pop("leaves") == "crash"
-    assert ends.pop("fails") == "fail"
-    assert set(ends.values()) == {"pass"}
-    assert len(ends) == 5
+    bad = {"raises": "error", "never ends": "timeout", "is killed": "crash", "leaves": "crash"}
+    good = dict.fromkeys(("first", *(f"good {k}" for k in range(4))), "pass")
+    assert ends == {**bad, "fails": "fail", **good}
+    assert workers_left() == []
 
 
 def test_the_page_and_the_exit_status_name_who_failed_and_why(troubled) -> None:
     site, night, _ = troubled
     assert not night.passed
     page = check_whole(site)
-    assert "did not end within 6 s" in page.text
-    assert "signal 9" in page.text
-    assert "ValueError: gear <b>lost</b> in line two" in page.text
-    junit = (site / "junit.xml").read_text()
-    assert 'errors="4"' in junit
+    for words in ("did not end within 6 s", "signal 9", "ValueError: gear <b>lost</b> in line two"):
+        assert words in page.text
+    assert 'errors="4"' in (site / "junit.xml").read_text()
 
 
 def test_progress_counts_to_the_end(troubled) -> None:
@@ -79,10 +74,6 @@ def workers_left() -> list[list[str]]:
 
     lines = [child.cmdline() for child in psutil.Process().children()]
     return [line for line in lines if "nightly.processes" in str(line)]
-
-
-def test_no_worker_stays_behind(troubled) -> None:
-    assert workers_left() == []
 
 
 def ends_of(build: str, tasks: list[Task]) -> dict[str, Answer]:

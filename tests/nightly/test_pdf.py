@@ -9,22 +9,10 @@ from nightly_fakes import fake_document
 from test_nightly_hostile import HOSTILE
 
 from actuator_lti.errors import InputError
+from reports import document as doc
 from reports.charts.chart import Chart
-from reports.document import (
-    column,
-    details,
-    document,
-    fact,
-    facts,
-    figure,
-    section,
-    table,
-    text,
-    verdict,
-    verdicts,
-)
-from reports.pdf import pdf_bytes, write_pdf
-from reports.pdf.printable import clean
+from reports.document import column, document, section, table, text, verdict, verdicts
+from reports.pdf import clean, pdf_bytes, write_pdf
 
 pypdf = pytest.importorskip("pypdf")
 
@@ -44,9 +32,9 @@ def rich_document(words: str = "plain words") -> dict:
     made = fake_document({"name": words, "margin": 5.0, "label": words, "requirement": words, "loop": words})
     blocks = [
         text(words + "\n\nsecond paragraph"),
-        facts([fact(words, 1.5, "V")]),
-        details(words, [text("folded")]),
-        *([figure("curves", CURVE, caption=words, alt=words)] if words == "plain words" else []),
+        doc.facts([doc.fact(words, 1.5, "V")]),
+        doc.details(words, [text("folded")]),
+        *([doc.figure("curves", CURVE, caption=words, alt=words)] if words == "plain words" else []),
     ]
     return document(
         title=words,
@@ -79,28 +67,15 @@ def test_the_cover_names_design_revision_verdicts_and_who_signs(plain) -> None:
 
 
 def test_a_dozen_requirements_still_leave_room_to_sign_on_the_cover() -> None:
-    items = [
-        verdict(
-            f"r{k}",
-            f"requirement {k}",
-            value=9.0,
-            limit=6.0,
-            unit="dB",
-            distance=3.0,
-            passed=True,
-            source="s",
-        )
-        for k in range(12)
-    ]
+    met = {"value": 9.0, "limit": 6.0, "unit": "dB", "distance": 3.0, "passed": True, "source": "s"}
+    items = [verdict(f"r{k}", f"requirement {k}", **met) for k in range(12)]
     blocks = [verdicts(items), verdicts(items[:2], what="checks"), verdicts(items[:2], what="odds")]
     made = document(
         title="A drive", subtitle="words " * 30, design={"name": "a", "revision": "B"}, provenance=ORIGIN,
         sections=[section("verdicts", "Verdicts", blocks)],
     )  # fmt: skip
     cover = words_of(read(pdf_bytes(made)).pages[0])
-    assert "12 of 12 requirements met" in cover
-    assert "requirement 11" in cover
-    assert "Signature" in cover
+    assert all(words in cover for words in ("12 of 12 requirements met", "requirement 11", "Signature"))
 
 
 def test_every_page_is_numbered(plain) -> None:

@@ -77,6 +77,4 @@ def test_the_terminal_prints_the_evidence(cli):
     loops = cli.data("margins", "ilr33-amber")["loops"]
     assert {result["evidence"] for result in loops.values()} == {"certified"}
     line = next(line for line in cli.text("margins", "ilr33-amber").splitlines() if "Margins are" in line)
-    assert (
-        line.split() == ["Margins", "are"] + ["certified"] * 4
-    )  # the current loop with the rotor free and locked
+    assert line.split() == ["Margins", "are"] + ["certified"] * 4  # the current loop, rotor free and locked

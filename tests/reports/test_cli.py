@@ -9,14 +9,8 @@ import sys
 import pytest
 import typer
 
+from actuator_lti.design.loader import design_text
 from reports.cli.app import build
-
-
-def shipped_text(name: str = "ilr33-amber") -> str:
-    """Give the text of a shipped design file."""
-    from actuator_lti.design.loader import shipped_path
-
-    return shipped_path(name).read_text(encoding="utf-8")
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
@@ -137,7 +131,8 @@ def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, cl
 
 def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
     design = tmp_path / "bad.toml"
-    design.write_text(shipped_text().replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
+    text = design_text("ilr33-amber").replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"')
+    design.write_text(text, encoding="utf-8")
     assert "rotor_inertia" in cli.refused("report", design, "--out", tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

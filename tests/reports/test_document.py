@@ -29,6 +29,11 @@ def made(**changes: Any) -> dict[str, Any]:
     return {**base, **changes}
 
 
+def holding(blocks: list[Any], **section: Any) -> str:
+    """The JSON of a document with one section."""
+    return json.dumps(made(sections=[doc.section("x", "X", blocks, **section)]))
+
+
 def test_verdicts_are_counted_wherever_they_stand() -> None:
     counts = {"met": 1, "not_met": 1, "not_proven": 1, "waived": 0}
     assert made()["verdict"] == {"verdict": "not met", "passed": False, "parts": {"requirements": counts}}
@@ -37,11 +42,8 @@ def test_verdicts_are_counted_wherever_they_stand() -> None:
 def test_checks_and_requirements_are_told_apart() -> None:
     check = doc.verdicts([judged("d", True)], what="checks")
     parts = [*made()["sections"], doc.section("two", "Two", [check])]
-    result = verdict_of(parts, "report")
-    assert verdict_words(result) == [
-        "1 of 3 requirements met, 1 not met, 1 not proven",
-        "1 of 1 checks by simulation met",
-    ]
+    said = verdict_words(verdict_of(parts, "report"))
+    assert said == ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]
 
 
 @pytest.mark.parametrize(
@@ -94,18 +96,9 @@ def test_a_document_survives_writing_and_reading() -> None:
         ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
         ("[]", "schema must be"),
         (json.dumps({"schema": doc.SCHEMA, "version": 1, "sections": []}), "version = 1"),
-        (
-            json.dumps(made(sections=[doc.section("x", "X", [{"kind": "magic"}])])),
-            r"sections\[1\].blocks\[1\].*'magic' found using 'kind'",
-        ),
-        (
-            json.dumps(made(sections=[doc.section("x", "X", [{"kind": "text"}])])),
-            r"sections\[1\].blocks\[1\].text: field required",
-        ),
-        (
-            json.dumps(made(sections=[doc.section("x", "X", [], status="good")])),
-            r"sections\[1\].status = \"good\": .*'pass', 'fail'",
-        ),
+        (holding([{"kind": "magic"}]), r"sections\[1\].blocks\[1\].*'magic' found using 'kind'"),
+        (holding([{"kind": "text"}]), r"sections\[1\].blocks\[1\].text: field required"),
+        (holding([], status="good"), r"sections\[1\].status = \"good\": .*'pass', 'fail'"),
         (json.dumps(made(sections=[doc.section("x", "X", [])] * 2)), 'section "x" occurs twice'),
     ],
 )
@@ -172,9 +165,8 @@ def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(
 @pytest.mark.parametrize("format", ["sig:0", "short:0", "ms:0", "sig", "fix:99", "sig:3x", ""])
 def test_a_column_that_no_number_can_be_written_by_is_refused(format: str) -> None:
     table = doc.table("T", [doc.column("a", "A", format=format)], [{"a": 1.5}])
-    content = json.dumps(made(sections=[doc.section("x", "X", [table])]))
     with pytest.raises(InputError, match=r"columns\[1\].format"):
-        doc.loads(content, "some.json")
+        doc.loads(holding([table]), "some.json")
 
 
 def test_numbers_carry_their_digits_and_a_true_minus() -> None:

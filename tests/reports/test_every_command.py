@@ -4,6 +4,7 @@ import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -22,11 +23,8 @@ def leaves(command: Any, path: str = "") -> dict[str, Any]:
     inner = getattr(command, "commands", None)
     if not inner:
         return {path: command}
-    return {
-        name: leaf
-        for key, sub in inner.items()
-        for name, leaf in leaves(sub, f"{path} {key}".strip()).items()
-    }
+    below = [leaves(sub, f"{path} {key}".strip()) for key, sub in inner.items()]
+    return {name: leaf for one in below for name, leaf in one.items()}
 
 
 COMMANDS = leaves(typer.main.get_command(build()))
@@ -111,22 +109,26 @@ def test_the_first_line_is_the_verdict(words: list[str], passed: bool, tmp_path,
     assert max(map(len, tables), default=0) <= 80
 
 
+@pytest.fixture
+def printed(monkeypatch, capsys) -> Callable[..., str]:
+    """What the terminal prints of a block, no line longer than its width."""
+
+    def call(width: int, block: Any) -> str:
+        monkeypatch.setenv("COLUMNS", str(width))
+        print_blocks([block])
+        out = capsys.readouterr().out
+        assert max(map(len, out.splitlines())) <= width
+        return out
+
+    return call
+
+
 @pytest.mark.parametrize("width", [30, 60, 80, 200])
-def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, monkeypatch, capsys) -> None:
-    monkeypatch.setenv("COLUMNS", str(width))
-    names = [f"Variant-{k}" for k in range(9)]
-    columns = [
-        doc.column("name", "Loop"),
-        doc.column("gain", "Gain margin", "dB"),
-        doc.column("pm", "Phase", "deg"),
-    ]
-    rows = [{"name": name, "gain": 10.5 + k, "pm": f"{k}23456789"} for k, name in enumerate(names)]
-    print_blocks([SideBySide("A head", [doc.table("A", columns, rows)])])
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= width
-    for row in rows:
-        assert row["name"] in out
-        assert row["pm"] in out
+def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, printed) -> None:
+    heads = (("name", "Loop", ""), ("gain", "Gain margin", "dB"), ("pm", "Phase", "deg"))
+    rows = [{"name": f"Variant-{k}", "gain": 10.5 + k, "pm": f"{k}23456789"} for k in range(9)]
+    out = printed(width, SideBySide("A head", [doc.table("A", [doc.column(*one) for one in heads], rows)]))
+    assert all(row["name"] in out and row["pm"] in out for row in rows)
     if width < 100:
         assert not re.search(r"^\s*\w\s*$", out, re.M)
 
@@ -156,26 +158,19 @@ def wide_table(columns: int) -> dict:
 
 @pytest.mark.parametrize("width", [40, 60, 80, 200])
 @pytest.mark.parametrize("columns", [1, 4, 12])
-def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, monkeypatch, capsys) -> None:
-    monkeypatch.setenv("COLUMNS", str(width))
+def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, printed) -> None:
     block = wide_table(columns)
-    print_blocks([block])
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= width
-    for row in block["rows"]:
-        assert all(value in out for value in row.values())
+    out = printed(width, block)
+    assert all(value in out for row in block["rows"] for value in row.values())
 
 
 @pytest.mark.parametrize("width", range(70, 140, 5))
-def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, monkeypatch, capsys) -> None:
+def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, printed) -> None:
     """A table whose headings are longer than its cells, narrower than they are, wider than the cells."""
-    monkeypatch.setenv("COLUMNS", str(width))
     labels = ["Cause", "Dry friction", "Kind", "Predicted, peak", "at", "Simulated", "at", "Verdict"]
     columns = [doc.column(f"c{k}", label, "Hz" * (3 <= k < 7)) for k, label in enumerate(labels)]
     cells = ["quantised output sensor", "left out", "attracting", "45.5", "35.3", "46.5", "30.8", "confirmed"]
-    print_blocks([doc.table("A table", columns, [{f"c{k}": cell for k, cell in enumerate(cells)}])])
-    out = capsys.readouterr().out
-    assert max(map(len, out.splitlines())) <= width
+    out = printed(width, doc.table("A table", columns, [{f"c{k}": cell for k, cell in enumerate(cells)}]))
     words = out.replace("\n", " ").lower().split()
     for word in " ".join([*labels[1:], *cells]).lower().split():  # stacked, the first column needs no name
         assert any(one.startswith(word) for one in words), word
@@ -199,18 +194,14 @@ def test_a_failed_requirement_is_in_the_first_line(cli) -> None:
 
 
 def test_the_program_runs_as_a_module() -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "reports.cli", "designs"],
-        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert "ilr33-amber" in done.stdout
-    done = subprocess.run(
-        [sys.executable, "-m", "reports.cli", "margins", "no-such-design"],
-        cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert done.stderr.count("\n") == 1
+    def ran(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "reports.cli", *words]
+        top = Path(__file__).parents[2]
+        return subprocess.run(command, cwd=top, capture_output=True, text=True, check=False)
+
+    good, bad = ran("designs"), ran("margins", "no-such-design")
+    assert (good.returncode, "ilr33-amber" in good.stdout) == (0, True)
+    assert (bad.returncode, bad.stderr.count("\n")) == (2, 1)
 
 
 def test_help_breaks_lines_at_the_width_of_the_terminal() -> None:

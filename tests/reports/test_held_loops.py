@@ -1,13 +1,11 @@
 """A load that pushes away: an inner loop alone is unstable, the drive is not, and is judged so everywhere."""
 
-import json
 from dataclasses import replace
 from math import exp
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
-from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
@@ -18,7 +16,6 @@ from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
 from analyses.validation import QUICK, validate
-from reports.cli.app import build
 
 SET = ["--set", "load.path=back-drivable", "--set"]
 PUSHED = [*SET, "load.moment_slope=1 N*m/rad"]
@@ -160,21 +157,13 @@ def test_tuning_starts_from_met_requirements() -> None:
     assert (distances > 0.0).all()
 
 
-def test_the_command_line_says_which_case_it_is() -> None:
-    run = CliRunner()
-    done = run.invoke(build(), ["margins", "ilr33-amber", *PUSHED])
-    assert done.exit_code == 0, done.output
-    first = " ".join(done.output.split())
+def test_the_command_line_says_which_case_it_is(cli) -> None:
+    first = " ".join(cli.text("margins", "ilr33-amber", *PUSHED).split())
     assert first.startswith("PASS")
     for words in ("all loops closed", "with the rotor locked", "outer loops open and rotor free"):
         assert words in first
-    done = run.invoke(build(), ["margins", "ilr33-amber", *PUSHED, "--json"])
-    made = json.loads(done.output)
-    assert (done.exit_code, made["passed"]) == (0, True)
-    assert made["loops"]["current"]["stable"] is False
-    assert made["loops"]["current"]["judged"]["how"] == "rotor locked"
-    assert made["loops"]["current"]["judged"]["stable"] is True
-    gone = [*SET, "load.moment_slope=1e9 N*m/rad"]
-    done = run.invoke(build(), ["margins", "ilr33-amber", *gone])
-    assert done.exit_code == 1
-    assert "FAIL" in done.output
+    made = cli.data("margins", "ilr33-amber", *PUSHED)
+    current = made["loops"]["current"]
+    assert (made["passed"], current["stable"]) == (True, False)
+    assert (current["judged"]["how"], current["judged"]["stable"]) == ("rotor locked", True)
+    assert "FAIL" in cli.text("margins", "ilr33-amber", *SET, "load.moment_slope=1e9 N*m/rad", status=1)

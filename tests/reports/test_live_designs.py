@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from live_page import (
-    agree,
-    command_line,
-    read,
-    same_figures,
-    saved,
-    settled,
-    type_value,
-    verdicts_agree,
-)
+from live_page import agree, command_line, read, same_figures, saved, settled, type_value, verdicts_agree
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures

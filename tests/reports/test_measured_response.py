@@ -6,7 +6,7 @@ import pytest
 
 from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.errors import InputError
-from analyses.margins.measured import measured_over
+from analyses.margins.run import measured_over
 from reports.build import report
 from reports.cli.main import main
 from reports.sections.measured import blocks, words

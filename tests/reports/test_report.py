@@ -158,20 +158,15 @@ def test_tables_have_captions_and_scoped_headers(built: Built) -> None:
     names = [tag for tag, _ in tags]
     assert names.count("table") == names.count("caption") > 8
     assert all(attributes.get("scope") in ("row", "col") for tag, attributes in tags if tag == "th")
-    assert all(
-        attributes.get("role") == "img" and attributes.get("aria-label")
-        for tag, attributes in tags
-        if tag == "svg" and attributes.get("aria-hidden") != "true"
-    )
+    drawn = [own for tag, own in tags if tag == "svg" and own.get("aria-hidden") != "true"]
+    assert all(own.get("role") == "img" and own.get("aria-label") for own in drawn)
 
 
 def test_names_from_a_design_file_stay_text() -> None:
     design = load_design("ilr33-amber")
     requirement = replace(design.requirements[0], id=HOSTILE, source=HOSTILE, note=HOSTILE)
-    parameters = {
-        path: replace(item, text=HOSTILE, source=HOSTILE)
-        for path, item in list(design.parameters.items())[:3]
-    }
+    some = list(design.parameters.items())[:3]
+    parameters = {path: replace(item, text=HOSTILE, source=HOSTILE) for path, item in some}
     names = dict.fromkeys(("name", "title", "description", "revision", "origin"), HOSTILE)
     hostile = replace(design, **names, requirements=(requirement,), parameters=parameters)
     content = page(design_report(hostile))
@@ -227,9 +222,8 @@ def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
 
 def test_a_linear_axis_is_told_in_its_own_units() -> None:
     document = design_report(load_design("emps"))
-    table = next(
-        block for part in document["sections"] if part["id"] == "operating-points" for block in part["blocks"]
-    )
+    part = next(one for one in document["sections"] if one["id"] == "operating-points")
+    table = part["blocks"][0]
     assert [column["unit"] for column in table["columns"][1:3]] == ["N", "N s/m"]
     assert table["rows"][0]["slope"] == pytest.approx(203.5034)  # viscous friction, published
 

@@ -97,19 +97,12 @@ def test_a_waiver_makes_what_is_not_proven_grey_and_nothing_else(amber: Design) 
     assert (missed.verdict, missed.waiver, missed.passes) == ("not met", None, False)
 
 
-@pytest.mark.parametrize(
-    ("keys", "words"),
-    [
-        ({"quantity": "beauty", "unit": "1", "minimum": 1.0}, "quantity = 'beauty': allowed are gain_margin"),
-        (
-            {"quantity": "bandwidth", "unit": "Hz", "minimum": 1.0, "loop": "outer"},
-            "loop = 'outer': allowed are",
-        ),
-    ],
-)
-def test_what_is_not_known_is_refused_by_name(amber: Design, keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        evaluate_requirements(with_requirement(amber, **keys))
+def test_what_is_not_known_is_refused_by_name(amber: Design) -> None:
+    with pytest.raises(InputError, match="quantity = 'beauty': allowed are gain_margin"):
+        evaluate_requirements(with_requirement(amber, quantity="beauty", unit="1", minimum=1.0))
+    outer = {"quantity": "bandwidth", "unit": "Hz", "minimum": 1.0, "loop": "outer"}
+    with pytest.raises(InputError, match="loop = 'outer': allowed are"):
+        evaluate_requirements(with_requirement(amber, **outer))
 
 
 # -- the drive's own figures, against the paper's equations by hand ------------------------------------

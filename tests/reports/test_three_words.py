@@ -107,21 +107,15 @@ def test_a_waiver_is_read_written_and_hashed_where_there_is_one() -> None:
     assert read_design_text(day, "again").waivers == (WAIVED,)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (
-            {"requirement": "cold"},
-            "waiver.cold.requirement = .*cold.*: allowed: each once: a requirement's id",
-        ),
-        ({"reason": " "}, "waiver.hot.reason"),
-        ({"date": "yesterday"}, "waiver.hot.date = .*yesterday.*: allowed: a day, YYYY-MM-DD"),
-    ],
-)
-def test_a_waiver_that_waives_nothing_is_refused(change: dict[str, str], words: str) -> None:
-    text = write_design(asking(replace(WAIVED, **change)))
-    with pytest.raises(InputError, match=words):
-        read_design_text(text, "d.toml")
+def test_a_waiver_that_waives_nothing_is_refused() -> None:
+    for change, words in (
+        ({"requirement": "cold"}, "cold.requirement = .*cold.*: allowed: each once: a requirement's id"),
+        ({"reason": " "}, "hot.reason"),
+        ({"date": "yesterday"}, "hot.date = .*yesterday.*: allowed: a day, YYYY-MM-DD"),
+    ):
+        text = write_design(asking(replace(WAIVED, **change)))
+        with pytest.raises(InputError, match=f"waiver.{words}"):
+            read_design_text(text, "d.toml")
 
 
 def test_one_waiver_holds_for_a_requirement_on_every_loop_and_for_a_check() -> None:
@@ -132,22 +126,17 @@ def test_one_waiver_holds_for_a_requirement_on_every_loop_and_for_a_check() -> N
     assert design.waiver_of("validation-sawtooth-gain") is None
 
 
-@pytest.mark.parametrize(
-    ("waived", "passes"),
-    [
-        ((), False),
-        (("validation-velocity",), True),
-        (("validation-velocity/NAME",), True),
-        (("validation-position",), False),
-    ],
-)
-def test_a_row_of_a_validation_not_proven_can_be_waived(waived: tuple[str, ...], passes: bool) -> None:
+WAIVING = {"": False, "validation-velocity": True, "validation-velocity/NAME": True,
+           "validation-position": False}  # fmt: skip
+
+
+@pytest.mark.parametrize(("waived", "passes"), WAIVING.items())
+def test_a_row_of_a_validation_not_proven_can_be_waived(waived: str, passes: bool) -> None:
     result = validate(load_design("emps"), CHECKS)
     k = next(k for k, row in enumerate(result.rows) if row.loop == "velocity")
     rows = list(result.rows)
     rows[k] = replace(rows[k], verdict=Verdict.NOT_PROVEN)
-    names = [name.replace("NAME", rows[k].name) for name in waived]
-    waivers = tuple(replace(WAIVED, requirement=name) for name in names)
+    waivers = (replace(WAIVED, requirement=waived.replace("NAME", rows[k].name)),) if waived else ()
     design = read_design_text(write_design(replace(result.design, waivers=waivers)), "d.toml")
     judged = replace(result, design=design, rows=tuple(rows))
     assert judged.verdict == ("met" if passes else "not proven")

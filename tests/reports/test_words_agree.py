@@ -89,18 +89,16 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     }
 
 
+SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
+
+
 @pytest.mark.parametrize(
     ("changes", "parts"),
     [
         ({}, ""),
         ({"control.position.feedforward": 1.0}, ": feed-forward included"),
         (
-            {
-                "command.filter_time": 0.01,
-                "command.rate": 0.3,
-                "command.acceleration": 10.0,
-                "command.jerk": 100.0,
-            },
+            {f"command.{key}": value for key, value in SHAPED.items()},
             ": mean of its profile and filter included",
         ),
     ],

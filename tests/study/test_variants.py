@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.errors import InputError
-from analyses.comparison.variant_figures import LargeSignal, figure_names
+from analyses.comparison.found import LargeSignal, figure_names
 from analyses.comparison.variants import compare
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import is_study, load_study, study_of

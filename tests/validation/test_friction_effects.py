@@ -12,9 +12,8 @@ from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
-from analyses.friction_effects.breakaway import Hysteresis, hysteresis, threshold
+from analyses.friction_effects.breakaway import Hysteresis, hysteresis, static_threshold, threshold
 from analyses.friction_effects.result import limit_cycles
-from analyses.linear.static_threshold import static_threshold
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 from itertools import pairwise
 
 from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpq_poly
 from scipy.optimize import brentq, minimize_scalar
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, at
+from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop
 from actuator_lti.margins.distances import Distance
 
 _MOST_INTERVALS = 60_000
@@ -34,17 +34,17 @@ class Axis:
 
     def __init__(self, loop: ExactDelayLoop) -> None:
         self.loop = loop
-        self._derivatives = [[(f, f.balls(), acb(1))] for f in (loop.N, loop.D)]  # with j^k/k!
+        self._derivatives = [[(f, acb(1))] for f in (loop.N, loop.D)]  # with j^k/k!
 
     def series(self, places: Sequence[arb]) -> tuple[acb_poly, acb_poly]:
         """N and D by powers of the way from x, coefficient k from the k-th place, a point or an interval."""
         coefficients = []
         for known in self._derivatives:
             while len(known) < len(places):
-                following = known[-1][0].derivative()
-                known.append((following, following.balls(), known[-1][2] * J / len(known)))
+                f, factor = known[-1]
+                known.append((f.derivative(), factor * J / len(known)))
             terms = zip(places, known[: len(places)], strict=True)
-            coefficients.append(acb_poly([factor * at(f, acb(0, x)) for x, (_, f, factor) in terms]))
+            coefficients.append(acb_poly([factor * f(acb(0, x)) for x, (f, factor) in terms]))
         N, D = coefficients
         return N, D
 
@@ -77,39 +77,24 @@ class Form:
     (1, 0, -1) is |L| - 1; (0, 1, 0) the real part of L; (1, 2, 1 - m^2) is |1 + L| - m.
     """
 
-    exact_u: fmpq
-    exact_v: fmpq
-    exact_w: fmpq
+    u: fmpq
+    v: fmpq
+    w: fmpq
     turned: bool = False
-
-    @cached_property
-    def u(self) -> arb:
-        """The weight of |N|^2."""
-        return arb(self.exact_u)
-
-    @cached_property
-    def v(self) -> acb:
-        """The weight of N conj D."""
-        return acb(arb(self.exact_v)) * (-J if self.turned else 1)
-
-    @cached_property
-    def w(self) -> arb:
-        """The weight of |D|^2."""
-        return arb(self.exact_w)
 
     def order(self, loop: ExactDelayLoop) -> int:
         """Multiplicity of its zero at x = 0; 0: it is none."""
         N, D = loop.at_rest
-        cross = self.exact_v * N * D(_MIRROR)
+        cross = self.v * N * D(_MIRROR)
         if self.turned:
             return _order(cross, 1)
-        return _order(self.exact_u * N * N(_MIRROR) + cross + self.exact_w * D * D(_MIRROR), 0)
+        return _order(self.u * N * N(_MIRROR) + cross + self.w * D * D(_MIRROR), 0)
 
     def along(self, N: acb_poly, D: acb_poly) -> arb_poly:
         """Its expansion by x, from those of N and D."""
         other_N, other_D = (acb_poly([c.conjugate() for c in f.coeffs()]) for f in (N, D))
-        total = N * other_D * self.v
-        if self.exact_u or self.exact_w:
+        total = N * other_D * (self.v * -J if self.turned else acb(self.v))
+        if self.u or self.w:
             total += N * other_N * self.u + D * other_D * self.w
         return arb_poly([c.real for c in total.coeffs()])
 
@@ -121,40 +106,42 @@ REAL, IMAGINARY = (Form(fmpq(0), fmpq(1), fmpq(0), turned) for turned in (False,
 def zeros(axis: Axis, q: Form, edges: list[float]) -> list[arb]:
     """Every zero of q between the edges, each alone in its interval; one at x = 0 is not listed."""
     result: list[arb] = []
-    stack = [(a, b) for a, b in pairwise(edges)][::-1]
-    count, order_at_zero = 0, 0 if edges[0] else q.order(axis.loop)
-    while stack:
-        low, high = stack.pop()
-        count += 1
+    order_at_zero = 0 if edges[0] else q.order(axis.loop)
+
+    def told(low: float, high: float) -> bool:
         if low == 0.0 and order_at_zero:
             if high < _NARROWEST * edges[1]:
                 raise NumericalError("a crossing next to zero frequency could not be determined")
-            if not _order_holds(axis, q, high, order_at_zero):
-                stack += [(0.5 * high, high), (0.0, 0.5 * high)]
-            continue
+            return _order_holds(axis, q, high, order_at_zero)
         inside, half = q.along(*axis.over(low, high)), _half(low, high)
         value, slope = inside(half), inside.derivative()(half)
         if value > 0 or value < 0:
-            continue
+            return True
         if slope > 0 or slope < 0:
-            result += _root(axis, q, low, high)
-            continue
-        stack += _halves(low, high, count, edges[-1], "what the loop does", ": a touch")
+            result.extend(_root(axis, q, low, high))
+            return True
+        return False
+
+    _halved_until(told, edges, "what the loop does near {:.10g} rad/s could not be determined: a touch")
     return result
 
 
-def _halves(
-    low: float, high: float, count: int, end: float, what: str, why: str
-) -> list[tuple[float, float]]:
-    """Both halves of an interval, the second first, unless there are too many or it is too narrow."""
-    if count > _MOST_INTERVALS:
-        raise NumericalError(
-            f"{count} certified intervals reach no farther than {low:.6g} rad/s of {end:.6g}"
-        )
-    if high - low < _NARROWEST * high:
-        raise NumericalError(f"{what} near {low:.10g} rad/s could not be determined{why}")
-    middle = 0.5 * (low + high)
-    return [(middle, high), (low, middle)]
+def _halved_until(told: Callable[[float, float], bool], edges: list[float], why: str) -> None:
+    """Go through the intervals between the edges in order; those of which nothing is told are halved."""
+    stack, count = [*pairwise(edges)][::-1], 0
+    while stack:
+        low, high = stack.pop()
+        count += 1
+        if told(low, high):
+            continue
+        if count > _MOST_INTERVALS:
+            raise NumericalError(
+                f"{count} certified intervals reach no farther than {low:.6g} rad/s of {edges[-1]:.6g}"
+            )
+        if high - low < _NARROWEST * high:
+            raise NumericalError(why.format(low))
+        middle = 0.5 * (low + high)
+        stack += [(middle, high), (low, middle)]
 
 
 def _root(axis: Axis, q: Form, low: float, high: float) -> list[arb]:
@@ -188,22 +175,22 @@ def _order_holds(axis: Axis, q: Form, high: float, order: int) -> bool:
 
 def turn(axis: Axis, edges: list[float]) -> arb:
     """Change of the angle of N + D along the intervals, rad."""
-    total = arb(0)
-    stack = [(a, b) for a, b in pairwise(edges)][::-1]
-    count = 0
-    last = sum(axis.values(arb(0)), acb(0))
-    while stack:
-        low, high = stack.pop()
-        count += 1
+    total, last = arb(0), sum(axis.values(arb(0)), acb(0))
+
+    def told(low: float, high: float) -> bool:
+        nonlocal total, last
         N, D = axis.over(low, high)
         F = N + D
-        ball = F(acb(_half(low, high))) / F[0] if not F[0].contains(0) else acb(0)
-        if ball.real > 0:
-            here = sum(axis.values(arb(high)), acb(0))
-            total += (here / F[0]).arg() - (last / F[0]).arg()
-            last = here
-            continue
-        stack += _halves(low, high, count, edges[-1], "the turn of 1 + L", " from one through zero")
+        if F[0].contains(0) or not (F(acb(_half(low, high))) / F[0]).real > 0:
+            return False
+        here = sum(axis.values(arb(high)), acb(0))
+        total += (here / F[0]).arg() - (last / F[0]).arg()
+        last = here
+        return True
+
+    _halved_until(
+        told, edges, "the turn of 1 + L near {:.10g} rad/s could not be determined from one through zero"
+    )
     return total
 
 

@@ -12,13 +12,12 @@ from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpq_mat, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delays.form import DelayForm
-from actuator_lti.margins.exact.loop import exact_loop, neighbours
-from actuator_lti.margins.exact.roots import NOTHING_HIDDEN, HalfPlanes, half_planes
-from actuator_lti.margins.given import ULP, Given
+from actuator_lti.margins.exact.loop import exact_loop, neighbours, rational
+from actuator_lti.margins.exact.roots import NOTHING_HIDDEN, HalfPlanes
+from actuator_lti.margins.given import ULP, Given, moved
 
 _MOST_DELAYS = 8
 HIGHEST_ORDER = 16
-Terms = tuple[tuple[fmpq_poly, fmpq], ...]
 
 
 @dataclass(frozen=True)
@@ -53,17 +52,13 @@ class Quasi:
             out += p * part
         return out.truncate(order)
 
-    def balls(self) -> list[tuple[acb_poly, arb]]:
-        """The terms at the working precision, for `at`."""
+    def __call__(self, s: acb) -> acb:
+        """The value at s, an interval or a point, at the working precision of the first call."""
+        return sum((p(s) * (-s * tau).exp() for p, tau in self._balls), acb(0))
+
+    @cached_property
+    def _balls(self) -> list[tuple[acb_poly, arb]]:
         return [(acb_poly(p), arb(tau)) for p, tau in self.terms]
-
-
-def at(balls: list[tuple[acb_poly, arb]], s: acb) -> acb:
-    """The value at s, an interval or a point."""
-    total = acb(0)
-    for p, tau in balls:
-        total += p(s) * (-s * tau).exp()
-    return total
 
 
 @dataclass(frozen=True)
@@ -123,17 +118,6 @@ def _sizes(f: Quasi) -> arb_poly:
     return sum((arb_poly([abs(arb(c)) for c in p.coeffs()]) for p, _ in f.terms), arb_poly())
 
 
-def neighbour(form: DelayForm, way: float) -> DelayForm:
-    """The same with every entry and delay 8 ulp away, see `Given.neighbours`."""
-    rng = np.random.default_rng(0)
-
-    def moved(entries: Any) -> Any:
-        x = np.asarray(entries, dtype=float)
-        return x + way * ULP * np.spacing(x) * rng.choice([-1.0, 1.0], x.shape) * (x != 0.0)
-
-    return DelayForm(moved(form.whole), moved(form.delays_s), float(moved(form.series_s)))
-
-
 def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ...]:
     """A continuous rational loop behind a delay, common factors cancelled, and its neighbours 8 ulp away."""
     loop = exact_loop(given)
@@ -141,19 +125,18 @@ def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ..
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
         )
-    hidden = half_planes(loop.hidden)
     out = []
     for near, way in zip((loop, *neighbours(given, loop)), (0.0, 1.0, -1.0), strict=True):
-        delay = _exact(delay_s + way * ULP * float(np.spacing(delay_s)))
-        N, D = (((fmpq_poly(p), tau),) for p, tau in ((near.N, delay), (near.D, fmpq(0))))
-        out.append(ExactDelayLoop(Quasi(N), Quasi(D), near.degree, hidden))
+        delay = rational(delay_s + way * ULP * float(np.spacing(delay_s)))
+        N, D = (Quasi(((fmpq_poly(p), tau),)) for p, tau in ((near.N, delay), (near.D, fmpq(0))))
+        out.append(ExactDelayLoop(N, D, near.degree, loop.hidden_modes))
     return tuple(out)
 
 
 def exact_inside_delays(form: DelayForm, *, reduced: bool = True) -> tuple[ExactDelayLoop, ...]:
     """A loop with delays inside, and its neighbours."""
-    every = (form, neighbour(form, 1.0), neighbour(form, -1.0))
-    return tuple(exact_delay_loop(each, reduced=reduced) for each in every)
+    near = [DelayForm(*moved(way, form.whole, form.delays_s, form.series_s)) for way in (1.0, -1.0)]
+    return tuple(exact_delay_loop(each, reduced=reduced) for each in (form, *near))
 
 
 def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop:
@@ -171,11 +154,11 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     q, n = form.delays_s.size, form.states
     if q > _MOST_DELAYS:
         raise InputError(f"exact arithmetic takes at most {_MOST_DELAYS} inner delays; this loop has {q}")
-    delays = [_exact(tau) for tau in form.delays_s]
+    delays = [rational(tau) for tau in form.delays_s]
     late = [sum((tau for k, tau in enumerate(delays) if mask >> k & 1), fmpq(0)) for mask in range(1 << q)]
     m = n + q
     whole, column = _exact_matrix(form.whole[:m, :m]), _exact_matrix(form.whole[:m, m:])
-    row, through = _exact_matrix(form.whole[m:, :m]), _exact(form.whole[m, m])
+    row, through = _exact_matrix(form.whole[m:, :m]), rational(form.whole[m, m])
     below = list(zip(_determinants(whole, n), late, strict=True))
     fed_back = _determinants(whole - column * row, n)
     above = [(p + (through - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
@@ -183,27 +166,11 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
         )
-    N, D = _present(above), _present(below)
-    if reduced:
-        N, D, n = _without_common_s(N, D, n)
-    return ExactDelayLoop(Quasi(N).late(_exact(form.series_s)), Quasi(D), n)
-
-
-def _without_common_s(N: Terms, D: Terms, degree: int) -> tuple[Terms, Terms, int]:
-    """Cancel a factor s that stands in every term of both: a mode at zero frequency that L does not show."""
-    while N and degree and all(p[0] == 0 for p, _ in (*N, *D)):
-        N, D = (tuple((p // fmpq_poly([0, 1]), tau) for p, tau in terms) for terms in (N, D))
-        degree -= 1
-    return N, D, degree
-
-
-def _present(terms: list[tuple[fmpq_poly, fmpq]]) -> Terms:
-    return tuple((p, tau) for p, tau in terms if p.degree() >= 0)
-
-
-def _exact(x: float) -> fmpq:
-    above, below = float(x).as_integer_ratio()
-    return fmpq(above, below)
+    N, D = ([(p, tau) for p, tau in terms if p.degree() >= 0] for terms in (above, below))
+    while reduced and N and n and all(p[0] == 0 for p, _ in (*N, *D)):
+        N, D = ([(p // fmpq_poly([0, 1]), tau) for p, tau in terms] for terms in (N, D))
+        n -= 1
+    return ExactDelayLoop(Quasi(tuple(N)).late(rational(form.series_s)), Quasi(tuple(D)), n)
 
 
 def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
@@ -232,4 +199,4 @@ def _part(M: fmpq_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpq_mat:
 
 def _exact_matrix(M: Any) -> fmpq_mat:
     rows, columns = M.shape
-    return fmpq_mat(rows, columns, [_exact(x) for x in M.ravel()])
+    return fmpq_mat(rows, columns, [rational(x) for x in M.ravel()])

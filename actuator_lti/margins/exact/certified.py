@@ -23,6 +23,7 @@ from actuator_lti.margins.single import Agreement
 
 _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
 _GIVEN = "exact arithmetic on the given doubles"
+_COUNTED = f"{ULP} ulp of the entries change how many closed-loop poles are unstable, not that some are"
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
 _TOLD = 1e-6
 
@@ -44,7 +45,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
         if found.problem is not None:
             found = shared(*(crossings(each, merge=True) for each in (loop, *others)))
     if found.problem is None:
-        figures = Figures(found.gains, found.reals, [smallest(loop, d) for d in (MODULUS, DISK)])
+        figures = Figures(found.gains, found.reals, [smallest(loop.N, loop.D, d) for d in (MODULUS, DISK)])
     if poles.hidden > hidden.at_zero:  # one that the data do not tell from a mode at zero
         hidden = replace(hidden, at_zero=poles.hidden)
     reason = f"{_GIVEN}, certified roots; {found.moved_text}"
@@ -55,7 +56,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
         Agreement(poles.unstable, None, poles.border),
         figures,
         method=_METHOD,
-        notes=(*hidden_notes(hidden), *found.notes),
+        notes=(*hidden_notes(hidden), *found.notes, *filter(None, (poles.note,))),
         evidence="certified",
         reason=found.problem or reason,
         band_rad_s=band_rad_s,
@@ -71,6 +72,7 @@ class _Poles:
     border: int = 0  # exactly on the border
     hidden: int = 0  # modes at zero frequency that the loop does not show
     problem: str | None = None
+    note: str = ""  # what 8 ulp of the entries change of these numbers
 
 
 def _poles(base: ExactLoop, others: list[ExactLoop]) -> _Poles:
@@ -92,7 +94,8 @@ def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex) -> _
     """Count with each pole's own error: how far it moves among the neighbours.
 
     On the border is a pole that lies there exactly; one that the neighbours only carry across it may lie on
-    either side, which is no answer. A hidden mode at zero frequency alone is known by its place.
+    either side, which is no answer, unless others lie in the right half plane whatever is meant. A hidden
+    mode at zero frequency alone is known by its place.
     """
     radius = _movements(closed, [_values(f, closed=True) for f in others])
     size, exact = np.abs(closed), _exactly_on_border(base, closed)
@@ -101,7 +104,10 @@ def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex) -> _
     beyond = [size[size > 10.0 * max(r, s)].min(initial=math.inf) for r, s in zip(radius, size, strict=True)]
     at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
     unsure, hidden = int(np.count_nonzero(at_dc & ~exact)), int(np.count_nonzero(at_dc))
-    if np.count_nonzero(near & ~exact & ~at_dc):
+    across = bool(np.count_nonzero(near & ~exact & ~at_dc))
+    if unstable and (across or unsure > 1):
+        return _Poles(base.unstable, base.on_border, base.hidden_modes.at_zero, note=_COUNTED)
+    if across:
         return _Poles(problem=ACROSS)
     if unsure > 1:  # be they hidden or not
         return _Poles(problem=f"{ULP} ulp of the entries decide about several modes at zero frequency")

@@ -29,6 +29,11 @@ class Strip:
     low: Real  # (m - 1, 2): at both ends of each interval; straight in between
     high: Real
 
+    @property
+    def range(self) -> tuple[float, float]:
+        """Smallest and largest value anywhere."""
+        return float(self.low.min()), float(self.high.max())
+
     def meets(self, level: float) -> tuple[Real, Real]:
         """Part [t0, t1] of each interval, 0 to 1, in which the function may pass a level; t0 > t1: none."""
         t0, t1 = np.zeros(self.low.shape[0]), np.ones(self.low.shape[0])
@@ -83,11 +88,15 @@ def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:
     unresolved = _unresolved(gain, turn, wobble)
     phase = np.angle(L[0]) + np.concatenate(([0.0], np.cumsum(turn))) - omega * delay_s
     u = np.log(omega)
-    bend_gain, bend_phase = _bend(u, gain), _bend(u, phase)
-    log_gain = _strip(gain, down, up, bend_gain)
-    angle = _strip(phase, wobble, wobble, bend_phase)
-    _open_gain(log_gain, unresolved, turn)
-    _open_phase(angle, unresolved, turn)
+    log_gain = _strip(gain, down, up, _bend(u, gain), unresolved)
+    angle = _strip(phase, wobble, wobble, _bend(u, phase), unresolved)
+    # inside an unresolved interval the gain may rise without limit, or fall where the phase leads
+    flips = np.abs(turn) > _FLIP
+    either = flips | (np.abs(turn) < _JUMP)
+    log_gain.high[unresolved & ((turn < 0.0) | either)] = np.inf
+    log_gain.low[unresolved & ((turn > 0.0) | either)] = -np.inf
+    more = np.where(unresolved & flips, 2.0 * np.pi - np.abs(turn), 0.0)[:, None]
+    angle.low[:], angle.high[:] = angle.low - more, angle.high + more
     return Bounds(log_gain, angle, unresolved, turn, lost)
 
 
@@ -111,37 +120,13 @@ def _bend(u: Real, y: Real) -> Real:
     return _CURVATURE * nearby * h**2 / 8.0
 
 
-def _strip(y: Real, down: Real, up: Real, bend: Real) -> Strip:
-    low, high = y - down, y + up
-    return Strip(
-        y,
-        down,
-        up,
-        np.stack((low[:-1], low[1:]), axis=1) - bend[:, None],
-        np.stack((high[:-1], high[1:]), axis=1) + bend[:, None],
-    )
-
-
-def _open_gain(strip: Strip, unresolved: Mask, turn: Real) -> None:
-    """Inside an unresolved interval the gain may rise without limit, or fall where the phase leads."""
-    either = _ambiguous(turn) | (np.abs(turn) < _JUMP)
-    peak, dip = unresolved & ((turn < 0.0) | either), unresolved & ((turn > 0.0) | either)
-    strip.low[unresolved] = strip.low[unresolved].min(axis=1, keepdims=True)
-    strip.high[unresolved] = strip.high[unresolved].max(axis=1, keepdims=True)
-    strip.high[peak] = np.inf
-    strip.low[dip] = -np.inf
-
-
-def _open_phase(strip: Strip, unresolved: Mask, turn: Real) -> None:
-    strip.low[unresolved] = strip.low[unresolved].min(axis=1, keepdims=True)
-    strip.high[unresolved] = strip.high[unresolved].max(axis=1, keepdims=True)
-    either = unresolved & _ambiguous(turn)
-    strip.low[either] -= 2.0 * np.pi - np.abs(turn[either])[:, None]
-    strip.high[either] += 2.0 * np.pi - np.abs(turn[either])[:, None]
-
-
-def _ambiguous(turn: Real) -> Mask:
-    return np.asarray(np.abs(turn) > _FLIP)
+def _strip(y: Real, down: Real, up: Real, bend: Real, unresolved: Mask) -> Strip:
+    """The strip about the chords; in an unresolved interval as wide everywhere as at its wider end."""
+    low, high = (np.stack((side[:-1], side[1:]), axis=1) for side in (y - down, y + up))
+    low, high = low - bend[:, None], high + bend[:, None]
+    low[unresolved] = low[unresolved].min(axis=1, keepdims=True)
+    high[unresolved] = high[unresolved].max(axis=1, keepdims=True)
+    return Strip(y, down, up, low, high)
 
 
 def distance_ranges(L: Complex, radius: Real, known: Bounds) -> tuple[Range, Range]:

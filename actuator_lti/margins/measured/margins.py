@@ -125,24 +125,18 @@ class Group:
         chosen = slice(first - self.first, last + 1 - self.first)
         return Group(first, last, self.t0[chosen], self.t1[chosen])
 
-    def text(self, omega: Real) -> str:
-        """Where, in rad/s."""
-        return f"between {omega[self.first]:.6g} and {omega[self.last + 1]:.6g} rad/s"
+    def bracket(self, omega: Real) -> tuple[float, float]:
+        """Where, rad/s."""
+        return float(omega[self.first]), float(omega[self.last + 1])
 
 
 def _groups(strip: Strip, level: float) -> list[Group]:
     t0, t1 = strip.meets(level)
-    out: list[Group] = []
-    start = None
-    for k in range(t0.size + 1):
-        open_here = k < t0.size and t0[k] <= t1[k]
-        joined = open_here and start is not None and t1[k - 1] >= 1.0 and t0[k] <= 0.0
-        if start is not None and not joined:
-            out.append(Group(start, k - 1, t0[start:k], t1[start:k]))
-            start = None
-        if open_here and start is None:
-            start = k
-    return out
+    open_in = np.flatnonzero(t0 <= t1)
+    before, after = open_in[:-1], open_in[1:]
+    joined = (after == before + 1) & (t1[before] >= 1.0) & (t0[after] <= 0.0)
+    parts = np.split(open_in, np.flatnonzero(~joined) + 1)
+    return [Group(int(k[0]), int(k[-1]), t0[k], t1[k]) for k in parts if k.size]
 
 
 def single_passages(strip: Strip, level: float) -> list[Group]:
@@ -192,13 +186,8 @@ def _passages(
         if at is not None:
             yield group, *at
         elif not result.unresolved[group.first : group.last + 1].all():  # told already
-            notes.append(
-                f"{group.text(omega)} {what} as it is known: crossings there are neither sure nor excluded"
-            )
-
-
-def _bracket(omega: Real, group: Group) -> tuple[float, float]:
-    return float(omega[group.first]), float(omega[group.last + 1])
+            where = "between {:.6g} and {:.6g} rad/s".format(*group.bracket(omega))
+            notes.append(f"{where} {what} as it is known: crossings there are neither sure nor excluded")
 
 
 def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
@@ -208,30 +197,22 @@ def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...]
         deg = math.degrees(_chord(result.phase.middle, k, t)) + 180.0
         turns = 360.0 * math.ceil((deg - 180.0) / 360.0)
         low, high = (math.degrees(each) + 180.0 - turns for each in group.over(result.phase))
-        if high - low >= 360.0:
-            low, high = -180.0, 180.0
-        known = _bracket(omega, group), (low, high)
-        out.append(PhaseMargin(deg - turns, between(omega, k, t), False, *known))
+        known = (-180.0, 180.0) if high - low >= 360.0 else (low, high)
+        out.append(PhaseMargin(deg - turns, between(omega, k, t), False, group.bracket(omega), known))
     return tuple(out), notes
 
 
 def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
     out, notes = [], list[str]()
-    lowest, highest = float(result.phase.low.min()), float(result.phase.high.max())
+    lowest, highest = (0.5 * (float(end) / math.pi - 1.0) for end in result.phase.range)
     near = "the phase comes as near to -180 deg"
-    for m in range(
-        math.ceil((lowest / math.pi - 1.0) / 2.0), math.floor((highest / math.pi - 1.0) / 2.0) + 1
-    ):
+    for m in range(math.ceil(lowest), math.floor(highest) + 1):
         for group, k, t in _passages(omega, result, result.phase, (2 * m + 1) * math.pi, notes, near):
             low, high = group.over(result.log_gain)
+            known = math.exp(-high), math.exp(-low) if low > -700.0 else math.inf
             ratio = math.exp(-_chord(result.log_gain.middle, k, t))
-            known = _bracket(omega, group), (_inverse(high), _inverse(low))
-            out.append(GainMargin(ratio, between(omega, k, t), False, *known))
+            out.append(GainMargin(ratio, between(omega, k, t), False, group.bracket(omega), known))
     return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
-
-
-def _inverse(log_gain: float) -> float:
-    return math.exp(-log_gain) if log_gain > -700.0 else math.inf
 
 
 def _reason(omega: Real, result: Bounds) -> str:

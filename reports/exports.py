@@ -1,4 +1,7 @@
-"""Write the drive as C99, as an FMU, or its linear models; the compiled code is measured."""
+"""The drive outside of Python: the running one as C99 or as an FMU, the linear one as state spaces.
+
+The compiled code is measured.
+"""
 
 from __future__ import annotations
 
@@ -13,20 +16,12 @@ from reports.cli.options import folder_for_results, refuse_existing
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.linear.code_check import CodeCheck
-    from reports.exports.asked import AskedC, AskedController, AskedFmu, AskedLinear
+    from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 
 
 @dataclass(frozen=True)
 class Exported:
-    """What was written, in words too, and what the check of the compiled code has found.
-
-    Attributes
-    ----------
-    files : tuple of str
-    words : str
-    check : CodeCheck or None
-        ``None`` where it was not asked for.
-    """
+    """What was written, in words too, and what the check of the compiled code has found, if asked for."""
 
     files: tuple[str, ...]
     words: str
@@ -44,50 +39,30 @@ class Exported:
 
 
 def export_c(design: Design, asked: AskedC) -> Exported:
-    """Write drive.h, drive.c, the design's parameters, an example and a README.
-
-    Raises
-    ------
-    InputError
-        If there are such files already, the folder cannot be written, or the prefix is no name.
-    """
+    """Write what `AskedC` says; refused where there are such files already, or the prefix is no name."""
     from nonlinear.export import c_export
     from reports.export_documents import check_text
 
-    folder = asked.target
-    folder_for_results(folder)
+    folder_for_results(asked.target)
     texts = c_export(design, single_precision=asked.single, prefix=asked.prefix)
-    _refuse_any(folder, texts, asked.force)
+    _refuse_any(asked.target, texts, asked.force)
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
-    return _put(folder, texts, check)
+    return _put(asked.target, texts, check)
 
 
 def export_controller(design: Design, asked: AskedController) -> Exported:
-    """Write the controller alone as C99 for firmware, with test vectors and a class for C++.
-
-    Raises
-    ------
-    InputError
-        If there are such files already, or the prefix is no name.
-    """
+    """Write what `AskedController` says; refused as by `export_c`."""
     from nonlinear.export import controller_export
 
-    folder = asked.target
-    folder_for_results(folder)
+    folder_for_results(asked.target)
     texts = controller_export(design, single_precision=asked.number == "float", prefix=asked.prefix)
-    _refuse_any(folder, texts, asked.force)
-    return _put(folder, texts)
+    _refuse_any(asked.target, texts, asked.force)
+    return _put(asked.target, texts)
 
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
-    """Write a co-simulation FMU: binaries, sources, every key of the design as a parameter.
-
-    Raises
-    ------
-    InputError
-        If there is such a file already, or the version or a platform is not known.
-    """
+    """Write what `AskedFmu` says; refused where there is such a file, for an unknown version or platform."""
     from actuator_lti.files.atomic import write_bytes
     from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
     from reports.export_documents import export_documents
@@ -113,13 +88,7 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
 
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
-    """Write every loop, break point, command and load response as state space, with units and margins.
-
-    Raises
-    ------
-    InputError
-        If there is such a file already.
-    """
+    """Write what `AskedLinear` says; refused where there is such a file already."""
     from actuator_lti.files.atomic import write_bytes
     from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
 

@@ -1,19 +1,39 @@
-"""The figures that variants are compared by, with their names, units and which way is better."""
+"""What is found of each design of a comparison: figures with their names, and where they are kept.
+
+On disk they are JSON, so that a study that was stopped goes on. An entry's name is the hash of all that it
+depends on (texts of both designs, commands, code, libraries). It is checked like any other file when it is
+read; one that is damaged is computed again.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import metadata
 from math import isnan, pi
+from pathlib import Path
+
+from pydantic import TypeAdapter
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES, drive_cases
 from actuator_lti.batch import Population
+from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.files.atomic import write_bytes
+from actuator_lti.files.reading import decode, read_bytes
 from actuator_lti.loops import Loops
+from actuator_lti.loops.limiters import onset
 from analyses.linear.loop_figures import LoopFigures
+from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.capability import drive_figures
+from analyses.specification.requirements import RequirementVerdict
+from analyses.studies.proof import code_version
+from analyses.validation.row import Row
 from nonlinear.runs.trajectory import COMMAND_UNITS
 
 Figures = Mapping[str, float | None]
@@ -65,9 +85,6 @@ class LargeSignal:
 
     def figures(self, design: Design, loops: Loops) -> dict[str, float | None]:
         """Largest linear amplitudes, and the nonlinear step of full deflection at every load."""
-        from actuator_lti.loops.limiters import onset
-        from analyses.monte_carlo.task import StepCheck, step_columns
-
         shown = COMMAND_UNITS[design.axis, design.controller.outermost][1]
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
@@ -81,7 +98,7 @@ class LargeSignal:
             columns = step_columns(step, Population(design, {}, 1))
             for name in ("rise_time", "overshoot", "settling_time", "peak_current"):
                 value = float(columns[f"nonlinear.{name}"][0])
-                figures[f"large.{name}@{load:g}"] = None if value != value else value
+                figures[f"large.{name}@{load:g}"] = None if isnan(value) else value
         return figures
 
 
@@ -94,18 +111,102 @@ def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[Figure
 def _name(key: str, design: Design) -> FigureName:
     group, _, rest = key.partition(".")
     quantity, _, at = rest.partition("@")
-    known = QUANTITIES.get(quantity)
+    known, words = QUANTITIES.get(quantity), quantity.replace("_", " ")
     if known is not None:
         unit, better = known.unit_for(design.axis), int(known.better)
     else:  # of the large signal
         command = COMMAND_UNITS[design.axis, design.controller.outermost][0]
         unit, better = (command, 1) if quantity == "onset" else ("A", -1)
-    words = quantity.replace("_", " ")
     if quantity == "onset":
         words, at = "linear up to", f"{at} Hz"
     elif known is not None and known.source == "stiffness":
         at = ""  # no load changes it
     elif at:
         at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
-    label = f"{words} at {at}" if at else words
-    return FigureName(key, label, "" if unit == "1" else unit, group, better)
+    return FigureName(key, f"{words} at {at}" if at else words, "" if unit == "1" else unit, group, better)
+
+
+LIBRARIES = ("numpy", "scipy")
+
+
+@dataclass(frozen=True)
+class Changed:
+    """One key that differs from the base, as texts."""
+
+    path: str
+    base: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Contribution:
+    """What one changed key alone does to a figure, starting from the base."""
+
+    path: str
+    amount: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """What is found of one design of a comparison: plain data, kept on disk as they are."""
+
+    # By column, such as ``"position.phase_margin"``; ``None`` where there is none
+    figures: dict[str, float | None]
+    verdicts: tuple[RequirementVerdict, ...]
+    changed: tuple[Changed, ...] = ()
+    differences: dict[str, float] = field(default_factory=dict)  # figure minus the base's, where they differ
+    # For each difference the changed keys one at a time, the strongest first; what is left over is their
+    # interaction (or a key without a number)
+    moved_by: dict[str, tuple[Contribution, ...]] = field(default_factory=dict)
+    # Of the validator: each prediction beside what the simulator shows; empty where not asked for
+    checks: tuple[Row, ...] = ()
+    untested: str = ""  # why the validator could not test this design
+
+
+@dataclass(frozen=True)
+class Kept:
+    """What is found of the designs of a study, in one folder; nothing without one."""
+
+    folder: Path | None
+    base: Design
+    settings: object  # its ``repr`` says all of them
+
+    def read(self, design: Design) -> Found | None:
+        """What was found; ``None`` where there is nothing, or nothing whole."""
+        path = self._path(design)
+        if path is None or not path.exists():
+            return None
+        try:
+            head, _, body = decode(read_bytes(path, "entry"), str(path)).partition("\n")
+            return _adapter().validate_python(json.loads(body)) if head == _digest(body) else None
+        except (InputError, ValueError, RecursionError):  # or not what this version writes
+            return None
+
+    def write(self, design: Design, found: Found) -> Found:
+        """Keep what was found, and give it back."""
+        if (path := self._path(design)) is not None:
+            body = json.dumps(_adapter().dump_python(found))
+            write_bytes(path, f"{_digest(body)}\n{body}".encode())
+        return found
+
+    def _path(self, design: Design) -> Path | None:
+        if self.folder is None:
+            return None
+        texts = [write_design(one) for one in (self.base, design)]
+        key = _digest(json.dumps([texts, repr(self.settings), _code()]))
+        return self.folder / key[:2] / f"{key}.json"
+
+
+@cache
+def _adapter() -> TypeAdapter[Found]:
+    """Turns what is found into plain data and back."""
+    return TypeAdapter(Found)
+
+
+@cache
+def _code() -> list[str]:
+    return [code_version(), *(f"{name} {metadata.version(name)}" for name in LIBRARIES)]
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

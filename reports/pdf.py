@@ -1,19 +1,31 @@
-"""A document as the template prints it: texts only, numbers in their format, figures as SVG."""
+"""Reports as PDF for signing, typeset by typst from the same document as the page.
+
+The template gets texts only: numbers in their format, figures as SVG, nothing that is markup.
+"""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from functools import cache
+from pathlib import Path
 from typing import Any
 
+from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree
-from reports.document import column, figures, section, table, walk
+from actuator_lti.start.extras import need
+from reports.document import column, figures, judged, section, table, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
 from reports.verdict_summary import role, verdict_lines, why
 from reports.visible import visible
 
+TEMPLATE = Path(__file__).resolve().parent / "templates" / "pdf" / "report.typ"
+MAX_BYTES = 64_000_000
 MAX_CELL = 600
 MAX_TEXT = 20_000
 MAX_TITLE = 240
@@ -25,21 +37,70 @@ _BREAKS = re.compile(r"[\t\n\r\f\v\x1c-\x1f\x85\u2028\u2029]+")
 _SIZE = re.compile(r'<svg [^>]*viewBox="[-\d.]+ [-\d.]+ ([\d.]+) ([\d.]+)"')
 
 
+def write_pdf(made: Mapping[str, Any], path: str | Path, *, whole: bool = True) -> Path:
+    """Write a document as PDF: cover with verdicts and lines to sign, tables, vector figures, page numbers.
+
+    Written whole or not at all; not ``whole``: the first screen and one line a section. An InputError where
+    the file cannot be written or the document is too large, a NumericalError where typst refuses it (no text
+    of a document should be able to make it).
+    """
+    write_bytes(path, pdf_bytes(made if whole else summary(made)))
+    return Path(path)
+
+
+def pdf_bytes(made: Mapping[str, Any]) -> bytes:
+    """Give a report as PDF; see `write_pdf`.
+
+    The fonts are those that come with typst and matplotlib, embedded; what they lack is taken from the
+    system's.  The same document gives the same file wherever those are the same.
+    """
+    need("typst", "pdf", "a PDF")
+    import typst
+
+    data = json.dumps(printable(made), ensure_ascii=False, allow_nan=False)
+    if len(data) > MAX_BYTES:
+        raise InputError(f"report of {len(data)} bytes: at most {MAX_BYTES} can be typeset")
+    try:
+        return bytes(
+            typst.compile(
+                str(TEMPLATE),
+                root=str(TEMPLATE.parent),
+                font_paths=[font_folder()],
+                sys_inputs={"document": data},
+                timestamp=_time(made),
+                format="pdf",
+            )
+        )
+    except typst.TypstError as error:
+        raise NumericalError(f"typst refuses the report: {str(error).splitlines()[0]}") from error
+
+
+@cache
+def font_folder() -> str:
+    """Folder of the fonts that matplotlib brings along: those of the figures."""
+    import matplotlib
+
+    return str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")
+
+
+def _time(made: Mapping[str, Any]) -> int:
+    text = (made.get("provenance") or {}).get("time")
+    try:
+        return int(datetime.fromisoformat(str(text)).astimezone(UTC).timestamp())
+    except (ValueError, OverflowError):
+        return 0
+
+
 def summary(made: Mapping[str, Any]) -> Tree:
     """A document with the first screen, what it found in one line a section, and where it comes from."""
     kept = [part for part in made["sections"] if part["id"] in ("answer", "provenance")]
+    rows = []
+    for part in (one for one in made["sections"] if one not in kept):
+        told = part["status"] if part["status"] in ("fail", "warn") else ""  # green is said of verdicts only
+        rows.append({"part": part["title"], "found": part.get("result") or "", "_status": told})
     columns = [column("part", "Section"), column("found", "Found")]
-    rows = [
-        {"part": part["title"], "found": part.get("result") or "", "_status": part["status"]}
-        for part in made["sections"]
-        if part not in kept
-    ]
-    for row in rows:  # green is said of verdicts only
-        row["_status"] = row["_status"] if row["_status"] in ("fail", "warn") else ""
-    found = section(
-        "found", "Section by section", [table("What each section of the whole report says", columns, rows)]
-    )
-    return {**made, "sections": [*kept[:1], found, *kept[1:]]}
+    found = table("What each section of the whole report says", columns, rows)
+    return {**made, "sections": [*kept[:1], section("found", "Section by section", [found]), *kept[1:]]}
 
 
 def printable(made: Mapping[str, Any]) -> Tree:
@@ -47,6 +108,8 @@ def printable(made: Mapping[str, Any]) -> Tree:
     blocks = figures(made)
     drawings = dict(zip(map(id, blocks), draw_all(blocks, page=False), strict=True))
     design, origin = made.get("design") or {}, made.get("provenance") or {}
+    every = (block for part in made["sections"] for block in walk(part))
+    own = (block for block in every if block.get("what", "requirements") == "requirements")
     return {
         "kicker": KICKERS.get(made.get("kind", "report"), "Report"),
         "title": clean(made.get("title"), MAX_TITLE),
@@ -54,7 +117,7 @@ def printable(made: Mapping[str, Any]) -> Tree:
         "overall": [[clean(words, 200), status] for words, status in verdict_lines(made["verdict"])],
         "facts": _facts(design, origin),
         "revision": clean(design.get("revision"), 60),
-        "verdicts": [_verdict(item) for item in _required(made)],
+        "verdicts": [_verdict(item) for item in judged(own)],  # what is signed
         "sections": [_section(part, drawings) for part in made["sections"]],
     }
 
@@ -85,26 +148,13 @@ def _facts(design: Mapping[str, Any], origin: Mapping[str, Any]) -> list[list[st
     return [[label, clean(value, 200)] for label, value in rows if value]
 
 
-def _required(made: Mapping[str, Any]) -> Iterable[Mapping[str, Any]]:
-    """Give the verdicts on the design's own requirements: what is signed."""
-    for part in made["sections"]:
-        for block in walk(part):
-            if block["kind"] == "verdicts" and block.get("what", "requirements") == "requirements":
-                yield from block["items"]
-
-
 def _verdict(item: Mapping[str, Any]) -> Tree:
     limit = f"{item.get('comparison') or ''} {show(item.get('limit'), 'short:6')}".strip()
+    value, distance = show(item.get("value"), "sig:4"), show_signed(item.get("distance"))
+    label, unit = clean(item.get("label"), 200), clean(item.get("unit"), 30)
     return {
         "state": role(item),
-        "cells": [
-            clean(item.get("label"), 200),
-            item["verdict"],
-            show(item.get("value"), "sig:4"),
-            clean(limit, 60),
-            show_signed(item.get("distance")),
-            clean(item.get("unit"), 30),
-        ],
+        "cells": [label, item["verdict"], value, clean(limit, 60), distance, unit],
         "id": clean(item.get("id"), 120),
         "reason": clean(why(item), 400),
         "source": clean(item.get("source"), 200),
@@ -116,14 +166,15 @@ def _section(part: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
         "title": clean(part["title"], MAX_TITLE),
         "intro": clean(f"{part.get('result') or ''} {part.get('intro') or ''}".strip(), MAX_TEXT),
         "status": part["status"],
-        "blocks": _paired([(_block(block, drawings), block) for block in part["blocks"]]),
+        "blocks": _paired(part["blocks"], drawings),
     }
 
 
-def _paired(made: Sequence[tuple[Tree, Mapping[str, Any]]]) -> list[Tree]:
-    """Put half-wide figures that follow each other in pairs beside each other."""
+def _paired(own: Sequence[Mapping[str, Any]], drawings: Mapping[int, str]) -> list[Tree]:
+    """Half-wide figures that follow each other stand in pairs beside each other."""
     blocks: list[Tree] = []
-    for printed, block in made:
+    for block in own:
+        printed = _block(block, drawings)
         if printed["kind"] != "figure" or block.get("layout", "wide") == "wide":
             blocks.append(printed)
         elif blocks and blocks[-1]["kind"] == "row" and len(blocks[-1]["figures"]) == 1:
@@ -158,13 +209,10 @@ def _glance(block: Mapping[str, Any]) -> Tree:
     cells = block["loops"][0]["figures"] if block["loops"] else []
     columns = [{"label": "Loop", "unit": "", "align": "left"}]
     columns += [{"label": cell["label"], "unit": cell["unit"], "align": "right"} for cell in cells]
-    rows = [
-        {
-            "status": "",
-            "cells": [_cell(row["loop"], "text"), *(_cell(c["value"], c["format"]) for c in row["figures"])],
-        }
-        for row in block["loops"]
-    ]
+    rows = []
+    for row in block["loops"]:
+        own = [_cell(cell["value"], cell["format"]) for cell in row["figures"]]
+        rows.append({"status": "", "cells": [_cell(row["loop"], "text"), *own]})
     weakest = block["weakest"]
     words = [f"Weakest point: {weakest['label']}, {weakest['words']}."] if weakest else []
     words += [f"{weakest['move']}."] if weakest and weakest.get("move") else []
@@ -185,22 +233,15 @@ def _figure(block: Mapping[str, Any], svg: str) -> Tree:
 
 def _table(block: Mapping[str, Any]) -> Tree:
     columns: Sequence[Mapping[str, Any]] = block["columns"]
-    return {
-        "kind": "table",
-        "caption": clean(block["caption"], 1000),
-        "note": clean(block.get("note"), 2000),
-        "columns": [
-            {"label": clean(c["label"], 120), "unit": clean(c["unit"], 30), "align": c["align"]}
-            for c in columns
-        ],
-        "rows": [
-            {
-                "status": row.get("_status") or "",
-                "cells": [_cell(row.get(c["key"]), c["format"]) for c in columns],
-            }
-            for row in block["rows"]
-        ],
-    }
+    heads = [
+        {"label": clean(c["label"], 120), "unit": clean(c["unit"], 30), "align": c["align"]} for c in columns
+    ]
+    rows = []
+    for row in block["rows"]:
+        cells = [_cell(row.get(c["key"]), c["format"]) for c in columns]
+        rows.append({"status": row.get("_status") or "", "cells": cells})
+    texts = {"caption": clean(block["caption"], 1000), "note": clean(block.get("note"), 2000)}
+    return {"kind": "table", **texts, "columns": heads, "rows": rows}
 
 
 def _cell(value: Any, form: str) -> dict[str, str]:

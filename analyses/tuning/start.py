@@ -1,0 +1,251 @@
+"""Where tuning begins, and what it may set.
+
+Closed-form gains that drive engineers start from, from the inner loop out; gains as the motion controller's
+objects hold them; and elements that may be added. A notch, a low-pass, feed-forward of a velocity loop are
+neutral until they are needed: a notch of depth 1, a low-pass at the end of the band, no feed-forward. The
+distance from there is what they cost, in the same measure as a gain (`change`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from math import ceil, floor, inf, pi, sqrt
+from typing import Literal, get_args
+
+import numpy as np
+
+from actuator_lti.design.model import Design, Filter
+from actuator_lti.design.object_dictionary import OBJECTS, KnownObject, step_of
+from actuator_lti.drive.facts import resonance_rad_s
+from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
+from actuator_lti.errors import InputError
+
+WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
+SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
+
+
+def magnitude_optimum(gain: float, time_constant_s: float, small_time_s: float) -> tuple[float, float]:
+    """PI (gain, integral time) for ``gain/(1 + s T1)`` behind small delays of T_sigma in sum.
+
+    The zero cancels T1 and the loop becomes ``1/(2 T_sigma s (1 + s T_sigma))``: damping 0.707, overshoot
+    4.3 %. Kessler 1958 (Betragsoptimum).
+    """
+    return time_constant_s / (2.0 * gain * small_time_s), time_constant_s
+
+
+def symmetric_optimum(integrator_gain: float, small_time_s: float, a: float = 2.0) -> tuple[float, float]:
+    """PI (gain, integral time) for ``k/s`` behind a small time constant T_sigma.
+
+    Crossover at 1/(a T_sigma) where the phase is highest, Tn = a^2 T_sigma; a = 2 is the usual choice.
+    Phase margin ``arctan(a) - arctan(1/a)``: 36.9 deg for a = 2, 60 deg for 2 + sqrt(3). Kessler 1958.
+    """
+    return 1.0 / (a * integrator_gain * small_time_s), a * a * small_time_s
+
+
+@dataclass(frozen=True)
+class RuleGains:
+    """Gains by rules, and how they were found."""
+
+    values: Mapping[str, float]  # SI by dotted key
+    steps: tuple[str, ...]  # one line a loop
+
+
+def rule_gains(design: Design) -> RuleGains:
+    """Start gains of every loop that a design has; a law of one's own stays, the others are tuned around it.
+
+    Current: magnitude optimum with T_sigma = d + T/2. Velocity: symmetric optimum for 60 deg, with the
+    current loop as a lag 2 T_sigma, its own hold, and what the speed measurement costs. Position: the
+    velocity loop's crossover over `SEPARATION`. Where a stage is missing, the next one takes its place.
+    """
+    values, steps, own = dict[str, float](), list[str](), design.controller.own_law
+    for loop, gain, time, words in _by_rule(design):
+        if own is None or own[0] != loop:
+            values[f"control.{loop}.gain"] = gain
+            if time is not None:
+                values[f"control.{loop}.integral_time"] = time
+            steps.append(f"{loop}: {words}")
+    if own is not None:
+        steps.append(f"{own[0]}: a law of one's own, left as it is")
+    return RuleGains(values, tuple(steps))
+
+
+def _by_rule(design: Design) -> Iterator[tuple[str, float, float | None, str]]:
+    """Loop, gain, integral time where it has one, and the rule in words, from the inner loop out."""
+    control, motor, encoder = design.controller, design.effective_motor, design.encoder
+    T, inner_s, torque, J = control.period_s, 0.0, standing_gain(design), design.inertia_kgm2
+    small = control.computing_delay_s + 0.5 * T  # T_sigma: delays of all that lies inside
+    if control.current is not None:
+        assert motor.resistance_ohm is not None
+        assert motor.inductance_H is not None
+        R, L = motor.resistance_ohm, motor.inductance_H
+        gain, time = magnitude_optimum(1.0 / R, L / R, small)
+        words = f"magnitude optimum, T_sigma {small * 1e6:.4g} us"
+        yield "current", gain, None if control.current.integral_time_s is None else time, words
+        small, inner_s = 2.0 * small, T
+    if control.velocity is not None:
+        own_s = control.velocity.every * T
+        small = small + max(0.5 * (own_s - inner_s), 0.0) + encoder.filter_time_s
+        if encoder.speed == "difference":
+            small += 0.5 * encoder.difference_samples * own_s
+        gain, time = symmetric_optimum(torque / J, small, WIDE)
+        words = f"symmetric optimum for 60 deg, T_sigma {small * 1e6:.4g} us"
+        yield "velocity", gain, None if control.velocity.integral_time_s is None else time, words
+        crossover = 1.0 / (WIDE * small)
+        if control.position is not None:
+            words = f"velocity crossover {crossover:.4g} rad/s over {SEPARATION:g}"
+            yield "position", crossover / SEPARATION, None, words
+    elif control.position is not None:  # |drive| = 1 at a tenth of 1/T_sigma or at its corner
+        corner = own_drag_Nms_rad(design) / J
+        omega = min(0.1 / small, corner) if corner > 0.0 else 0.1 / small
+        response = torque / (J * abs(complex(corner, omega)) * omega)
+        words = "no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below"
+        yield "position", 1.0 / response, None, words
+
+
+def object_of(design: Design, path: str) -> KnownObject | None:
+    """The object that holds a gain; None where the drive is not that motion controller."""
+    if not design.objects.named:
+        return None
+    return next((known for known in OBJECTS.values() if path in known.paths), None)
+
+
+def step_of_gain(design: Design, path: str) -> float | None:
+    """SI value of one step of the object that holds a gain."""
+    known = object_of(design, path)
+    return None if known is None else step_of(known, design.objects.velocity_gain_factor)
+
+
+def allowed_range(design: Design, path: str) -> tuple[float, float]:
+    """Smallest and largest SI value of a gain that its object can hold."""
+    known, step = object_of(design, path), step_of_gain(design, path)
+    return (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
+
+
+def neighbours(design: Design, paths: tuple[str, ...], gains: np.ndarray) -> np.ndarray:
+    """All roundings of gains to the steps of their objects, up and down, shape (roundings, gains).
+
+    A gain without an object stays as it is.
+    """
+    choices = []
+    for path, value in zip(paths, gains, strict=True):
+        step = step_of_gain(design, path)
+        if step is None:
+            choices.append((float(value),))
+            continue
+        low, high = allowed_range(design, path)
+        around = {floor(value / step), ceil(value / step)}
+        inside = sorted(n * step for n in around if low * (1 - 1e-12) <= n * step <= high * (1 + 1e-12))
+        choices.append(tuple(inside) or (float(np.clip(round(value / step) * step, low, high)),))
+    return np.array(list(product(*choices)))
+
+
+Element = Literal["notch", "lowpass", "feedforward"]
+ELEMENTS: tuple[Element, ...] = get_args(Element)
+DEEPEST = 0.01  # of a notch, -40 dB
+END_OF_BAND = 0.9  # of the Nyquist frequency of the velocity loop
+
+
+@dataclass(frozen=True)
+class Variable:
+    """One number that tuning may choose, its values in SI."""
+
+    path: str
+    start: float
+    low: float
+    high: float
+    home: float | None  # value that costs nothing; None where every value does
+    linear: bool = False  # whether it counts by itself (a share that may be 0), and not by its logarithm
+    # Path of a variable that it is measured against (the width of a notch against its frequency)
+    per: str = ""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A design with neutral elements, and their variables."""
+
+    design: Design
+    variables: tuple[Variable, ...]
+    elements: tuple[Element, ...]
+
+
+def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
+    """What may be placed in a design; an unknown word, or what the drive has no place for, is refused."""
+    control, name = design.controller, design.name
+    for word in wanted:
+        if word not in ELEMENTS:
+            raise InputError(f"place = {word!r}: allowed: {', '.join(ELEMENTS)}")
+        if control.velocity is None:
+            raise InputError(f"place = {word}: the design {name} has no control.velocity to hold it")
+        if word == "feedforward" and control.position is None:
+            raise InputError(
+                f"place = {word}: the design {name} has no control.position, whose command it needs"
+            )
+    return tuple(item for item in ELEMENTS if item in wanted)
+
+
+def place(design: Design, elements: tuple[Element, ...]) -> Placed:
+    """A design with neutral elements in its velocity loop."""
+    variables: list[Variable] = []
+    for element in elements:
+        if element == "feedforward":
+            variables += _feedforward(design)
+            continue
+        velocity = design.controller.velocity
+        assert velocity is not None
+        item, own = _filter(design, element)
+        filters = (*velocity.filters, item)
+        control = replace(design.controller, velocity=replace(velocity, filters=filters))
+        design, path = replace(design, controller=control), f"control.velocity.filter.{len(filters)}."
+        variables += [replace(v, path=path + v.path, per=path + v.per if v.per else "") for v in own]
+    return Placed(design, tuple(variables), elements)
+
+
+def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
+    """A neutral filter, from Nyquist of the velocity loop (90 % of it) three decades down.
+
+    A notch begins at the resonance of motor and load on the coupling, without damping; without one in the
+    middle of the band.
+    """
+    velocity = design.controller.velocity
+    assert velocity is not None
+    high = END_OF_BAND * pi / (velocity.every * design.controller.period_s)
+    low = high / 1000.0
+    if element == "lowpass":
+        lowpass = Filter(kind="lowpass", frequency_rad_s=high)
+        return lowpass, [Variable("frequency", high, low, high, high)]
+    free = sqrt(low * high) if design.coupling is None else resonance_rad_s(design)
+    centre = float(np.clip(free, low, high))
+    item = Filter(kind="notch", frequency_rad_s=centre, width_rad_s=0.5 * centre, depth=1.0)
+    return item, [
+        Variable("frequency", centre, low, high, None),
+        Variable("width", 0.5 * centre, 0.02 * low, 4.0 * high, None, per="frequency"),
+        Variable("depth", 1.0, DEEPEST, 1.0, 1.0),
+    ]
+
+
+def _feedforward(design: Design) -> list[Variable]:
+    position = design.controller.position_loop
+    return [
+        Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
+        for key in ("feedforward", "acceleration_feedforward")
+        for value in [getattr(position, key)]
+    ]
+
+
+def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
+    """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
+
+    Of rows in SI, shape (candidates, variables); shape (candidates,).
+    """
+    places = {v.path: k for k, v in enumerate(variables)}
+    total = np.zeros(len(values))
+    for k, item in enumerate(variables):
+        if item.per:
+            total += (values[:, k] / values[:, places[item.per]]) ** 2
+        elif item.home is not None and item.linear:
+            total += (values[:, k] - item.home) ** 2
+        elif item.home is not None and item.home < inf:
+            total += np.log(values[:, k] / item.home) ** 2
+    return total
