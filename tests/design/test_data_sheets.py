@@ -163,6 +163,7 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         ("limits.peak_current", "12 A dc", 12.0),
         ("control.velocity.gain", "0.04 A rms*s/rad", 0.04 * sqrt(1.5)),
         ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
+        ("control.current.gain", "12.5 V/A phase", 25.0),  # L w of a phase is half of L w line-line
         ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
         ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
@@ -183,6 +184,7 @@ def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value
         (FLAT, "motor.torque_constant", "0.1 Nm/Apk"),
         (SERVO, "limits.voltage", "230 Vrms"),
         (FLAT, "limits.peak_current", "5 A rms"),
+        (SERVO, "limits.peak_current", "5 A phase"),
     ],
 )
 def test_a_convention_that_the_motor_has_not_is_refused(text: str, path: str, bad: str) -> None:
@@ -195,7 +197,7 @@ def test_a_convention_that_the_motor_has_not_is_refused(text: str, path: str, ba
     [
         ("limits.peak_current", "12 A", r"A rms \(its data sheet's\) or A dc"),
         ("control.velocity.gain", "0.04 A*s/rad", r"A rms\*s/rad .* or A dc\*s/rad"),
-        ("control.current.gain", "25 V/A", "V/A rms .* or V/A dc"),
+        ("control.current.gain", "25 V/A", "V/A rms .* or V/A dc .*: V/A phase"),
     ],
 )
 def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: str, allowed: str) -> None:

@@ -163,7 +163,10 @@ def test_a_rigid_stage_that_cannot_hold_its_load_is_warned_of() -> None:
     (line,) = elastic_warnings(with_overrides(AMBER, low))
     assert line.startswith("friction.load_coefficient: ")
     damped = {"coupling": {**SPRING["coupling"], "damping": "0.1 N*m*s/rad"}, "load.path": "back-drivable"}
-    assert list(elastic_warnings(with_overrides(AMBER, {**damped, **low}))) == []
+    (line,) = elastic_warnings(with_overrides(AMBER, {**damped, **low}))
+    assert line.startswith("coupling.play: ")
+    rubbing = {"load.friction.dry_torque": "0.1 N*m"}
+    assert list(elastic_warnings(with_overrides(AMBER, {**damped, **low, **rubbing}))) == []
 
 
 def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
