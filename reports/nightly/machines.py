@@ -7,8 +7,7 @@ from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
 from actuator_lti.files.tree import Tree
-from reports.nightly.changes import Comparison
-from reports.nightly.headline import cause_lines
+from reports.nightly.changes import Comparison, cause_lines
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import STATES, DesignView, Overview
 from reports.numbers import or_none

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.conditional import Conditional, Prediction
+from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
@@ -36,10 +36,8 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    if not conditional.diverges:
-        return []
     text = _words(conditional, *output_unit(axis))[0]
-    return [doc.Finding(severity="fail", text=text, where="conditional")]
+    return [doc.Finding(severity="fail", text=text, where="conditional")] if conditional.diverges else []
 
 
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:

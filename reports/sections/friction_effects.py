@@ -221,7 +221,8 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = noticed(result.design, settlings)
     if swing is not None:
-        return f"Friction keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
+        ends = told(result.design, swing, fine, small)
+        return f"Friction alone keeps the drive from rest after a step: {ends}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
     if left:
         most = max(settlings, key=lambda one: abs(one.rest.error))

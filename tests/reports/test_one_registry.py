@@ -14,7 +14,7 @@ from reports.html import script
 from reports.live import live_model
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, figures_of
-from reports.nightly.tolerance import Tolerances
+from reports.nightly.moves import Tolerances
 from reports.sections import answer, loop, margins
 
 DESIGN = load_design("ilr33-amber")
