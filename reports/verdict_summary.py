@@ -87,6 +87,20 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
         yield from walk(block)
 
 
+def open_items(sections: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Name what is not met, or not proven and not waived, with the reason or with value and limit."""
+    blocks = [block for part in sections for block in walk(part) if block["kind"] == "verdicts"]
+    items = [item for block in blocks for item in block["items"] if role(item) in ("fail", "warn")]
+    items.sort(key=lambda item: role(item) != "fail")
+    return list(dict.fromkeys(f"{item['verdict']}: {item['label']}{_found(item)}" for item in items))
+
+
+def _found(item: Mapping[str, Any]) -> str:
+    if item["value"] is None or item["limit"] is None:
+        return f": {item['reason']}" if item["reason"] else ""
+    return f": {item['value']:.4g}, limit {item['comparison']} {item['limit']:g} {item['unit']}".rstrip()
+
+
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
     """Collect the findings that sections carry, each once: the gravest first, of every section in turn."""
     every = [item for part in sections for item in part.get("findings", ())]

@@ -74,13 +74,7 @@ class Counts:
 
 
 def counted_gain(ratio: float, offset: float = 0.0) -> float:
-    """Gain of counts for a sine of amplitude ``ratio`` counts about a bias of ``offset`` counts off an edge.
-
-    Examples
-    --------
-    >>> round(counted_gain(0.5) - 4.0 / 3.141592653589793, 12), round(counted_gain(1e3), 3)
-    (0.0, 1.0)
-    """
+    """Gain of counts for a sine of amplitude ``ratio`` counts, ``offset`` counts off an edge."""
     edges = np.arange(np.ceil(-ratio - offset), np.floor(ratio - offset) + 1.0) + offset
     inside = np.abs(edges) < ratio
     return float(2.0 / (pi * ratio) * np.sqrt(1.0 - (edges[inside] / ratio) ** 2).sum())
@@ -106,11 +100,12 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
-    at_motor = quantum * (design.total_ratio if sensor == "output" else 1.0)
+    to_motor = design.total_ratio if sensor == "output" else 1.0
+    to_output = design.total_ratio if sensor == "motor" else 1.0
     alone, ideal = without_counts(design, other), without_counts(design)
-    ripple, at = _ripple(alone, ideal, at_motor, settle_ticks)
-    wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0)
-    off = _linearity(alone, ideal, loops, wanted, settle_ticks)
+    ripple, at = _ripple(alone, ideal, quantum * to_motor, settle_ticks)
+    linear = linear_ratio() * quantum
+    off = _linearity(alone, ideal, loops, linear / to_output, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
     made_of = velocity is not None and velocity.sensor == sensor and design.encoder.speed == "difference"
     return Counts(
@@ -118,11 +113,11 @@ def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Count
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
         standing_seen_rad=_standing(alone, ideal),
-        speed_step_rad_s=at_motor / _span_s(design) if made_of else None,  # q/(m T)
+        speed_step_rad_s=quantum * to_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
         cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design, (cause,))),
-        linear_rad=linear_ratio() * quantum,
+        linear_rad=linear,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
     )
@@ -148,8 +143,7 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
         rows.ramp("command", speeds / one.total_ratio)
         rows["ticks"] = settle_ticks + 2 * window
         rows.window(window, 1, 0)
-        low, high = rows.run().span("motor_speed_rad_s")
-        found.append(0.5 * (high - low))
+        found.append(0.5 * np.ptp(rows.run().span("motor_speed_rad_s"), axis=0))
     added = found[0] - found[1]
     k = int(np.argmax(added))
     return max(float(added[k]), 0.0), float(speeds[k])
@@ -158,10 +152,10 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
 def _standing(design: Design, ideal: Design) -> float:
     """Error that counts leave after a step."""
     size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
-    ends = []
-    for one in (design, ideal):
-        low, high = step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad")
-        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])))
+    spans = [
+        step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad") for one in (design, ideal)
+    ]
+    ends = [abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])) for low, high in spans]
     return abs(ends[0] - ends[1])
 
 

@@ -16,8 +16,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.corners import corners
 from analyses.duty import duty
 from analyses.failures import failures
-from analyses.large_signal.steady_start import linear_steady_state
-from analyses.large_signal.tones import run_tones, tone
+from analyses.large_signal.tones import linear_steady_state, run_tones, tone
 from analyses.limit_cycles import limit_cycles
 from analyses.motion.settling import ending_of
 

@@ -10,8 +10,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
-from analyses.large_signal.steady_start import linear_steady_state
-from analyses.large_signal.tones import TANH_TOLERANCE
+from analyses.large_signal.tones import TANH_TOLERANCE, linear_steady_state
 from analyses.specification.capability import (
     Capability,
     Manoeuvre,

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.conditional import Conditional, Prediction
+from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc

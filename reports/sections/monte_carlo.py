@@ -10,8 +10,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.statistics import ColumnStatistics
+from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, or_none

@@ -18,7 +18,7 @@ from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.loops.limiters import onset
 from actuator_lti.step import step_figures
 from analyses.isolation import isolated
-from analyses.large_signal.at_rest import free_amplitude, sweep_from_rest
+from analyses.large_signal.from_rest import free_amplitude, sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.responses import answer_curve, response_at
