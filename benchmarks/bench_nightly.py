@@ -15,11 +15,11 @@ from benchmarks.row import Row
 from reports.nightly.cache import Cache
 from reports.nightly.figures import Figure
 from reports.nightly.history import History, Reported, open_history
+from reports.nightly.moves import change_points
 from reports.nightly.night import Settings, run_night
 from reports.nightly.pages import design_page, index
 from reports.nightly.records import Result
 from reports.nightly.source import Study, read_study
-from reports.nightly.trend import change_points
 from reports.nightly.view import overview
 
 GROUP = "nightly"

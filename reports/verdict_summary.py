@@ -25,13 +25,12 @@ _SECTIONS: tuple[tuple[str, str, Role], ...] = (
 
 def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
     """Count items of `reports.document.verdicts`, of some the checks that they gather."""
-    counts = (
-        Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
-        if (gathered := item.get("gathers")) is None
-        else Tally(**gathered)
-        for item in items
-    )
-    return sum(counts, Tally())
+    count = Tally()
+    for item in items:
+        gathered = item.get("gathers")
+        one = Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
+        count += one if gathered is None else Tally(**gathered)
+    return count
 
 
 def role(item: Mapping[str, Any]) -> Role:
@@ -86,6 +85,20 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
     for block in part.get("blocks", ()):
         yield block
         yield from walk(block)
+
+
+def open_items(sections: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Name what is not met, or not proven and not waived, with the reason or with value and limit."""
+    blocks = [block for part in sections for block in walk(part) if block["kind"] == "verdicts"]
+    items = [item for block in blocks for item in block["items"] if role(item) in ("fail", "warn")]
+    items.sort(key=lambda item: role(item) != "fail")
+    return list(dict.fromkeys(f"{item['verdict']}: {item['label']}{_found(item)}" for item in items))
+
+
+def _found(item: Mapping[str, Any]) -> str:
+    if item["value"] is None or item["limit"] is None:
+        return f": {item['reason']}" if item["reason"] else ""
+    return f": {item['value']:.4g}, limit {item['comparison']} {item['limit']:g} {item['unit']}".rstrip()
 
 
 def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:

@@ -97,9 +97,9 @@ def _most(design: Design) -> Iterator[Refusal]:
 
 def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design: Design) -> Iterator[Refusal]:
     value, unit = getattr(part_at(design, field.section), field.attribute), field.unit(Structure.of(design))
-    most, why = bound(design)
+    (most, why), unit = bound(design), "" if unit == "1" else f" {unit}"
     if value > most:
-        yield field.path, f"{value:g} {unit}", f"{why}; allowed: at most {most:.4g} {unit}"
+        yield field.path, f"{value:g}{unit}", f"{why}; allowed: at most {most:.4g}{unit}"
 
 
 FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)  # of inertia, constants

@@ -161,8 +161,8 @@ class CurrentLoop:
     The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
     """
 
-    gain_V_A: Annotated[float, positive("gain of the current PI", "Kp_i", example="20 mohm",
-        required=True)] = ABSENT
+    gain_V_A: Annotated[float, positive("gain of the current PI; of a dq controller in V/A phase", "Kp_i",
+        example="20 mohm", required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive("integral time of the current PI; without it a P "
         "controller", "Tn_i", example="150 us")] = None
     back_emf_feedforward: Annotated[float, quantity("share of the back-EMF kE w added to the voltage",

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from math import isfinite, pi, sqrt
 from pathlib import Path
@@ -206,18 +207,18 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
         raise InputError(unfit, where=where)
     given = found.read(text, where)
     overrides, used, notes = _overrides(found, given, base, path.name)
-    tables = {key.rpartition(".")[0] for key in overrides}
-    tables |= {path for _, path, _ in parts_of(base)}
+    tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
     fixed = {
         key: value if key == "encoder.speed" else {"value": value, "source": found.words}
         for key, value in found.fixed.items()
         if key.rpartition(".")[0] in tables
     }
-    left = [name for name in given if name not in (*used, *found.also)]
-    words = f"not understood, of {len(given)} settings: {', '.join(left) or 'none'}"
-    design = with_overrides(base, {**fixed, **overrides})
-    changed = tuple(key for key in {**fixed, **overrides} if key in design.parameters)
-    return Imported(design=design, changed=changed, kept=(), notes=(f"read as {found.words}", *notes, words))
+    left = ", ".join(name for name in given if name not in (*used, *found.also)) or "none"
+    notes = [f"read as {found.words}", *notes, f"not understood, of {len(given)} settings: {left}"]
+    changes = {**fixed, **overrides}
+    design = with_overrides(base, changes)
+    changed = tuple(key for key in changes if key in design.parameters)
+    return Imported(design=design, changed=changed, kept=(), notes=tuple(notes))
 
 
 def _overrides(
@@ -227,14 +228,15 @@ def _overrides(
     overrides: dict[str, Any] = {}
     used: set[str] = set()
     notes: list[str] = []
-    for item in found.settings:
-        numbers = [_number(given.get(name)) for name in item.names]
-        known = [number for number in numbers if number is not None]
-        if not item.holds(base) or len(known) < len(numbers):
-            notes += _wanted(item, given) if known and item.holds(base) else []
+    for item in (one for one in found.settings if one.holds(base)):
+        numbers = {name: number for name in item.names if (number := _number(given.get(name))) is not None}
+        lacking = [name for name in item.names if name not in numbers]
+        if lacking:
+            said = f"{item.names[0]}: needs {', '.join(lacking)} for {item.key}"
+            notes += [said] if item.names[0] in numbers else []
             continue
         used |= {*item.names}
-        value = item.of(known)
+        value = item.of([*numbers.values()])
         stated = ", ".join(f"{name} = {given[name]}" for name in item.names)
         if item.key == "limits.speed" and value > no_load_speed(base):
             notes.append(f"{stated}: faster than the supply allows, left out")
@@ -246,14 +248,7 @@ def _overrides(
     return overrides, used, notes
 
 
-def _wanted(item: Setting, given: Tree) -> list[str]:
-    """What a file lacks of the numbers that make a key together, where it has the first of them."""
-    lacking = [name for name in item.names if _number(given.get(name)) is None]
-    return [] if item.names[0] in lacking else [f"{item.names[0]}: needs {', '.join(lacking)} for {item.key}"]
-
-
 def _number(raw: object) -> float | None:
-    try:
+    with suppress(TypeError, ValueError, OverflowError):
         return None if isinstance(raw, bool) else float(raw)  # type: ignore[arg-type]
-    except (TypeError, ValueError, OverflowError):
-        return None
+    return None

@@ -65,18 +65,23 @@ def as_stated(tree: Tree, changed: Collection[str]) -> None:
             pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
 
 
+def _words(entry: Any) -> tuple[list[re.Match[str] | None], str]:
+    """What a sheet's own keys say in the source of a value that was read from them, and its own source."""
+    said, _, source = entry["source"].removeprefix(FROM).partition("; ")
+    return [_WORD.fullmatch(word) for word in said.split(", ")], source
+
+
 def _is_read(entry: Any, tables: Collection[str]) -> bool:
     """Whether a value of friction and its tolerance are as a sheet's keys were read: no words of a user."""
-    source = entry.get("source", "") if isinstance(entry, dict) else ""
-    words = [_WORD.fullmatch(word) for word in source.removeprefix(FROM).partition("; ")[0].split(", ")]
-    read = source.startswith(FROM) and entry.get("tolerance", _OPEN) == _OPEN
-    return read and all(word is not None and word["table"] in tables for word in words)
+    if not isinstance(entry, dict) or not entry.get("source", "").startswith(FROM):
+        return False
+    known = all(word is not None and word["table"] in tables for word in _words(entry)[0])
+    return known and entry.get("tolerance", _OPEN) == _OPEN
 
 
 def _put_back(tables: dict[str, Tree], entry: Tree) -> None:
-    words, _, source = entry["source"].removeprefix(FROM).partition("; ")
-    for word in map(_WORD.fullmatch, words.split(", ")):
-        assert word is not None
+    words, source = _words(entry)
+    for word in filter(None, words):
         stated = {"value": word["text"], "source": source, "grade": entry.get("grade", "")}
         tables[word["table"]][word["key"]] = stated
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated
 
@@ -38,35 +38,28 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     >>> entry.default, entry.allowed
     ('1', 'at least 1 and at most 1000')
     """
-    kinds = {section.template: section.kind for section in SECTIONS}
-    structure = Structure(axis)
     order = list(dict.fromkeys(field.section for field in ALL_FIELDS))
     listed = sorted((*ALL_FIELDS, *SHEET), key=lambda field: order.index(field.section))
-    return tuple(_entry(field, kinds.get(field.section), structure) for field in listed)
+    return tuple(_entry(field, Structure(axis)) for field in listed)
 
 
-def _entry(field: Field, kind: type | None, structure: Structure) -> KeyEntry:
+def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
     same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
-    return KeyEntry(
-        **{
-            **same,
-            "unit": unit,
-            "default": "" if field.required else _default(field, kind, unit),
-            "allowed": _allowed(field, unit),
-        }
-    )
+    default = "" if field.required else _default(field, unit)
+    return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
 
 
-def _default(field: Field, kind: type | None, unit: str) -> str:
+def _default(field: Field, unit: str) -> str:
+    kind = next((section.kind for section in SECTIONS if section.template == field.section), None)
     known = {item.name: item.default for item in fields(kind)} if kind is not None else {}
-    value = known.get(field.attribute, MISSING)
-    if value is MISSING or value is None or value in ("", ()):
+    value = known.get(field.attribute)
+    if value in (None, "", ()):
         return ""
     if value == inf:
         return "none"
     if isinstance(value, bool):
-        return "true" if value else "false"
+        return f"{value}".lower()
     if isinstance(value, tuple):
         return ", ".join(f"{item:g}" for item in value)
     text = value if isinstance(value, str) else f"{value:.10g}"
@@ -74,9 +67,8 @@ def _default(field: Field, kind: type | None, unit: str) -> str:
 
 
 def _allowed(field: Field, unit: str) -> str:
-    if field.kind in ("text", "label"):
-        return ""
-    if field.kind in ("quantity", "quantities", "matrix") and field.low == -BIG and field.high == BIG:
+    numbers = field.kind in ("quantity", "quantities", "matrix")
+    if field.kind in ("text", "label") or (numbers and (field.low, field.high) == (-BIG, BIG)):
         return ""
     if field.high == BIG:
         return "above 0" if field.low > 0 else "0 or more"

@@ -35,7 +35,8 @@ def read_law(path: Path) -> Tree:
         held = _from_mat(data) if path.suffix == ".mat" else parse_json(decode(data, where), where)
     except InputError as error:
         raise InputError(f"cannot be read: {error.message}; allowed: a {_WHAT}", where=where) from None
-    held = _holding(held)
+    tables = [held, *(held.values() if isinstance(held, dict) else ())]  # the file itself, or one in it
+    held = next((one for one in tables if isinstance(one, dict) and "D" in one), None)
     if held is None:
         raise InputError(f"holds no A, B, C and D; allowed: a {_WHAT}", where=where)
     period = next((held[name] for name in _PERIODS if name in held), None)
@@ -55,12 +56,6 @@ def _from_mat(data: bytes) -> Tree:
         table, _, field = name.rpartition(".")
         (held.setdefault(f"{table}.", {}) if table else held)[field] = values
     return held
-
-
-def _holding(held: Any) -> Tree | None:
-    """The table that has D and perhaps the others: the file itself, or one in it."""
-    tables = [held, *(held.values() if isinstance(held, dict) else ())]
-    return next((one for one in tables if isinstance(one, dict) and "D" in one), None)
 
 
 def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) -> Tree:

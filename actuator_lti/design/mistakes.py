@@ -199,12 +199,12 @@ def _paths(names: list[str], tree: Any, counts: Mapping[str, int]) -> tuple[str,
     spelled: tuple[str, ...] = ("",)
     for depth, name in enumerate(names, 1):
         tree = tree.get(name) if isinstance(tree, dict) else None
-        labels = [f".{name}"]
+        labels = [name]
         if isinstance(tree, list):
             count = counts.get("\0".join(names[:depth]), 0)
             tree = tree[count - 1] if 0 < count <= len(tree) else None
             known = [tree.get(key) for key in ("name", "id", "requirement")] if isinstance(tree, dict) else []
-            texts = [label for label in known if isinstance(label, str)]
-            labels = [f".{name}.{label}" for label in (*texts[:1], count)] + [f".{name}[{count}]"]
-        spelled = tuple(f"{begin}{label}" for begin in spelled for label in labels)
+            label = next((one for one in known if isinstance(one, str)), count)
+            labels = [f"{name}.{label}", f"{name}.{count}", f"{name}[{count}]"]
+        spelled = tuple(f"{begin}.{label}" for begin in spelled for label in labels)
     return tuple(path[1:] for path in spelled)

@@ -215,7 +215,8 @@ def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, 
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)
     unit = "rad/s" if design.axis == "rotary" else "m/s"
-    return most, f"held over a tick, in which {speed:.4g} {unit} passes more than {MOST_PHASE_rad} rad of it"
+    passed = f"{speed:.4g} {unit} passes more than {MOST_PHASE_rad} rad of it"
+    return most, f"held over a tick, in which {passed} (a lower limits.speed or control.period takes more)"
 
 
 def _largest_damping(design: "Design") -> tuple[float, str]:

@@ -35,12 +35,13 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
-_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk)\b\)?", re.IGNORECASE)
+_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
 _PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
+PHASE = "V/A phase"
 _UPSIDE_DOWN = {
     "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),
     "motor.cogging_periods": (2.0 * pi, "{angle}"),
@@ -292,10 +293,13 @@ class Reader:
         which = ampere_unit(field.path, unit, self.constants)
         if which == unit or value == 0.0 or isinf(value) or not isinstance(text, str) or _DIRECT.search(text):
             return value
-        own = "rms" if self.constants == "rms-line" else "peak"
+        own = which.replace("dc", "rms" if self.constants == "rms-line" else "peak")
+        volts, phase = "", ""
+        if unit.startswith("V/A"):
+            volts, phase = ", volts line-line", f"; of a dq controller, of a phase: {PHASE}"
         raise InputError(
             "which amperes of the AC motor is not said; "
-            f"allowed: {which.replace('dc', own)} (its data sheet's) or {which} (the model's)"
+            f"allowed: {own} (its data sheet's{volts}) or {which} (the model's){phase}"
         )
 
     def _amperes(self, field: Field, unit: str, convention: str) -> float:
@@ -303,6 +307,8 @@ class Reader:
 
         Constants of the motor become those of its convention, rms or peak; kE against kM tells a wrong one.
         """
+        if convention == "phase":
+            return _per_phase(unit)
         given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
         if self.constants == "dc":
             phase = ", where R and L are per phase" if given == "peak-phase" else ""
@@ -476,3 +482,10 @@ def _turned(path: str, text: Any, unit: str) -> float | None:
     except InputError:
         return None
     return one / value if value > 0.0 else None
+
+
+def _per_phase(unit: str) -> float:
+    """Of volts over amperes of a phase, the model's: R and L line-line are twice those of a phase."""
+    if not unit.startswith("V/A"):
+        raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
+    return 2.0

@@ -157,9 +157,8 @@ def part_at(design: model.Design, path: str) -> Any:
     """The part that a table's dotted path names; None if the design has none, KeyError if no table can."""
     if path in BY_PATH and not BY_PATH[path].many:
         return at_place(design, BY_PATH[path].place)
-    outer = path.rpartition(".")[0]
-    section = BY_PATH.get(outer)
-    if section is None or not section.many:
+    section = BY_PATH[path.rpartition(".")[0]]
+    if not section.many:
         raise KeyError(path)
     items = enumerate(at_place(design, section.place) or ())
     return next((item for index, item in items if section.item_path(index, item) == path), None)
@@ -172,9 +171,8 @@ def with_part(design: model.Design, path: str, part: Any) -> model.Design:
         section = BY_PATH[path.rpartition(".")[0]]
         old = at_place(design, section.place)
         part = tuple(part if section.item_path(i, item) == path else item for i, item in enumerate(old))
-    return _replaced(design, section.place.split("."), part)
-
-
-def _replaced(here: Any, names: list[str], part: Any) -> Any:
-    inner = part if len(names) == 1 else _replaced(getattr(here, names[0]), names[1:], part)
-    return replace(here, **{names[0]: inner})
+    outer, _, name = section.place.rpartition(".")
+    while outer:
+        part = replace(at_place(design, outer), **{name: part})
+        outer, _, name = outer.rpartition(".")
+    return replace(design, **{name: part})

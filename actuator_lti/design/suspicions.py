@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import isfinite, pi
+from math import inf, isfinite, pi
+from typing import Any
 
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
@@ -29,26 +30,24 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     return tuple(line for check in checks for line in check(design))
 
 
-def _loops(design: Design) -> Iterator[tuple[str, object, float]]:
+def _loops(design: Design) -> Iterator[tuple[str, Any, float]]:
     """Name, settings and period in s of each loop that the design has."""
-    control = design.controller
-    for name in reversed(control.stages):
-        loop = getattr(control, name)
-        yield name, loop, getattr(loop, "every", 1) * control.period_s
+    for name in reversed(design.controller.stages):
+        loop = getattr(design.controller, name)
+        yield name, loop, getattr(loop, "every", 1) * design.controller.period_s
 
 
 def _sampling(design: Design) -> Iterator[str]:
-    control = design.controller
     for name, loop, period in _loops(design):
-        integral = getattr(loop, "integral_time_s", None)
+        integral = loop.integral_time_s
         if integral is not None and integral < period:
             yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
-    if control.computing_delay_s > 2 * control.period_s:
-        ticks = control.computing_delay_s / control.period_s
+    ticks = design.controller.computing_delay_s / design.controller.period_s
+    if ticks > 2:
         yield f"control.computing_delay: {ticks:.3g} ticks is unusually long (1 to 2 are common)"
 
 
-def estimated_crossovers(design: Design) -> dict[str, float]:
+def _estimated_crossovers(design: Design) -> dict[str, float]:
     """First estimates of the loops' crossovers in rad/s, from the asymptotes; only for warnings."""
     control, motor = design.controller, design.effective_motor
     result: dict[str, float] = {}
@@ -57,17 +56,17 @@ def estimated_crossovers(design: Design) -> dict[str, float]:
     if control.velocity is not None:
         torque = motor.source_gain_Nm_V
         if torque is None and motor.torque_constant_Nm_A is not None and motor.resistance_ohm is not None:
-            divisor = 1.0 if control.current is not None else motor.resistance_ohm
-            torque = motor.torque_constant_Nm_A / divisor
+            torque = motor.torque_constant_Nm_A / (1.0 if control.current else motor.resistance_ohm)
         result["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
         if control.position is not None:
             result["position"] = control.position.gain
-    own = control.own_law  # has no crossover that a gain tells
-    return {stage: value for stage, value in result.items() if own is None or stage != own[0]}
+    if control.own_law is not None:  # has no crossover that a gain tells
+        result.pop(control.own_law[0], None)
+    return result
 
 
 def _crossovers(design: Design) -> Iterator[str]:
-    crossovers = estimated_crossovers(design)
+    crossovers = _estimated_crossovers(design)
     for name, _, period in _loops(design):
         nyquist = pi / period
         if crossovers.get(name, 0.0) > 0.4 * nyquist:
@@ -76,7 +75,7 @@ def _crossovers(design: Design) -> Iterator[str]:
                 f"Nyquist frequency of {nyquist:.3g} rad/s"
             )
     for inner, outer in (("current", "velocity"), ("velocity", "position")):
-        if inner in crossovers and outer in crossovers and crossovers[outer] > crossovers[inner]:
+        if crossovers.get(outer, 0.0) > crossovers.get(inner, inf):
             yield (
                 f"control.{outer}.gain: crossover near {crossovers[outer]:.3g} rad/s lies above that of the "
                 f"{inner} loop inside it, {crossovers[inner]:.3g} rad/s"
@@ -90,12 +89,10 @@ def _law(design: Design) -> Iterator[str]:
 
 
 def _limits(design: Design) -> Iterator[str]:
-    limits, resistance = design.limits, design.effective_motor.resistance_ohm
-    if resistance is not None:
-        stall = limits.voltage_V / resistance
-        if isfinite(limits.peak_current_A) and limits.peak_current_A > stall:
-            peak = limits.peak_current_A
-            yield f"limits.peak_current: {peak:g} A, but the supply gives only {stall:.3g} A at stall"
+    peak, resistance = design.limits.peak_current_A, design.effective_motor.resistance_ohm
+    stall = inf if resistance is None else design.limits.voltage_V / resistance
+    if stall < peak < inf:
+        yield f"limits.peak_current: {peak:g} A, but the supply gives only {stall:.3g} A at stall"
 
 
 def _unused(design: Design) -> Iterator[str]:
@@ -158,6 +155,8 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
     if free and design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
         yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
+    elif free and design.coupling is not None and design.coupling.play_rad > 0.0:
+        yield "coupling.play: in the gap nothing stops a load without load.friction, it may never rest"
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"
     if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):

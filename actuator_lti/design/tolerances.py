@@ -48,7 +48,7 @@ def read_tolerance(raw: Any, nominal: float, parse: Parse, field: Field, unit: s
         if key != "kind" and (isinstance(value, bool) or not isinstance(value, str | int | float)):
             raise InputError("allowed: a number with its unit, as text", where=key)
     tolerance = _from_table(table, nominal, parse)
-    check_tolerance(tolerance, nominal, unit, field)
+    _refuse_impossible(tolerance, nominal, unit, field)
     return tolerance
 
 
@@ -57,7 +57,7 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
     if kind not in _KINDS:
         raise InputError("allowed: " + " or ".join(f'"{one}"' for one in _KINDS), where="kind")
     wanted, unwanted = ("half_width", "std") if kind == "uniform" else ("std", "half_width")
-    bounds = {key: table[key] for key in ("lower", "upper") if key in table}
+    bounds = {key: parse(table[key]) for key in ("lower", "upper") if key in table}
     if wanted not in table:
         raise InputError(f'missing {wanted}; a "{kind}" tolerance needs it')
     if unwanted in table:
@@ -65,15 +65,11 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
     if bool(bounds) != (kind == "truncated-normal"):
         raise InputError('allowed: lower or upper with kind "truncated-normal", and only there')
     given = table[wanted]
-    return Tolerance(
-        kind=kind,
-        text=given if isinstance(given, str) else repr(given),
-        **{wanted: _width(given, nominal, parse)},
-        **{key: parse(text) for key, text in bounds.items()},
-    )
+    text = given if isinstance(given, str) else repr(given)
+    return Tolerance(kind=kind, text=text, **{wanted: _width(given, nominal, parse)}, **bounds)
 
 
-def check_tolerance(tolerance: Tolerance, nominal: float, unit: str, field: Field) -> None:
+def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: Field) -> None:
     """Refuse a tolerance whose values may be impossible (a half width that reaches a negative inertia)."""
     if field.kind == "integer":
         raise InputError("allowed: none, a whole number has no tolerance")

@@ -150,8 +150,7 @@ def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
     path = "control.velocity.filter"
     there = design_tree(design)["control"]["velocity"].get("filter", [])
     units = with_units(design, {f"{path}.1.{key}": value for key, value in keys.items()})
-    new = {at.rpartition(".")[2]: value for at, value in units.items()}
-    return with_overrides(design, {path: [*there, new]})
+    return with_overrides(design, {path: [*there, {at.rpartition(".")[2]: one for at, one in units.items()}]})
 
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
@@ -213,11 +212,9 @@ def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     if not isinstance(here, dict):
         raise InputError(f"{path}: unknown key; allowed: a key of the design file")
     old = here.get(parts[-1])
-    if isinstance(old, dict) and not isinstance(value, Mapping):
+    if isinstance(old, dict) and "value" in old and not isinstance(value, Mapping):
         kept = {"tolerance": old["tolerance"]} if "tolerance" in old and not _width_gone(old, value) else {}
-        value = (
-            {"value": value, "source": f"changed from {old['value']}", **kept} if "value" in old else value
-        )
+        value = {"value": value, "source": f"changed from {old['value']}", **kept}
     here[parts[-1]] = value
 
 

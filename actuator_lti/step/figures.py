@@ -102,8 +102,10 @@ def _figures(
 ) -> StepFigures:
     scale = 1.0 if period_s is None else period_s
     parts: list[Stepped | Motion] = [*early, later]
-    ten, ninety = (min(_first_at_least(part, level) for part in parts) for level in (0.1, 0.9))
-    settled = max(0.0, *(_settled(part) for part in parts))
+    ten, ninety = (
+        min(_passage(part, level - 1.0 - part.tie, last=False) for part in parts) for level in (0.1, 0.9)
+    )
+    settled = max(0.0, *(_passage(part, _BAND + part.tie, last=True) + part.sampled for part in parts))
     excess, peak_time = OVER, np.inf
     for part in parts:
         excess, peak_time = _greatest(part, excess, peak_time)
@@ -123,34 +125,22 @@ def _figures(
     )
 
 
-def _first_at_least(part: Stepped | Motion, level: float) -> float:
-    """First time at which 1 + e reaches a level below 1; infinity: not in this part."""
-    target, best = level - 1.0 - part.tie, np.inf
+def _passage(part: Stepped | Motion, level: float, *, last: bool) -> float:
+    """The first time at which e lies above a level, or the last at which |e| does; infinite: never."""
+    best, sides = (-np.inf, (level, -level)) if last else (np.inf, (level,))
+    of = np.abs if last else np.asarray
 
     def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
         nonlocal best
-        best = min(best, a[left >= target].min(initial=np.inf), b[right >= target].min(initial=np.inf))
-        return (a < best) & (left < target) & (most >= target)
+        above = np.concatenate((a[left > level], b[right > level]))
+        best = above.max(initial=best) if last else above.min(initial=best)
+        return (most > level) & ((b > best) if last else (a < best))
 
-    for a, series in sorted(part.spans(undecided, np.asarray), key=itemgetter(0)):
-        for root in _within(series, target):
-            return a + root * part.shortest
+    for a, series in sorted(part.spans(undecided, of), key=itemgetter(0), reverse=last):
+        roots = [root for side in sides for root in _within(series, side)]
+        if roots:
+            return a + (max(roots) if last else min(roots)) * part.shortest
     return float(best)
-
-
-def _settled(part: Stepped | Motion) -> float:
-    """From when on |e| is no more than 2 %; minus infinity: in all of this part."""
-    band, best = _BAND + part.tie, -np.inf
-
-    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-        nonlocal best
-        best = max(best, a[left > band].max(initial=-np.inf), b[right > band].max(initial=-np.inf))
-        return (b > best) & (most > band)
-
-    for a, series in sorted(part.spans(undecided, np.abs), key=itemgetter(0), reverse=True):
-        if roots := [*_within(series, _BAND), *_within(series, -_BAND)]:
-            return a + max(roots) * part.shortest
-    return float(best) + part.sampled
 
 
 def _greatest(part: Stepped | Motion, best: float, place: float) -> tuple[float, float]:

@@ -163,16 +163,6 @@ def heating(design: Design, rms_A: float) -> Heating | None:
     """Temperature of the winding under a current of this rms value: ``tau dT/dt = Ta + Rth P(T) - T``.
 
     P(T) = R i^2 (1 + alpha (T - T_ref)); None without a thermal resistance.
-
-    Examples
-    --------
-    1 ohm, 2 K/W, 3 A, alpha 0: 18 K above ambient.
-
-    >>> from actuator_lti.design import load_design, with_overrides
-    >>> design = with_overrides(load_design("fin"), {"temperature.thermal_resistance": "2 K/W",
-    ...     "temperature.thermal_time": "60 s", "temperature.resistance_coefficient": "0 1/K"})
-    >>> heating(design, 3.0).final_degC
-    43.0
     """
     heat = design.temperature
     if heat is None or heat.thermal_resistance_K_W is None:

@@ -18,15 +18,13 @@ class Means:
     """Means of several signals over one stretch, shape (k,), and the covariance of these means, shape (k, k).
 
     ``correlation_samples`` is the integrated autocorrelation time of each signal in samples (1: white): the
-    number of samples worth one independent one. The covariance is that of the means of ``batches`` stretches,
-    each at least five correlation times long where the record allows.
+    number of samples worth one independent one. The covariance is that of the means of stretches, each at
+    least five correlation times long where the record allows.
     """
 
     values: FloatArray
     covariance: FloatArray
     correlation_samples: FloatArray
-    samples: int
-    batches: int
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -43,16 +41,9 @@ def correlated_means(columns: FloatArray) -> Means:
     tau = np.array([correlation_time(columns[:, k]) for k in range(columns.shape[1])])
     batches = int(np.clip(n / (BATCH_TIMES * tau.max()), MIN_BATCHES, MAX_BATCHES))
     length = n // batches
-    used = columns[: batches * length]
-    means = used.reshape(batches, length, -1).mean(axis=1)
+    means = columns[: batches * length].reshape(batches, length, -1).mean(axis=1)
     covariance = np.atleast_2d(np.cov(means, rowvar=False)) / batches
-    return Means(
-        values=columns.mean(axis=0),
-        covariance=covariance,
-        correlation_samples=tau,
-        samples=n,
-        batches=batches,
-    )
+    return Means(values=columns.mean(axis=0), covariance=covariance, correlation_samples=tau)
 
 
 def correlation_time(values: FloatArray) -> float:

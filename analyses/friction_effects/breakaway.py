@@ -73,17 +73,12 @@ def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
     17.187
     """
     gain, strongest = float(torque_gain_Nm_rad(design)), float(stall_torque_Nm(design))
-    both = {}
-    for direction in (1, -1):
-        needed = breakaway_torque_Nm(design, load_Nm, direction)
-        both[direction] = needed / gain if needed < strongest else math.inf
-    velocity = design.controller.velocity
-    times = [
-        None if velocity is None else velocity.integral_time_s,
-        design.controller.position_loop.integral_time_s,
-    ]
-    integrals = [one for one in times if one is not None] + [None, None]
-    return StaticThreshold(load_Nm, gain, both[1], both[-1], integrals[0], integrals[1])
+    needed = (breakaway_torque_Nm(design, load_Nm, direction) for direction in (1, -1))
+    forward, backward = (torque / gain if torque < strongest else math.inf for torque in needed)
+    velocity, position = design.controller.velocity, design.controller.position_loop
+    times = [None if velocity is None else velocity.integral_time_s, position.integral_time_s]
+    first, second, *_ = *(one for one in times if one is not None), None, None
+    return StaticThreshold(load_Nm, gain, forward, backward, first, second)
 
 
 FRACTIONS = (0.2, 0.3, 0.5, 0.7, 0.9)
@@ -117,7 +112,6 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
     motor that starts, from angle zero: what dry friction holds behind a spring follows later.
     """
     design = replace(design, command=Command())
-    moment = load_Nm + float(design.load.moment_Nm(0.0))
     friction = design.friction
     at_zero = replace(  # its own torque there an offset, no friction behind the spring
         design,
@@ -125,7 +119,7 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
         load=replace(design.load.level(), friction=None),
         friction=replace(friction, offset_torque_Nm=friction.offset_torque_Nm + holding_torque_Nm(design)),
     )
-    static = static_threshold(at_zero, moment)
+    static = static_threshold(at_zero, load_Nm + float(design.load.moment_Nm(0.0)))
     if not 0.0 < static.forward_rad < math.inf:
         return None
     if design.controller.position_loop.kicks:

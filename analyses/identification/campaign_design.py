@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,15 +82,14 @@ def suggest_runs(
     if criterion == "margins" and not len(slopes):
         raise InputError("no margin depends on the friction: use the criterion D")
     weight = slopes.T @ slopes / max(len(slopes), 1)
-    runs = _greedy(fit, count, None if criterion == "D" else weight)
     shared = {name: float(shift @ weight @ shift) / 3.0 for name, shift in fit.shared_shifts.items()}
     whole = float(np.sum(weight * fit.covariance))
     return CampaignSuggestion(
         criterion=criterion,
         margins=margins,
-        runs=runs,
+        runs=tuple(_greedy(fit, count, None if criterion == "D" else weight)),
         shared_part=sum(shared.values()) / whole if whole > 0.0 else 0.0,
-        largest_shared=max(shared, key=lambda name: shared[name]) if shared else None,
+        largest_shared=max(shared, key=lambda name: shared[name], default=None),
     )
 
 
@@ -110,10 +109,8 @@ def margin_spreads(
             progress(k + 1, 3)
     made = []
     for (label, unit), s in slopes.items():
-        std, floor = (
-            float(np.sqrt(np.maximum(s @ covariance @ s, 0.0)))
-            for covariance in (fit.covariance, fit.covariance - fit.random_covariance)
-        )
+        parts = (fit.covariance, fit.covariance - fit.random_covariance)
+        std, floor = (float(np.sqrt(np.maximum(s @ covariance @ s, 0.0))) for covariance in parts)
         value = middle[label, unit]
         made.append(MarginSpread(label=label, unit=unit, value=value, slopes=s, std=std, floor_std=floor))
     return tuple(made)
@@ -141,35 +138,29 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
     return result
 
 
-def _candidates(fit: SurfaceFit) -> FloatArray:
-    """Rows 1, speed, load over the range of the runs so far, and at no load."""
-    speed, load = np.array([[p.speed_rad_s, p.load_Nm] for p in fit.points]).T
+def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> Iterator[SuggestedRun]:
+    """The best run again and again, over the range of the runs so far and at no load.
+
+    A run's own variance is the median of those made. The best has the least weighed sum of the covariance or,
+    without a weight, its least determinant.
+    """
+    own = float(np.median(fit.residual_stds_Nm**2))
+    points = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points])
+    rows, (_, speed, load) = points / fit.residual_stds_Nm[:, None], points.T
     loaded = load[load > 0.0]
     levels = np.linspace(loaded.min(), loaded.max(), 8) if len(loaded) else np.zeros(0)
     speeds = np.linspace(speed.min(), speed.max(), 9)
-    return np.array([[1.0, w, m] for m in (0.0, *levels) for w in speeds])
-
-
-def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> tuple[SuggestedRun, ...]:
-    """Add the best run again and again; a run's own variance is the median of those made.
-
-    The best has the least weighed sum of the covariance or, without a weight, its least determinant.
-    """
-    own = float(np.median(fit.residual_stds_Nm**2))
-    rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
-    information, candidates = rows.T @ rows, _candidates(fit)
+    candidates = np.array([[1.0, w, m] for m in (0.0, *levels) for w in speeds])
+    information = rows.T @ rows
 
     def spread(matrix: FloatArray) -> float:
         covariance = np.linalg.inv(matrix)
         return float(np.linalg.det(covariance) if weight is None else np.sum(weight * covariance))
 
     start = spread(information)
-    runs = []
     for order in range(1, count + 1):
         tried = [spread(information + np.outer(x, x) / own) for x in candidates]
         best = int(np.argmin(tried))
-        x = candidates[best]
-        information = information + np.outer(x, x) / own
-        left = tried[best] / start
-        runs.append(SuggestedRun(order=order, speed_rad_s=float(x[1]), load_Nm=float(x[2]), remaining=left))
-    return tuple(runs)
+        _, w, m = candidates[best].tolist()
+        information = information + np.outer(candidates[best], candidates[best]) / own
+        yield SuggestedRun(order=order, speed_rad_s=w, load_Nm=m, remaining=tried[best] / start)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import exp, inf, log
 from typing import Any
@@ -19,7 +20,7 @@ from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, Recipe, default_value
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, electrical_parts
-from analyses.records.factors import named_factor
+from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
 NO_CHANCE = 1e-3
@@ -77,39 +78,26 @@ def design_values(
 
     ``start`` is the design with what was found of its motor first; its constants made torques of currents.
     """
-    behind = friction_behind(design)
-    looked_at = (name for name in model.names if not name.startswith(("offset", "map_", "gravity")))
+    behind: dict[str, float] = {}
+    friction, motor = design.load.friction, design.effective_motor
+    if design.coupling is not None and friction is not None:  # taken off the torque that a wrong scale is in
+        ratio = design.ratio_to_coupling
+        behind = {"viscous": friction.viscous_Nms_rad / ratio**2, "dry": friction.dry_torque_Nm / ratio}
     found = [
         design_value(
             design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0)
         )
-        for name in looked_at
+        for name in model.names
+        if not name.startswith(("offset", "map_", "gravity"))
     ]
-    electrical, motor = _electrical(start, records), design.effective_motor
-    if electrical is not None:
-        own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}
-        found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
-    return tuple(one for one in found if one is not None)
-
-
-def friction_behind(design: Design) -> dict[str, float]:
-    """Friction behind the coupling, at the motor: it was taken off the torque that a wrong scale is in."""
-    ratio, friction = design.ratio_to_coupling, design.load.friction
-    if design.coupling is None or friction is None:
-        return {}
-    return {"viscous": friction.viscous_Nms_rad / ratio**2, "dry": friction.dry_torque_Nm / ratio}
-
-
-def _electrical(design: Design, records: Sequence[Record]) -> Fit | None:
-    """The voltage equation of the records that hold voltage, current and motion."""
-    motor = design.effective_motor
     whole = [record for record in records if {"voltage", "current"} <= set(record.signals)]
-    if not whole or motor.resistance_ohm is None or not motor.back_emf_constant_Vs_rad:
-        return None
-    try:
-        return fit_electrical(design, whole)
-    except InputError:
-        return None  # R and kE are not told apart
+    own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}
+    known = start.effective_motor
+    if whole and known.resistance_ohm is not None and known.back_emf_constant_Vs_rad:
+        with suppress(InputError):  # R and kE are not told apart
+            electrical = fit_electrical(start, whole)
+            found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
+    return tuple(one for one in found if one is not None)
 
 
 def design_value(
@@ -172,10 +160,8 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
 
 def told(words: str, factor: float, error: float) -> str:
     """A cause in words."""
-    named = named_factor(factor)
-    known = f": factor {named}" if named else ""
     found = f"a factor {factor:.3g} (standard error {error:.1g})"
-    return f"identified values are off as by {found} in {words}{known}"
+    return with_factor(f"identified values are off as by {found} in {words}", factor)
 
 
 STEP = 0.1

@@ -209,17 +209,13 @@ def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
 
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
     """The response of the design as it was written against the measured lines."""
-    coupling, friction = written.coupling, written.load.friction
+    coupling, friction = written.coupling, written.load.friction or LoadFriction()
     assert coupling is not None
-    values = {
-        "motor_inertia": written.motor_side_inertia_kgm2,
-        "load_inertia": written.load_side_inertia_kgm2,
-        "stiffness": coupling.stiffness_Nm_rad,
-        "damping": coupling.damping_Nms_rad,
-        "viscous": written.friction.viscous_Nms_rad,
-        "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
-    }
-    model, _ = angle_responses(lines.omega_rad_s, values, written.ratio_to_coupling, reaction)
+    inertias = written.motor_side_inertia_kgm2, written.load_side_inertia_kgm2
+    own = (*inertias, coupling.stiffness_Nm_rad, coupling.damping_Nms_rad)
+    values = (*own, written.friction.viscous_Nms_rad, friction.viscous_Nms_rad)
+    named = dict(zip(NAMES, values, strict=True))
+    model, _ = angle_responses(lines.omega_rad_s, named, written.ratio_to_coupling, reaction)
     measured, relative = response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)
     error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))

@@ -60,13 +60,11 @@ def friction_columns(
 ) -> tuple[list[str], FloatArray]:
     """Names and columns of inertia, friction (of a form, or a map over the speed) and offset."""
     velocity, side = motion.velocity, np.sign(motion.velocity)
+    names, own = list(NAMES[form]), [velocity, side, np.ones_like(side)]
     if knots_rad_s is not None:
         names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
-        own = [*(linear_basis(np.abs(velocity), knots_rad_s) * side[:, None]).T, np.ones_like(side)]
-    elif form == "symmetric":
-        names, own = list(NAMES[form]), [velocity, side, np.ones_like(side)]
-    else:
-        names = list(NAMES[form])
+        own[:2] = (linear_basis(np.abs(velocity), knots_rad_s) * side[:, None]).T
+    elif form == "per-direction":
         own = [values * (turn * side > 0.0) for turn in (1.0, -1.0) for values in (velocity, side)]
     return names, np.column_stack([motion.acceleration, *own])
 

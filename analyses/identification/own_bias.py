@@ -154,12 +154,17 @@ def _driven(design: Design, record: Record) -> Record:
     if command_of(design, record) is not None:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"
-    wanted = command = _place(design, record)
+
+    def place(record: Record) -> FloatArray:
+        """The filtered position at the motor."""
+        return motion_of(design, record, recipe_for(record))[0].position
+
+    wanted = command = place(record)
     assert design.controller.position is not None  # _cannot has seen to it
     gain = design.controller.position.gain
     for _ in range(COMMAND_ROUNDS):  # learnt: the loop is about gain/(s + gain), what it lacks is added
         driven = replace(record, signals={**record.signals, name: command / design.total_ratio})
-        off = wanted - _place(design, _with_model_signals(design, driven))
+        off = wanted - place(_with_model_signals(design, driven))
         command = command + off + np.gradient(off, record.period_s) / gain
     return driven
 
@@ -169,11 +174,6 @@ def _with_model_signals(design: Design, record: Record) -> Record:
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals, _ = model_signals(design, record, {name: record[name] for name in names})
     return replace(record, signals={**record.signals, **signals})
-
-
-def _place(design: Design, record: Record) -> FloatArray:
-    """The filtered position at the motor."""
-    return motion_of(design, record, recipe_for(record))[0].position
 
 
 def _sizes(model: JointModel) -> np.ndarray:

@@ -117,7 +117,11 @@ def plan_motions(
     ]
     values = np.array([default_value(design, name) for name in names])
     size = np.array([abs(v) if v else default_value(design, "dry") for v in values]) * within / COVERAGE
-    there = [] if measured is None else _of_measured(measured, names)
+    there = []
+    for part in () if measured is None else measured.records:
+        place = [part.names.index(name) if name in part.names else -1 for name in names]
+        wide = np.column_stack([part.w, np.zeros(len(part.w))])[:, place]
+        there.append(information_of(wide, part.noise))
     chosen = _chosen(segments, there, size)
     command = np.concatenate([one.command for one in chosen] or [np.zeros(0)])
     covariance = joint_covariance([*there, *(one.information for one in chosen)])
@@ -199,10 +203,3 @@ def _information(
         own = record_rows(design, replace(record, signals=noisy), "symmetric", None)
         rests.append(own.y - rows.y)
     return information_of(rows.w[:, list(kept)], np.concatenate(rests))
-
-
-def _of_measured(model: JointModel, names: Sequence[str]) -> list[Information]:
-    """What measured records tell of the values of the plan."""
-    place = [model.names.index(name) if name in model.names else -1 for name in names]
-    wide = [np.column_stack([part.w, np.zeros(len(part.w))])[:, place] for part in model.records]
-    return [information_of(w, part.noise) for w, part in zip(wide, model.records, strict=True)]

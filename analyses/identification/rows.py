@@ -156,7 +156,9 @@ def record_rows(
         told = f"{told}, {sides.told}"
     names, columns = friction_columns(motion, form, knots_rad_s)
     others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
-    part = _used_rows(motion, recipe)
+    pace, skip = np.abs(motion.velocity), recipe.skip_end_samples
+    in_motion = float(pace[-1]) > END_SHARE * float(np.max(pace)) and len(pace) > 4 * skip
+    part = slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
     w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
@@ -227,13 +229,6 @@ def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe
         return rows
     moment = model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine
     return record_rows(design, record, model.form, recipe, gravity=True, moment=moment, knots_rad_s=knots)
-
-
-def _used_rows(motion: Motion, recipe: Recipe) -> slice:
-    """Without the samples of the recipe at the begin and, where the record ends in motion, at the end."""
-    speed, skip = np.abs(motion.velocity), recipe.skip_end_samples
-    moving = float(speed[-1]) > END_SHARE * float(np.max(speed))
-    return slice(recipe.skip_samples, len(speed) - (skip if moving and len(speed) > 4 * skip else 0))
 
 
 def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:

@@ -47,55 +47,34 @@ def identify(
     design: Design, asked: Asked, *, progress: Progress | None = None
 ) -> BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan:
     """Identify a drive from its records, and hold the design that comes of it against them."""
+    limit, first, *others = asked.residual_limit / 100.0, *asked.files
     if asked.plan:
-        return _planned(design, asked, progress)
-    of = (
-        _of_response
-        if asked.response
-        else _of_campaign
-        if asked.is_campaign
-        else _of_sweep
-        if asked.frequency_response
-        else _of_records
-    )
-    return replace(of(design, asked, progress), accepted=asked.accept)
+        records = _opened(others)
+        measured = identify_bench(design, records, settings=asked).model if records else None
+        noise = asked.noise if asked.noise is not None else design.instruments.current_noise_A
+        within = asked.within / 100.0
+        return plan_motions(design, within=within, noise=noise, measured=measured, progress=progress)
+    made: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult
+    fixed = fixed_values(design, asked.fix)
+    if asked.response:
+        made = identify_response(
+            design, first, loop=asked.loop, of=asked.response_of, fixed=fixed, limit=limit, progress=progress
+        )
+    elif asked.is_campaign:
+        made = _of_campaign(design, asked, progress)
+    elif asked.frequency_response:
+        play = None if asked.play is None else open_record(asked.play)
+        record = open_record(first)
+        made = identify_frequency(design, record, play_record=play, period_s=asked.period_s, fixed=fixed)
+    else:
+        records = _opened(asked.files)
+        unseen = _opened(asked.validate or (), [record.name for record in records])
+        made = identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
+    return replace(made, accepted=asked.accept)
 
 
 def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
     return named_apart([record for path in paths for record in open_records(path)], taken)
-
-
-def _of_records(design: Design, asked: Asked, progress: Progress | None) -> BenchResult:
-    records = _opened(asked.files)
-    unseen = _opened(asked.validate or (), [record.name for record in records])
-    return identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
-
-
-def _planned(design: Design, asked: Asked, progress: Progress | None) -> Plan:
-    records = _opened(asked.files[1:])
-    measured = identify_bench(design, records, settings=asked).model if records else None
-    noise = asked.noise if asked.noise is not None else design.instruments.current_noise_A
-    within = asked.within / 100.0
-    return plan_motions(design, within=within, noise=noise, measured=measured, progress=progress)
-
-
-def _of_sweep(design: Design, asked: Asked, _: Progress | None) -> FrequencyResult:
-    play = None if asked.play is None else open_record(asked.play)
-    fixed = fixed_values(design, asked.fix)
-    record = open_record(asked.files[0])
-    return identify_frequency(design, record, play_record=play, period_s=asked.period_s, fixed=fixed)
-
-
-def _of_response(design: Design, asked: Asked, progress: Progress | None) -> ResponseResult:
-    return identify_response(
-        design,
-        asked.files[0],
-        loop=asked.loop,
-        of=asked.response_of,
-        fixed=fixed_values(design, asked.fix),
-        limit=asked.residual_limit / 100.0,
-        progress=progress,
-    )
 
 
 def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:

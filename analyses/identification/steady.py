@@ -141,7 +141,7 @@ def steady_point(run: ImportedRun, torque_constant_Nm_A: float) -> SteadyPoint:
         load_Nm=mean_load,
         covariance=means.covariance,
         window=window,
-        samples=means.samples,
+        samples=len(speed),
         correlation_samples=(a, b, c),
         load_is_zero=run.load_is_zero,
     )

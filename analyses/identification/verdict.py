@@ -14,7 +14,7 @@ from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause, told
 from analyses.identification.diagnosis import Followed
 from analyses.records.consistency import RATE_TOLERANCE, Finding
-from analyses.records.factors import named_factor
+from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
 RESIDUAL_LIMIT = 0.20
@@ -143,8 +143,8 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
             told_how = "so kM and all torques are as far off: --electrical takes it from the record"
             reasons.append(f"{off}, {told_how}")
         elif not 1.0 / most <= one.ratio <= most:
-            factor = named_factor(one.ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-            reasons.append(off + (f": factor {factor}" if factor else ""))
+            known = {design.total_ratio: f"the reduction {design.total_ratio:g}"}
+            reasons.append(with_factor(off, one.ratio, known))
         elif kind == "dry" and one.ratio > (MOST_DRY_UNLOADED if feels else LARGEST_FACTOR):
             load = (one.found - one.design) / max(design.friction.load_coefficient, 1e-300)
             reasons.append(off + (f": as under a load of {load:.3g} N m, not recorded" if feels else ""))

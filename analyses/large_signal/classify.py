@@ -31,12 +31,6 @@ def rate_limited(amplitude: float, omega_rad_s: float, rate_limit: float) -> Rat
 
     ``amplitude``: peak of the command.
     ``rate_limit``: R, in the unit of the amplitude per second.
-
-    Examples
-    --------
-    >>> result = rate_limited(10.0, 2 * math.pi * 5.0, 150.0)
-    >>> round(result.gain, 6), round(result.lag_deg, 4), result.peak
-    (0.607927, 41.4096, 7.5)
     """
     x = omega_rad_s * amplitude / rate_limit
     if x <= 1.0:

@@ -24,11 +24,11 @@ from analyses.large_signal.classify import (
     not_linear,
     waveforms,
 )
-from analyses.large_signal.steady_start import linear_steady_state
 from analyses.large_signal.tones import (
     MOST_TICKS,
     amplitudes,
     frequency_range_hz,
+    linear_steady_state,
     run_tones,
     tones,
     work_ticks,
@@ -263,15 +263,7 @@ def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:
 
 
 def crossing_range(hz: np.ndarray, values: np.ndarray, level: float) -> tuple[float, float]:
-    """The frequencies between which the values first fall through a level; what is NaN tells nothing.
-
-    Examples
-    --------
-    >>> import math
-    >>> import numpy as np
-    >>> crossing_range(np.array([1.0, 2.0, 4.0, 8.0]), np.array([0.0, math.nan, -5.0, -9.0]), -3.0)
-    (1.0, 4.0)
-    """
+    """The frequencies between which the values first fall through a level; what is NaN tells nothing."""
     known = np.flatnonzero(~np.isnan(values))
     above = values[known] >= level
     first = int(np.argmin(above)) if known.size and not above.all() else known.size

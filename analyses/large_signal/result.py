@@ -25,8 +25,7 @@ from analyses.large_signal.map import (
     amplitude_map,
 )
 from analyses.large_signal.sawtooth import Sawtooth, sawtooth
-from analyses.large_signal.steady_start import DECAY, linear_steady_state
-from analyses.large_signal.tones import MOST_TICKS, run_tones, tones, work_ticks
+from analyses.large_signal.tones import DECAY, MOST_TICKS, linear_steady_state, run_tones, tones, work_ticks
 from analyses.linear.responses import response_at
 from nonlinear import LIMITERS
 

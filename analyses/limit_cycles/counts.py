@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from math import inf, pi
+from math import inf, log, pi
 
 import numpy as np
 import numpy.typing as npt
@@ -22,7 +22,7 @@ import numpy.typing as npt
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
 from analyses.large_signal.conditional import step_rows
-from analyses.large_signal.tones import LONGEST_TICKS, full_range, tone
+from analyses.large_signal.tones import LONGEST_TICKS, TIME_CONSTANTS, full_range, tone
 from analyses.limit_cycles.describing import (
     SENSORS,
     Cause,
@@ -44,6 +44,7 @@ SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no patte
 PART = 0.3  # of the drive's speed: no faster is looked at
 SAMPLES = 2000  # of a window at constant speed
 UPDATES = 400  # of the position loop in a window of a sine
+SETTLED = 1e4  # what begins at rest is that much smaller by then: far below `WITHIN`
 TRIED = np.array([0.1, 0.3, 1.0, 2.0, 4.0, 16.0, 64.0, 256.0])  # of the amplitude from which it is linear
 
 
@@ -73,13 +74,7 @@ class Counts:
 
 
 def counted_gain(ratio: float, offset: float = 0.0) -> float:
-    """Gain of counts for a sine of amplitude ``ratio`` counts about a bias of ``offset`` counts off an edge.
-
-    Examples
-    --------
-    >>> round(counted_gain(0.5) - 4.0 / 3.141592653589793, 12), round(counted_gain(1e3), 3)
-    (0.0, 1.0)
-    """
+    """Gain of counts for a sine of amplitude ``ratio`` counts, ``offset`` counts off an edge."""
     edges = np.arange(np.ceil(-ratio - offset), np.floor(ratio - offset) + 1.0) + offset
     inside = np.abs(edges) < ratio
     return float(2.0 / (pi * ratio) * np.sqrt(1.0 - (edges[inside] / ratio) ** 2).sum())
@@ -88,8 +83,12 @@ def counted_gain(ratio: float, offset: float = 0.0) -> float:
 @cache
 def linear_ratio() -> float:
     """Amplitude in counts from which the gain is 1 to `WITHIN`, whatever the bias."""
-    off = np.array([max(abs(counted_gain(r, d) - 1.0) for d in OFFSETS) for r in RATIOS])
-    return float(RATIOS[int(np.flatnonzero(off > WITHIN)[-1]) + 1])
+    ratio = float(RATIOS[-1])
+    for smaller in RATIOS[::-1]:
+        if any(abs(counted_gain(smaller, d) - 1.0) > WITHIN for d in OFFSETS):
+            break
+        ratio = float(smaller)
+    return ratio
 
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
@@ -101,11 +100,12 @@ def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, 
 def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
     sensor, other = SENSORS[cause]
     quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
-    at_motor = quantum * (design.total_ratio if sensor == "output" else 1.0)
+    to_motor = design.total_ratio if sensor == "output" else 1.0
+    to_output = design.total_ratio if sensor == "motor" else 1.0
     alone, ideal = without_counts(design, other), without_counts(design)
-    ripple, at = _ripple(alone, ideal, at_motor, settle_ticks)
-    wanted = linear_ratio() * quantum / (design.total_ratio if sensor == "motor" else 1.0)
-    off = _linearity(alone, ideal, loops, wanted, settle_ticks)
+    ripple, at = _ripple(alone, ideal, quantum * to_motor, settle_ticks)
+    linear = linear_ratio() * quantum
+    off = _linearity(alone, ideal, loops, linear / to_output, settle_ticks)
     good = np.logical_and.accumulate((off <= WITHIN)[::-1])[::-1]  # here and at all that is larger
     made_of = velocity is not None and velocity.sensor == sensor and design.encoder.speed == "difference"
     return Counts(
@@ -113,11 +113,11 @@ def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Count
         quantum_rad=quantum,
         standing_rad=quantum if sensor == "output" else 0.0,
         standing_seen_rad=_standing(alone, ideal),
-        speed_step_rad_s=at_motor / _span_s(design) if made_of else None,  # q/(m T)
+        speed_step_rad_s=quantum * to_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
         cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design, (cause,))),
-        linear_rad=linear_ratio() * quantum,
+        linear_rad=linear,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
     )
@@ -143,8 +143,7 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
         rows.ramp("command", speeds / one.total_ratio)
         rows["ticks"] = settle_ticks + 2 * window
         rows.window(window, 1, 0)
-        low, high = rows.run().span("motor_speed_rad_s")
-        found.append(0.5 * (high - low))
+        found.append(0.5 * np.ptp(rows.run().span("motor_speed_rad_s"), axis=0))
     added = found[0] - found[1]
     k = int(np.argmax(added))
     return max(float(added[k]), 0.0), float(speeds[k])
@@ -153,10 +152,10 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
 def _standing(design: Design, ideal: Design) -> float:
     """Error that counts leave after a step."""
     size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
-    ends = []
-    for one in (design, ideal):
-        low, high = step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad")
-        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])))
+    spans = [
+        step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad") for one in (design, ideal)
+    ]
+    ends = [abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])) for low, high in spans]
     return abs(ends[0] - ends[1])
 
 
@@ -171,7 +170,7 @@ def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, s
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
         rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
         rows.sine("command", output_rad / gain * TRIED, sine.frequency_hz)
-        rows["ticks"] = settle_ticks + 2 * sine.ticks
+        rows["ticks"] = np.ceil(settle_ticks * log(SETTLED) / TIME_CONSTANTS) + sine.ticks
         rows.window(sine.ticks, sine.cycles)
         run = rows.run()
         seen.append(run.phasor("output_angle_rad"))

@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.large_signal.steady_start import ELASTIC, PLACES
+from analyses.large_signal.tones import ELASTIC, PLACES
 from analyses.limit_cycles.describing import (
     SENSORS,
     Cycle,

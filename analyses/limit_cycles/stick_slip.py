@@ -11,12 +11,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import breakaway_torque_Nm
 from actuator_lti.drive.steady import standing_gain, steady_input
 from actuator_lti.loops import Loops, assemble_loops
-from analyses.large_signal.steady_start import AT_REST, linear_steady_state, without_value
+from analyses.large_signal.tones import AT_REST, linear_steady_state, without_value
 
 SMALLEST, LARGEST, POINTS = 1e-3, 1.0, 241  # of the threshold
 SLOPE_STEP = 1e-3
@@ -78,12 +79,9 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     ``None`` where there is none: every slip stops short of the other side, or ends at a smaller error.
     ``loops`` are sampled and sliding, of this design, if they are there already.
     """
-    from scipy.optimize import brentq
-
     if (slip := _slip(design, load_Nm, loops)) is None:
         return None
-    threshold = slip.start / slip.gain
-    grid = threshold * np.geomspace(SMALLEST, LARGEST, POINTS)
+    grid = slip.start / slip.gain * np.geomspace(SMALLEST, LARGEST, POINTS)
 
     def surplus(error: float) -> float:
         result = slip.from_error(error)
@@ -98,11 +96,10 @@ def stick_slip_cycle(design: Design, load_Nm: float, loops: Loops | None = None)
     result = slip.from_error(error)
     if result is None or not math.isfinite(result[2]):
         return None
+    _, slipping, resting = result
     step = SLOPE_STEP * error
     slope = (surplus(error + step) - surplus(error - step)) / (2.0 * step) + 1.0
-    _, slipping, resting = result
-    hz = 0.5 / (slipping + resting)
-    return StickSlipCycle(error / design.total_ratio, hz, resting, slope)
+    return StickSlipCycle(error / design.total_ratio, 0.5 / (slipping + resting), resting, slope)
 
 
 def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
@@ -110,8 +107,8 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
 
     The slip has to be that of the linear loop, with a constant sliding friction alike either way.
     """
-    velocity, friction = design.controller.velocity, design.friction
-    plain = design.controller.own_law is None  # what a law of one's own does meanwhile is not known here
+    control, friction = design.controller, design.friction
+    velocity, plain = control.velocity, control.own_law is None  # what such a law does meanwhile is not known
     alike = friction.dry_torque_reverse_Nm is None and friction.offset_torque_Nm == 0.0
     rubs = friction.law == "coulomb" and not friction.points and friction.dry_Nm(load_Nm) > 0.0
     if not (plain and alike and rubs and design.load.path != "back-drivable"):
@@ -125,27 +122,18 @@ def _slip(design: Design, load_Nm: float, loops: Loops | None) -> _Slip | None:
     torque = breakaway_torque_Nm(design, load_Nm, 1)
     current, volts = steady_input(design, torque, 0.0)
     start = torque / standing_gain(design)
-    gain = velocity.gain * design.controller.position_loop.gain
+    gain = velocity.gain * control.position_loop.gain
     held = {"i": start, "velocity.I": start, "hold_i_ref": start}
     if design.motor.has_electrical_dynamics:
         held["i"] = current
     held |= {"current.I": volts} | {name: volts for name in system.states if name[0] == "u"}
-    error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": design.controller.position_loop.gain}
+    error = {"th": -1.0, "velocity.I": -gain, "hold_w_ref": control.position_loop.gain}
     if without_value(system.states, held.keys() | error.keys(), AT_REST):
         return None  # what a filter, say, holds before breakaway is not known here
-    rests = (
-        system.initial_state({k: v for k, v in held.items() if k in system.states}),
-        system.initial_state({k: v for k, v in error.items() if k in system.states}),
-    )
-    reference, dry = np.zeros(ticks), friction.dry_Nm(load_Nm)
-    runs = [system.respond(reference, -dry, rests[0]), system.respond(reference, 0.0, rests[1])]
-    key = "i_ref" if design.controller.current is not None else "u"
-    return _Slip(
-        period_s=design.controller.period_s,
-        gain=gain,
-        integral_gain=1.0 / velocity.integral_time_s,
-        start=start,
-        w=np.array([run["w"] for run in runs]),
-        th=np.array([run["th"] for run in runs]),
-        command=np.array([run[key] for run in runs]),
-    )
+    runs = []
+    for state, torque in ((held, -friction.dry_Nm(load_Nm)), (error, 0.0)):
+        rest = system.initial_state({k: v for k, v in state.items() if k in system.states})
+        runs.append(system.respond(np.zeros(ticks), torque, rest))
+    names = ("w", "th", "u" if control.current is None else "i_ref")
+    w, th, command = (np.array([run[name] for run in runs]) for name in names)
+    return _Slip(control.period_s, gain, 1.0 / velocity.integral_time_s, start, w, th, command)

@@ -31,7 +31,7 @@ HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
-AWAY = "the load or falling friction drives it away"
+AWAY = "the load, cogging or falling friction drives it away"
 
 
 def held_loop(loops: Loops, name: str) -> Loop | None:

@@ -21,7 +21,7 @@ from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.statistics import Sketch
+from analyses.monte_carlo.result import Sketch
 from analyses.studies.engine import Chunk
 
 if TYPE_CHECKING:

@@ -37,8 +37,15 @@ from analyses.monte_carlo.judging import (
     source_columns,
     unpacked,
 )
-from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.statistics import MOST, clopper_pearson, column_statistics
+from analyses.monte_carlo.result import (
+    MOST,
+    Driver,
+    MonteCarloResult,
+    Odds,
+    WorstCase,
+    clopper_pearson,
+    column_statistics,
+)
 from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug

@@ -40,7 +40,15 @@ def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None]
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
     duration = _played_s(asked)
     command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
-    seconds = _run_s(command, duration)
+    seconds = duration
+    if seconds is None:
+        tabled = command.kind in ("stepped_sine", "recorded", "sampled")
+        seconds = command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
+    elif command.kind == "stepped_sine" and 0.0 < seconds < command.end_s * (1.0 - 1e-9):
+        raise InputError(
+            f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
+            " allowed: that or more, or fewer --count or --cycles"
+        )
     if asked.start >= seconds > 0.0 and asked.start > 0.0:
         raise InputError(
             f"--start {asked.start:g}: the run ends at {seconds:g} s; allowed: less, or --duration"
@@ -75,19 +83,6 @@ def _played_s(asked: Asked) -> float | None:
             f" {needed:g} s; allowed: one of the two options"
         )
     return needed
-
-
-def _run_s(command: Command, wanted_s: float | None) -> float:
-    """Duration of the run: what is wanted, else that of the command where it has one."""
-    tabled = command.kind in ("stepped_sine", "recorded", "sampled")
-    if wanted_s is None:
-        return command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
-    if command.kind == "stepped_sine" and 0.0 < wanted_s < command.end_s * (1.0 - 1e-9):
-        raise InputError(
-            f"--duration {wanted_s:g}: the stepped sine takes {command.end_s:.6g} s;"
-            " allowed: that or more, or fewer --count or --cycles"
-        )
-    return wanted_s
 
 
 def _command(design: Design, asked: Asked, duration: float, unit: str, scale: float) -> Command:

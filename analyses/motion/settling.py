@@ -141,7 +141,7 @@ def accepted(design: Design) -> Requirement | None:
 def accepted_rad(design: Design) -> float:
     """The swing that is accepted (m on a linear axis); 0 where rest itself is asked."""
     asked = accepted(design)
-    most = 0.0 if asked is None or asked.maximum is None else asked.maximum
+    most = (asked.maximum if asked else None) or 0.0
     return most if design.axis == "linear" else radians(most)
 
 

@@ -110,7 +110,13 @@ def import_campaign(
     runs, aside = [], []
     for k, entry in enumerate(campaign.runs, 1):
         try:
-            runs.append(import_run(campaign, entry))
+            drive, sensor = read_record(entry.drive, campaign.drive), None
+            if entry.sensor is not None and campaign.sensor is None:
+                told = f"run {entry.id} has a sensor file, but there is no [sensor]"
+                raise InputError(told, where=campaign.origin)
+            if entry.sensor is not None and campaign.sensor is not None:
+                sensor = read_record(entry.sensor, campaign.sensor)
+            runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:
             aside.append(SetAside(id=entry.id, reason=str(error)))
         if progress is not None:
@@ -119,17 +125,6 @@ def import_campaign(
         told = f"none of the {len(aside)} runs can be used; the first: {aside[0].reason}"
         raise InputError(told, where=campaign.origin)
     return ImportedCampaign(campaign=campaign, runs=tuple(runs), set_aside=tuple(aside))
-
-
-def import_run(campaign: Campaign, entry: RunEntry) -> ImportedRun:
-    """Read one run's files and put them on the drive's clock."""
-    drive, sensor = read_record(entry.drive, campaign.drive), None
-    if entry.sensor is not None:
-        if campaign.sensor is None:
-            told = f"run {entry.id} has a sensor file, but there is no [sensor]"
-            raise InputError(told, where=campaign.origin)
-        sensor = read_record(entry.sensor, campaign.sensor)
-    return assemble_run(campaign, entry, drive, sensor)
 
 
 def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Record | None) -> ImportedRun:

@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
-from analyses.records.factors import explaining, named_factor
+from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.record import Record
 
 RATE_TOLERANCE = 0.02
@@ -198,8 +198,8 @@ def _rate(design: Design, record: Record) -> Finding | None:
     if abs(ratio.found - 1.0) <= RATE_TOLERANCE:
         told = f"{clock}, beyond their noise ({ratio.low:.4f} to {ratio.high:.4f}): the intervals hold it"
         return Finding(subject=subject, passed=None, text=told)
-    factor = named_factor(ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-    return Finding(subject=subject, passed=False, text=f"{said}: factor {factor}" if factor else clock)
+    named = with_factor(said, ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
+    return Finding(subject=subject, passed=False, text=clock if named == said else named)
 
 
 def clock_doubt(design: Design, record: Record) -> float:
@@ -287,9 +287,10 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     if abs(alike) < ALIKE:
         return Finding(subject=subject, passed=False, text="they are not alike")
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
-    factor = None if passed else named_factor(ratio, {design.total_ratio: "the reduction, counted twice"})
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
-    return Finding(subject=subject, passed=passed, text=text + (f": factor {factor}" if factor else ""))
+    if not passed:
+        text = with_factor(text, ratio, {design.total_ratio: "the reduction, counted twice"})
+    return Finding(subject=subject, passed=passed, text=text)
 
 
 def _twist_share(design: Design, record: Record) -> float:
@@ -368,12 +369,12 @@ def _counted(design: Design, name: str, low: float, high: float) -> tuple[bool |
     if low <= 1.0 + allowed and high >= 1.0 - allowed:
         return True, f"{name} is {low:.3g} to {high:.3g} times as the design has it"
     ratio = 0.5 * (low + high)
-    kelvin, factor = (ratio - 1.0) / COPPER_1_K, named_factor(1.0 / ratio) if ratio else None
+    kelvin = (ratio - 1.0) / COPPER_1_K
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
         text += f": a winding {kelvin:+.0f} K from the design's"
         text += f", or a current {1.0 / ratio:.3g} times the real"
-    return (None if warm else False), text + (f": factor {factor}" if factor else "")
+    return (None if warm else False), with_factor(text, 1.0 / ratio if ratio else 0.0)
 
 
 def _command(design: Design, record: Record) -> Finding | None:
@@ -419,10 +420,8 @@ def _supply(design: Design, record: Record) -> Finding | None:
         return None
     level, nominal = float(np.median(record["supply"])), design.limits.voltage_V
     ratio = level / nominal if isfinite(nominal) else 1.0
-    passed = 0.4 < ratio < 1.6
-    factor = None if passed else named_factor(ratio)
-    text = f"supply {level:.4g} V, the design's {nominal:.4g} V" + (f": factor {factor}" if factor else "")
-    return Finding(subject="supply", passed=passed, text=text)
+    passed, text = 0.4 < ratio < 1.6, f"supply {level:.4g} V, the design's {nominal:.4g} V"
+    return Finding(subject="supply", passed=passed, text=text if passed else with_factor(text, ratio))
 
 
 def _limits(design: Design, record: Record) -> Iterator[Finding | None]:

@@ -56,6 +56,12 @@ def named_factor(ratio: float, more: Mapping[float, str] | None = None) -> str |
     return known[best] + turned
 
 
+def with_factor(text: str, ratio: float, more: Mapping[float, str] | None = None) -> str:
+    """A text and, where a ratio has a name, that."""
+    named = named_factor(ratio, more)
+    return f"{text}: factor {named}" if named else text
+
+
 USUAL = {"A": (1e3,), "V": (1e3,), "rad/s": (60.0 / (2.0 * pi), 180.0 / pi, 2.0 * pi), "N m": (100.0, 1e3)}
 """Factors that are usual with a unit, for a value that can only be held against a limit."""
 

@@ -91,8 +91,10 @@ def spec_of_names(
             why[column] = found
             continue
         before = signals.get(found.name)
-        taken = found if before is None or _at_the_output(found, before) else before
-        if before is not None:
+        taken = found
+        if before is not None:  # behind a coupling the output's column is not the motor's
+            new, old = (taken_apart(str(one.column)).base for one in (found, before))
+            taken = found if new.startswith("output_") and old.startswith("motor_") else before
             other = before if taken is found else found
             why[str(other.column)] = f"{MEANINGS[found.name]} is read from {taken.column}"
         signals[found.name] = taken
@@ -102,12 +104,6 @@ def spec_of_names(
         return None, why
     time = TimeColumn(column=first, unit=taken_apart(_own_name(first)).unit or "s")
     return RecordSpec(format=layout or CsvFormat(), time=time, signals=tuple(signals.values())), why
-
-
-def _at_the_output(found: SignalColumn, before: SignalColumn) -> bool:
-    """Whether a column is the output's, where the motor's was taken: behind a coupling they differ."""
-    new, old = (taken_apart(str(one.column)).base for one in (found, before))
-    return new.startswith("output_") and old.startswith("motor_")
 
 
 def _own_name(column: str) -> str:

@@ -120,10 +120,9 @@ def is_unit(text: str) -> bool:
 
 def _spelled(unit: str) -> str:
     """Units as recorders spell them: 1/min, U/min, Ncm, Arms."""
-    text = unit.strip()
-    plain = {"1/min": "rpm", "U/min": "rpm", "min-1": "rpm", "min^-1": "rpm", "r/min": "rpm"}
-    runs = {"Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m", "Arms": "A", "Vrms": "V", "Aeff": "A"}
-    return plain.get(text, runs.get(text, text))
+    known = dict.fromkeys(("1/min", "U/min", "min-1", "min^-1", "r/min"), "rpm")
+    known |= {"Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m", "Arms": "A", "Vrms": "V", "Aeff": "A"}
+    return known.get(unit.strip(), unit.strip())
 
 
 def _words(base: str, unit: str | None) -> ColumnName:
@@ -151,13 +150,9 @@ def fits(unit: str, known: str) -> bool:
 
 def signal_of(base: str, unit: str) -> Signal | None:
     """The signal that words and a unit mean together, such as ``("reference", "deg")``."""
-    for signal in SIGNALS:
-        if signal.name == base and fits(unit, signal.unit):
-            return signal
-    for signal in SIGNALS:
-        if base in signal.also and fits(unit, signal.unit):
-            return signal
-    return None
+    by_name = [signal for signal in SIGNALS if signal.name == base]
+    others = [signal for signal in SIGNALS if base in signal.also]
+    return next((signal for signal in (*by_name, *others) if fits(unit, signal.unit)), None)
 
 
 def canonical(name: str, unit: str) -> str:

@@ -132,16 +132,16 @@ class Record:
         period, steps = self.period_s, np.diff(self.time_s)
         grid = np.arange(self.time_s[0], self.time_s[-1] + 1e-6 * period, period)
         cut = {name: np.interp(grid, self.time_s, values) for name, values in self.signals.items()}
-        longest = int(np.argmax(steps))
-        gap = float(steps[longest] / period)
-        errors = {name: line_error(self.time_s, values, gap) for name, values in self.signals.items()}
-        worst = max(errors, key=lambda name: errors[name])
+        widest = int(np.argmax(steps))
+        gap = float(steps[widest] / period)
+        errors = ((line_error(self.time_s, values, gap), name) for name, values in self.signals.items())
+        error, worst = max(errors, key=lambda one: one[0])
         note = (
             f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
-            f"{steps[longest]:.4g} s at {self.time_s[longest]:.4g} s, error up to "
-            f"{100.0 * errors[worst]:.2g} % of the range ({worst})"
+            f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
+            f"{100.0 * error:.2g} % of the range ({worst})"
         )
-        check_error(errors[worst], self.resample_tolerance, note, self.name)
+        check_error(error, self.resample_tolerance, note, self.name)
         return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
 
 

@@ -68,40 +68,30 @@ def manoeuvres(
     Rate and acceleration: the largest of the output; ``settling_s``: of the linear loop.
     """
     full = design.validation.full_deflection_rad
-    result = []
-    travel = full / rate_rad_s if 0.0 < rate_rad_s < math.inf else 0.0
-    swing = 2.0 * math.sqrt(full / acceleration_rad_s2) if 0.0 < acceleration_rad_s2 < math.inf else 0.0
-    time = min(travel + 4.0 * swing + 4.0 * settling_s, LONGEST_TICKS * design.controller.period_s)
-    result.append(_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None))
-    bounds = []  # angular frequencies at which a sine needs all of the rate, or of the acceleration
-    if 0.0 < rate_rad_s < math.inf:
-        bounds.append(rate_rad_s / full)
-    if 0.0 < acceleration_rad_s2 < math.inf:
-        bounds.append(math.sqrt(acceleration_rad_s2 / full))
-    slow = min(bounds) / (2.0 * math.pi) if bounds else None
+    moves, turns = 0.0 < rate_rad_s < math.inf, 0.0 < acceleration_rad_s2 < math.inf
+    travel = full / rate_rad_s if moves else 0.0
+    swing = math.sqrt(full / acceleration_rad_s2) if turns else 0.0
+    time = travel + 8.0 * swing + 4.0 * settling_s
+    result = [_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None)]
+    # angular frequencies at which a sine needs all of the rate, or of the acceleration
+    bounds = [rate_rad_s / full] * moves + [math.sqrt(acceleration_rad_s2 / full)] * turns
+    slow_hz = min(bounds, default=0.0) / (2.0 * math.pi)
     names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
-    for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True):
-        if slow is not None:
-            result.append(_sine(design, name, full, share * slow, load_Nm))
+    for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True) if bounds else ():
+        every = design.controller.position_loop.every
+        hz = min(share * slow_hz, 0.2 / (every * design.controller.period_s))
+        chosen = tone(hz, design)
+        period = chosen.ticks / chosen.cycles * design.controller.period_s  # two of them; the second counts
+        sine, said = commands.sine(full, chosen.frequency_hz), f"{name} ({hz:.3g} Hz)"
+        result.append(_manoeuvre(design, said, sine, 2.0 * period, load_Nm, period))
     return tuple(result)
-
-
-def _sine(design: Design, name: str, full: float, hz: float, load_Nm: float) -> Manoeuvre:
-    """Two periods of a sine; the second counts."""
-    every = design.controller.position_loop.every
-    hz = min(hz, 0.2 / (every * design.controller.period_s))
-    chosen = tone(hz, design)
-    period = chosen.ticks / chosen.cycles * design.controller.period_s
-    time = min(2.0 * period, LONGEST_TICKS * design.controller.period_s)
-    return _manoeuvre(
-        design, f"{name} ({hz:.3g} Hz)", commands.sine(full, chosen.frequency_hz), time, load_Nm, period
-    )
 
 
 def _manoeuvre(
     design: Design, name: str, command: commands.Command, time: float, load_Nm: float, period: float | None
 ) -> Manoeuvre:
     """Simulate, and read speeds, torques and currents."""
+    time = min(time, LONGEST_TICKS * design.controller.period_s)
     run = simulate(design, command, time, load_Nm, raise_on_failure=False)
     count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
     torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-count:]
@@ -219,14 +209,9 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
     (3.037, 'speed limit')
     """
     capacity = facts.capability(design, load_Nm)
-    current = float(capacity.motor_current_A)
-    return DriveFigures(
-        load_Nm=load_Nm,
-        output_rate_rad_s=float(capacity.output_rate_rad_s),
-        rate_limit=facts.RATE_LIMITS[int(capacity.rate_limit)],
-        motor_current_A=None if math.isnan(current) else current,
-        acceleration_rad_s2=float(capacity.acceleration_rad_s2),
-    )
+    rate, current = float(capacity.output_rate_rad_s), float(capacity.motor_current_A)
+    limit, push = facts.RATE_LIMITS[int(capacity.rate_limit)], float(capacity.acceleration_rad_s2)
+    return DriveFigures(load_Nm, rate, limit, None if math.isnan(current) else current, push)
 
 
 @dataclass(frozen=True)

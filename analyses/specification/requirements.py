@@ -112,52 +112,44 @@ def judged(
             f"{', '.join(QUANTITIES)}",
             where=design.origin or None,
         )
-    verdicts = []
     if quantity.scope == "analysis":
-        verdicts.append(_verdict(requirement, requirement.id, None, *asked(quantity.name)))
+        verdicts = [_verdict(requirement, None, *asked(quantity.name))]
     elif quantity.scope == "drive":
         value = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
         reason = "the design has no such figure" if math.isnan(value) else ""
-        verdicts.append(_verdict(requirement, requirement.id, None, value, reason))
+        verdicts = [_verdict(requirement, None, value, reason)]
     else:
-        named = requirement.loop not in (None, "every")
-        for name in judged_loops(requirement.loop, figures):
-            id = requirement.id if named else f"{requirement.id}/{name}"
-            one = _judge_loop(design, requirement, id, name, figures)
-            if name == "current":
-                rotor = requirement.rotor or (figures[name].rotor if name in figures else "")
-                one = replace(one, rotor=rotor)
-            verdicts.append(one)
+        loops = judged_loops(requirement.loop, figures)
+        verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
     waiver = design.waiver_of
     return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
 
 
 def _judge_loop(
-    design: Design, requirement: Requirement, id: str, name: str, figures: Mapping[str, LoopFigures]
+    design: Design, requirement: Requirement, name: str, found: LoopFigures | None
 ) -> RequirementVerdict:
     """Judge one requirement on one loop; an unstable loop meets none."""
+    rotor = requirement.rotor or (found.rotor if found else "") if name == "current" else ""
     if name not in LOOPS:
         raise InputError(
             f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
             where=design.origin or None,
         )
-    if name not in figures:
-        return _verdict(requirement, id, name, None, f"the design has no {name} loop")
-    result = figures[name].asked(requirement)
+    if found is None:
+        return _verdict(requirement, name, None, f"the design has no {name} loop", rotor)
+    result = found.asked(requirement)
     if result.margins.stable is None:
-        return _verdict(requirement, id, name, None, "stability is not certain, so no figure is given")
+        return _verdict(requirement, name, None, "stability is not certain, so no figure is given", rotor)
     if not result.stable:
-        why = f"the {name} loop is {result.margins.verdict}"
-        return RequirementVerdict(
-            id=id, requirement=requirement, loop=name, verdict=Verdict.NOT_MET, reason=why
-        )
+        unstable = _verdict(requirement, name, None, f"the {name} loop is {result.margins.verdict}", rotor)
+        return replace(unstable, verdict=Verdict.NOT_MET)
     value = QUANTITIES[requirement.quantity].read(result)
     reason = which_response(requirement.quantity, name, requirement.to or "command", design)
     if value is None:
         reason = "not found in the band of this loop"
-    if figures[name].held is not None and requirement.rotor != "locked":
+    if found.held is not None and requirement.rotor != "locked":
         reason = ", ".join(filter(None, (reason, by_itself(name))))
-    return _verdict(requirement, id, name, value, reason)
+    return _verdict(requirement, name, value, reason, rotor)
 
 
 def which_response(quantity: str, loop: str, to: ResponseTo = "command", design: Design | None = None) -> str:
@@ -189,20 +181,18 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command", design:
 
 
 def _verdict(
-    requirement: Requirement, id: str, loop: str | None, value: float | None, reason: str
+    requirement: Requirement, loop: str | None, value: float | None, reason: str, rotor: str = ""
 ) -> RequirementVerdict:
-    """Compare a value with the limits."""
+    """Compare a value with the limits; ``reason``: why there is none, or what has to be known to read it."""
+    id = requirement.id if loop is None or requirement.loop == loop else f"{requirement.id}/{loop}"
+    of = RequirementVerdict(
+        id=id, requirement=requirement, loop=loop, verdict=Verdict.NOT_PROVEN, reason=reason, rotor=rotor
+    )
     if value is None or math.isnan(value):
-        return RequirementVerdict(
-            id=id, requirement=requirement, loop=loop, verdict=Verdict.NOT_PROVEN, reason=reason
-        )
+        return of
     room = distance(requirement, value)
-    if math.isinf(value):
-        reason = "nothing limits it" if value > 0 else reason
-    return RequirementVerdict(
-        id=id, requirement=requirement, loop=loop, value=value, distance=room,
-        verdict=Verdict.of(room >= 0.0), reason=reason,
-    )  # fmt: skip
+    reason = "nothing limits it" if value == inf else reason
+    return replace(of, value=value, distance=room, verdict=Verdict.of(room >= 0.0), reason=reason)
 
 
 def distance(requirement: Requirement, value: float) -> float:

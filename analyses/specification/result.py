@@ -10,8 +10,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
-from analyses.large_signal.steady_start import linear_steady_state
-from analyses.large_signal.tones import TANH_TOLERANCE
+from analyses.large_signal.tones import TANH_TOLERANCE, linear_steady_state
 from analyses.specification.capability import (
     Capability,
     Manoeuvre,
@@ -65,6 +64,7 @@ def step_times(
     result = rows.run()
     speeds, currents = result.extreme("motor_speed_rad_s"), result.extreme("current_A")
     electric = design.motor.has_electrical_dynamics
+    limited = {name: result.limit_fraction(name) for name in LIMITERS}
     return tuple(
         StepTime(
             load_Nm=float(rows["load"][k]),
@@ -75,11 +75,7 @@ def step_times(
             settling_time_s=finite(result.step.settling_time_s[k]),
             peak_rate_rad_s=float(max(-speeds[0][k], speeds[1][k])) / design.total_ratio,
             peak_current_A=float(max(-currents[0][k], currents[1][k])) if electric else None,
-            limits={
-                name: float(result.limit_fraction(name)[k])
-                for name in LIMITERS
-                if result.limit_fraction(name)[k] > 0.0
-            },
+            limits={name: float(share[k]) for name, share in limited.items() if share[k] > 0.0},
         )
         for k in range(len(sizes))
     )

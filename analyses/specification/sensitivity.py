@@ -13,7 +13,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, drive_cases
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.design import parameter_value
+from actuator_lti.design import parameter_value, tolerances
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean
 from analyses.studies.sampling import Factor
@@ -52,12 +52,9 @@ class Sensitivities:
 
     def tornado(self, figure: str) -> tuple[Sensitivity, ...]:
         """The parameters that move a figure, the strongest first."""
-        chosen = [
-            e
-            for e in self.entries
-            if e.figure == figure and e.swing > 1e-9 * max(abs(self.base[figure]), 1e-9)
-        ]
-        return tuple(sorted(chosen, key=lambda e: (-e.swing, e.path)))
+        least = 1e-9 * max(abs(self.base[figure]), 1e-9)
+        chosen = [one for one in self.entries if one.figure == figure and one.swing > least]
+        return tuple(sorted(chosen, key=lambda one: (-one.swing, one.path)))
 
 
 def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensitivities:
@@ -81,23 +78,20 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
         if value != 0.0 and np.isfinite(value) and not path.startswith("friction.breakaway")
     }
     ends = {path: (value * (1 - SWING), value * (1 + SWING)) for path, value in nominal.items()}
-    for path, value in nominal.items():
-        if (own := design.parameters.get(path)) is not None and own.tolerance is not None:
-            ends[path] = Factor(path, value, own.tolerance).box
+    for path, value, tolerance in tolerances(design):
+        if path in nominal:
+            ends[path] = Factor(path, value, tolerance).box
     moves = [
         {path: to}
         for path, value in nominal.items()
         for to in (value * (1 - STEP), value * (1 + STEP), *ends[path])
     ]
     figures = population_figures(moved(design, nominal, moves), design)
-    entries = [
-        Sensitivity(
-            path, name, _rise(column[1 + 4 * k], column[2 + 4 * k]) / (200.0 * STEP), *ends[path],
-            float(column[3 + 4 * k]), float(column[4 + 4 * k]),
-        )
-        for k, path in enumerate(nominal)
-        for name, column in figures.items()
-    ]  # fmt: skip
+    entries = []
+    for k, path in enumerate(nominal):
+        for name, column in figures.items():
+            down, up, low, high = column[1 + 4 * k : 5 + 4 * k].tolist()
+            entries.append(Sensitivity(path, name, _rise(down, up) / (200.0 * STEP), *ends[path], low, high))
     return Sensitivities({name: float(column[0]) for name, column in figures.items()}, tuple(entries))
 
 

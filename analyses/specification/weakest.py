@@ -150,15 +150,15 @@ def spread(
     points: Sequence[OperatingPointFigures], names: Iterable[str] = ("gain_margin", "phase_margin")
 ) -> dict[str, dict[str, Spread]]:
     """By loop and figure; of a loop that is stable at every operating point."""
-    stable = {
-        loop: [point for point in points if loop in point.figures and point.kind != "describing-function"]
-        for loop in dict.fromkeys(name for point in points for name in point.figures)
-    }
+    seen = [point for point in points if point.kind != "describing-function"]
     made: dict[str, dict[str, Spread]] = {}
-    for loop, seen in stable.items():
-        if not all(point.figures[loop].judged.stable for point in seen):
+    for loop in dict.fromkeys(name for point in points for name in point.figures):
+        judged = [
+            (point.place or "sliding", point.figures[loop].judged) for point in seen if loop in point.figures
+        ]
+        if not all(one.stable for _, one in judged):
             continue
-        rows = [(point.place or "sliding", _signed(point.figures[loop].judged.margins)) for point in seen]
+        rows = [(place, _signed(one.margins)) for place, one in judged]
         for name in names:
             values = [(figures[name], place) for place, figures in rows if name in figures]
             if values:

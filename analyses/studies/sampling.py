@@ -165,11 +165,6 @@ def semidefinite_root(matrix: np.ndarray) -> np.ndarray:
 
     Two parameters that are one (correlation 1 or -1) have a zero on the diagonal of L, so that the second
     follows the first exactly.
-
-    Examples
-    --------
-    >>> semidefinite_root(np.array([[1.0, -1.0], [-1.0, 1.0]])).tolist()
-    [[1.0, 0.0], [-1.0, 0.0]]
     """
     size = len(matrix)
     root = np.zeros((size, size))

@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
-from analyses.large_signal.at_rest import RestSweep
-from analyses.large_signal.by_amplitude import AmplitudeMargin
 from analyses.large_signal.conditional import Conditional
+from analyses.large_signal.from_rest import AmplitudeMargin, RestSweep
 from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
 from analyses.motion.settling import Settling, ending_of, noticed, verdict_of, waiver_of_rest

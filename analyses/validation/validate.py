@@ -19,9 +19,8 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from analyses.friction_effects import friction_effects
 from analyses.isolation import attempt
-from analyses.large_signal.at_rest import RestSweep, free_amplitude, sweep_from_rest
-from analyses.large_signal.by_amplitude import margins_by_amplitude
 from analyses.large_signal.conditional import Conditional, conditional_stability
+from analyses.large_signal.from_rest import RestSweep, free_amplitude, margins_by_amplitude, sweep_from_rest
 from analyses.large_signal.result import large_signals
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles.counts import Counts, counts_of

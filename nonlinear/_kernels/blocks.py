@@ -138,29 +138,6 @@ def counted(value, scale):
 
 
 @kernel
-def difference(p, s, angle):
-    """Difference over the last m samples; the angles lie in the state, oldest first."""
-    m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
-    speed = (angle - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
-    for j in range(m - 1):
-        s[at + j] = s[at + j + 1]
-    s[at + m - 1] = angle
-    return speed
-
-
-@kernel
-def tracking(p, s, angle):
-    """Tracking loop: p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r."""
-    speed = s[layout.S_TRACKED_SPEED]
-    foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * speed
-    r = angle - foreseen
-    s[layout.S_TRACKED_ANGLE] = foreseen + p[layout.TRACKING_ANGLE] * r
-    speed += p[layout.TRACKING_SPEED] * r
-    s[layout.S_TRACKED_SPEED] = speed
-    return speed
-
-
-@kernel
 def measured_speed(p, s, io, w, th):
     """Speed by the encoder's method, then its first-order filter, then the speed filters."""
     x, angle, source = w, th, int(p[layout.SPEED_SOURCE])
@@ -168,9 +145,19 @@ def measured_speed(p, s, io, w, th):
         x = p[layout.RATIO] * io[layout.IN_OUTPUT_SPEED]
         angle = p[layout.RATIO] * io[layout.IN_OUTPUT]
     if source == DIFFERENCE:
-        x = difference(p, s, counted(angle, p[layout.COUNTS_PER_RAD]))
-    elif source == TRACKING:
-        x = tracking(p, s, counted(angle, p[layout.COUNTS_PER_RAD]))
+        angle = counted(angle, p[layout.COUNTS_PER_RAD])
+        m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])  # the last angles, oldest first
+        x = (angle - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
+        for j in range(m - 1):
+            s[at + j] = s[at + j + 1]
+        s[at + m - 1] = angle
+    elif source == TRACKING:  # p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r
+        x = s[layout.S_TRACKED_SPEED]
+        foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * x
+        r = counted(angle, p[layout.COUNTS_PER_RAD]) - foreseen
+        s[layout.S_TRACKED_ANGLE] = foreseen + p[layout.TRACKING_ANGLE] * r
+        x += p[layout.TRACKING_SPEED] * r
+        s[layout.S_TRACKED_SPEED] = x
     filtered = s[layout.S_FILTERED_SPEED]
     filtered += p[layout.FILTER_COEFFICIENT] * (x - filtered)
     s[layout.S_FILTERED_SPEED] = filtered

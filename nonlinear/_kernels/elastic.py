@@ -152,6 +152,14 @@ def guards_hold(p, s, chord, i, w, W, d):
 
 
 @kernel
+def row_of(p, o, i, w, W, d, u, a, b):
+    """One row of a transition: what state and held inputs make of a number."""
+    return (
+        p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
+    )
+
+
+@kernel
 def stride(p, s, number, h):
     """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j.
 
@@ -162,16 +170,11 @@ def stride(p, s, number, h):
     i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
     x = at.ES_INPUT
     u, a, b = s[x + at.IN_U], s[x + at.IN_MOTOR], s[x + at.IN_LOAD]
-    i1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
-    o += 7
-    w1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
-    o += 7
-    W1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
-    o += 7
-    d1 = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d + (p[o + 4] * u + p[o + 5] * a + p[o + 6] * b)
-    o += 7
-    turned = p[o] * i + p[o + 1] * w + p[o + 2] * W + p[o + 3] * d
-    turned += p[o + 4] * u + p[o + 5] * a + p[o + 6] * b
+    i1 = row_of(p, o, i, w, W, d, u, a, b)
+    w1 = row_of(p, o + at.STEP_COLUMNS, i, w, W, d, u, a, b)
+    W1 = row_of(p, o + 2 * at.STEP_COLUMNS, i, w, W, d, u, a, b)
+    d1 = row_of(p, o + 3 * at.STEP_COLUMNS, i, w, W, d, u, a, b)
+    turned = row_of(p, o + 4 * at.STEP_COLUMNS, i, w, W, d, u, a, b)
     if s[at.ES_GUARDS] > 0.0:
         reach = p[m + at.MODE_REACH + number] * speed_of_change(p, s)
         if s[at.ES_ROOM] > 2.0 * reach:  # twice: rounding does not decide

@@ -11,7 +11,7 @@ import math
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.elastic_series import rounding_of
+from nonlinear._kernels.elastic_series import rounding_of, slopes_of
 
 
 @kernel
@@ -277,14 +277,9 @@ def fails(p, s, event):
 @kernel
 def elastic_slopes(p, s):
     """(i', w', W', delta') in the present mode under the inputs that were held last."""
-    m = int(s[at.ES_MODE])
-    i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
-    x = at.ES_INPUT
-    di = p[m + at.A_II] * i + p[m + at.A_IW] * w + p[m + at.B_I] * s[x + at.IN_U]
-    dw = p[m + at.A_WI] * i + p[m + at.A_WW] * w + p[m + at.A_WV] * W + p[m + at.A_WD] * d
-    dw += p[m + at.B_W] * s[x + at.IN_MOTOR]
-    dW = p[m + at.A_VW] * w + p[m + at.A_VV] * W + p[m + at.A_VD] * d + p[m + at.B_V] * s[x + at.IN_LOAD]
-    return di, dw, dW, p[m + at.A_DW] * w + p[m + at.A_DV] * W
+    x, w, W = at.ES_INPUT, s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
+    u, torque, load = s[x + at.IN_U], s[x + at.IN_MOTOR], s[x + at.IN_LOAD]
+    return slopes_of(p, int(s[at.ES_MODE]), s[layout.S_CURRENT], w, W, s[at.ES_TWIST], u, torque, load)
 
 
 @kernel

@@ -17,30 +17,28 @@ ROUNDING = 2e-15
 
 
 @kernel
+def slopes_of(p, m, i, w, W, d, u, torque, load):
+    """(i', w', W', delta') of a state in the mode at ``m``, under these inputs."""
+    di = p[m + at.A_II] * i + p[m + at.A_IW] * w + p[m + at.B_I] * u
+    dw = p[m + at.A_WI] * i + p[m + at.A_WW] * w + p[m + at.A_WV] * W + p[m + at.A_WD] * d
+    dw += p[m + at.B_W] * torque
+    dW = p[m + at.A_VW] * w + p[m + at.A_VV] * W + p[m + at.A_VD] * d + p[m + at.B_V] * load
+    return di, dw, dW, p[m + at.A_DW] * w + p[m + at.A_DV] * W
+
+
+@kernel
 def fill_series(p, s):
     """Taylor coefficients of (i, w, W, delta) from the present state under the held inputs."""
-    m = int(s[at.ES_MODE])
-    u, torque, load = (
-        s[at.ES_INPUT + at.IN_U],
-        s[at.ES_INPUT + at.IN_MOTOR],
-        s[at.ES_INPUT + at.IN_LOAD],
-    )
+    m, x = int(s[at.ES_MODE]), at.ES_INPUT
+    u, torque, load = s[x + at.IN_U], s[x + at.IN_MOTOR], s[x + at.IN_LOAD]
     i, w, W, d = s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST]
-    one = 1.0  # the inputs act on the first derivative only
-    for k in range(int(p[at.EL_TERMS])):
+    for k in range(int(p[at.EL_TERMS]) + 1):
         x = at.ES_SERIES + 4 * k
         s[x], s[x + 1], s[x + 2], s[x + 3] = i, w, W, d
+        di, dw, dW, dd = slopes_of(p, m, i, w, W, d, u, torque, load)
         scale = 1.0 / (k + 1)
-        i_next = p[m + at.A_II] * i + p[m + at.A_IW] * w + one * p[m + at.B_I] * u
-        w_next = p[m + at.A_WI] * i + p[m + at.A_WW] * w + p[m + at.A_WV] * W + p[m + at.A_WD] * d
-        w_next += one * p[m + at.B_W] * torque
-        W_next = p[m + at.A_VW] * w + p[m + at.A_VV] * W + p[m + at.A_VD] * d
-        W_next += one * p[m + at.B_V] * load
-        d_next = p[m + at.A_DW] * w + p[m + at.A_DV] * W
-        i, w, W, d = i_next * scale, w_next * scale, W_next * scale, d_next * scale
-        one = 0.0
-    x = at.ES_SERIES + 4 * int(p[at.EL_TERMS])
-    s[x], s[x + 1], s[x + 2], s[x + 3] = i, w, W, d
+        i, w, W, d = di * scale, dw * scale, dW * scale, dd * scale
+        u, torque, load = 0.0, 0.0, 0.0  # they act on the first derivative only
 
 
 @kernel

@@ -24,17 +24,6 @@ STANDING = 1e-13  # change of the reference, relative, below which it stands sti
 
 
 @kernel
-def closing_speed(distance, a, T):
-    """Speed at which a distance is covered in whole samples T while the speed falls by a T in each."""
-    d = abs(distance)
-    if a == math.inf:
-        return distance / T
-    steps = float(math.floor(0.5 * (math.sqrt(1.0 + 8.0 * d / (a * T * T)) - 1.0)))
-    speed = d / ((steps + 1.0) * T) + 0.5 * steps * a * T
-    return speed if distance > 0.0 else -speed
-
-
-@kernel
 def profile(p, s, wanted):
     """Follow the command with limited first and second derivative; exact where it keeps both limits itself.
 
@@ -45,7 +34,13 @@ def profile(p, s, wanted):
     r = clamp(wanted, p[layout.PROFILE_RANGE])
     x, v, last = s[layout.S_PROFILE], s[layout.S_PROFILE_SPEED], s[layout.S_PROFILE_COMMAND]
     gap = last - x
-    aim = (r - last) / T + closing_speed(gap, a, T)
+    closing = gap / T  # covers the gap in whole samples while the speed falls by a T in each
+    if a < math.inf:
+        d = abs(gap)
+        steps = float(math.floor(0.5 * (math.sqrt(1.0 + 8.0 * d / (a * T * T)) - 1.0)))
+        speed = d / ((steps + 1.0) * T) + 0.5 * steps * a * T
+        closing = speed if gap > 0.0 else -speed
+    aim = (r - last) / T + closing
     allowed = clamp(aim, rate)
     if abs(allowed - v) > a * T:
         allowed = v + a * T if allowed > v else v - a * T

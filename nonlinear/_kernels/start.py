@@ -1,4 +1,4 @@
-"""What comes before the first tick: lengths, what does not change with time, the state at t_0."""
+"""What comes before the first tick: lengths, what does not change with time, the state; a part of a tick."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
 from nonlinear._kernels.energy import prepare_forms
-from nonlinear._kernels.motion import put_load
+from nonlinear._kernels.motion import closely, count_events, hold, put_load, quick
 from nonlinear._kernels.sense import seed_streams
 from nonlinear._kernels.slipping import COMPLEX, describe, transition
 from nonlinear._kernels.smooth import prepare_tanh
 from nonlinear._kernels.tick import (
+    decide,
     init_command,
     init_controller,
     init_elastic,
@@ -190,3 +191,25 @@ def retune(p, s):
     put_direction(p, s)
     if p[layout.ELASTIC_DRIVE] > 0.0:
         find_mode(p, s)
+
+
+@kernel
+def part_of_tick(p, q, s, io, tau):
+    """Sense and control at t_k and move to t_k + tau, 0 < tau < Ts; returns a status.
+
+    ``s`` is a copy of the state at t_k that no tick goes on from.  ``q``, a copy of derived ``p``, becomes
+    the plant over a tick of tau seconds, exact as over a whole one: the voltage changes at t_k + f in both.
+    """
+    decide(p, s, io)
+    hold(p, s, io)
+    q[layout.PERIOD], q[layout.DELAY_FRACTION] = tau, min(p[layout.DELAY_FRACTION], tau)
+    derive(q, s)
+    events = 0.0
+    for part in range(2):
+        if q[layout.LENGTH + part] > 0.0 and events >= 0.0:
+            u = s[layout.S_QUEUE + part]
+            s[layout.S_HELD] = u
+            if quick(q, s, part, u) == 0:
+                events = closely(q, s, part, u, events)
+    count_events(s, events)
+    return int(s[layout.S_STATUS])

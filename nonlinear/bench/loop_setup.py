@@ -37,17 +37,10 @@ HELD = 1e12  # so many times its inertia holds the rotor at its speed
 class LoopSetup:
     """A drive set up to test one loop.
 
-    Attributes
-    ----------
-    design : Design
-    loop : str
-        ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
-        ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
-    bias : OperatingMotion
-        The motion underneath.
-    limits_on : bool
-    held : bool
-        Whether the rotor is held at its speed.
+    ``loop``: ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
+    ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
+    ``bias``: the motion underneath.
+    ``held``: whether the rotor is held at its speed.
     """
 
     design: Design

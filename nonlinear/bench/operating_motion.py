@@ -43,23 +43,14 @@ FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 class OperatingMotion:
     """A drive at constant speed: every signal of the cascade, motor side.
 
-    Attributes
-    ----------
-    speed_rad_s : float
-        0: the drive stands, and dry friction has to be left out of the test.
-    current_A, voltage_V : float
-        What the motor takes (zero current for an ideal torque source).
-    friction_on : bool
-        Whether dry friction and offset torque take part.
-    load_Nm : float
-        Constant moment at the output.
-    twist_rad, coupling_Nm : float
-        Of the coupling, at its own shaft; 0 where the drive train is rigid.
-    extra_Nm : float
-        Constant torque at the motor shaft: against what presses the coupling past its play, and on a drive
-        that stands against its own.
-    room_rad_s : float
-        How far the motor speed may move before the friction is another.
+    ``speed_rad_s``: 0: the drive stands, and dry friction has to be left out of the test.
+    ``current_A``, ``voltage_V``: what the motor takes (zero current for an ideal torque source).
+    ``friction_on``: whether dry friction and offset torque take part.
+    ``load_Nm``: constant moment at the output.
+    ``twist_rad``, ``coupling_Nm``: of the coupling, at its own shaft; 0 where the drive train is rigid.
+    ``extra_Nm``: constant torque at the motor shaft: against what presses the coupling past its play, and
+    on a drive that stands against its own.
+    ``room_rad_s``: how far the motor speed may move before the friction is another.
     """
 
     speed_rad_s: float

@@ -15,8 +15,16 @@ from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.export.program import c_text, filled, header_text, replaced, single, source_hash, source_text
-from nonlinear.export.rows import place_words
+from nonlinear.export.program import (
+    c_text,
+    filled,
+    header_text,
+    place_words,
+    replaced,
+    single,
+    source_hash,
+    source_text,
+)
 from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
 from nonlinear.row.parameters import design_row
@@ -29,14 +37,9 @@ SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 class ExportedDesign:
     """What an export knows of a design.
 
-    Attributes
-    ----------
-    row : ndarray, shape (layout.SIZE,)
-        Parameters of a run: the design at rest, its load torque an input.
-    p_size, s_size : int
-        Lengths of the rows of parameters and state.
-    derived : ndarray, shape (p_size,)
-        The row with all that follows from it.
+    ``row``: parameters of a run: the design at rest, its load torque an input.
+    ``p_size``, ``s_size``: lengths of the rows of parameters and state.
+    ``derived``: the row with all that follows from it.
     """
 
     design: Design
@@ -170,7 +173,8 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
     """The README of an export."""
     design, row = ours.design, ours.row
     what, unit = stage_words(design)
-    number = 4 if single_precision else 8
+    number, step = 4 if single_precision else 8, spare_parameters(ours) // SPARE_LEVELS
+    longer = f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."
     values = {
         "NAME": _seen(design.name),
         "TITLE": _seen(design.title),
@@ -183,15 +187,8 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
         "S": str(ours.s_size),
         "IO": str(at.IO_SIZE),
         "BYTES": str(number * (ours.p_size + ours.s_size + at.IO_SIZE)),
-        "STIFFER": _stiffer(ours),
+        "STIFFER": longer if step else "",
         "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }
     return filled("README.md", values)
-
-
-def _stiffer(ours: ExportedDesign) -> str:
-    if ours.row[at.ELASTIC_DRIVE] <= 0.0:
-        return ""
-    step = spare_parameters(ours) // SPARE_LEVELS
-    return f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."

@@ -54,7 +54,9 @@ def controller_export(
     }  # fmt: skip
     source = _source(ours.program, prefix)
     values["SOURCE_HASH"] = hashlib.sha256(source.encode()).hexdigest()
-    values["SIZES"], values["LIBRARY"] = _sizes(ours, single_precision), _library(source)
+    called = ", ".join(f"`{name}`" for name in sorted({*_LIBRARY.findall(source)}))
+    values["LIBRARY"] = f"{called} of the mathematical library" if called else "no function of any library"
+    values["SIZES"] = _sizes(ours, single_precision)
     values["ROUNDINGS"] = str(roundings(ours))
     texts = {
         "controller.h": filled("controller.h", values),
@@ -83,11 +85,6 @@ def _source(program: Program, prefix: str) -> str:
     words["SOURCE_HASH"] = " "
     parts = " ".join(f'"{word}" {upper}CONTROLLER_{name}' for name, word in words.items())
     return "\n".join([*head, f"const char {prefix}controller_version[] = {parts};", "", body])
-
-
-def _library(source: str) -> str:
-    names = sorted(set(_LIBRARY.findall(source)))
-    return f"`{'`, `'.join(names)}` of the mathematical library" if names else "no function of any library"
 
 
 def _declarations(program: Program) -> str:

@@ -59,13 +59,8 @@ def controller_start(p, s):  # type: ignore[no-untyped-def]
 class Controller:
     """The controller of a design as C in double precision.
 
-    Attributes
-    ----------
-    p : ndarray
-        The parameters of the design with all that is derived from them.
-    program : Program
-    state, measured, out : Struct
-        What it remembers, is given and gives.
+    ``p``: the parameters of the design with all that is derived from them.
+    ``state``, ``measured``, ``out``: what it remembers, is given and gives.
     """
 
     design: Design

@@ -6,7 +6,7 @@ from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
 from nonlinear.export.c_files import stage_words
-from nonlinear.export.rows import said_of
+from nonlinear.export.program import said_of
 
 _COMMANDED = {"position": "rad", "velocity": "rad/s", "current": "A", "voltage": "V"}  # unit of each stage's
 _INSIDE = {  # numbers in the unit of the command of the next stage inside

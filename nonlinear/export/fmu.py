@@ -69,7 +69,8 @@ def fmu_bytes(
     variables = of.variables_of(design, trace)
     texts = _sources(design, trace, version)
     names = [name for name in texts if name.endswith(".c")]
-    token = _token(texts, variables)
+    digest = hashlib.sha256("".join([*texts.values(), repr(variables)]).encode()).digest()
+    token = f"{{{uuid.UUID(bytes=digest[:16])}}}"  # another program or other variables change it
     files = {"modelDescription.xml": description(design, variables, token, version, names, tool)}
     texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", token)
     for platform in platforms:
@@ -105,12 +106,6 @@ def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str
         "fmu_core.c": filled("fmu_core.c", {"BITS": bits}),
         f"fmi{version}.c": template(f"fmi{version}.c"),
     }
-
-
-def _token(texts: Mapping[str, str], variables: Sequence[of.Variable]) -> str:
-    """An identifier that another program or other variables change."""
-    digest = hashlib.sha256("".join([*texts.values(), repr(variables)]).encode())
-    return f"{{{uuid.UUID(bytes=digest.digest()[:16])}}}"
 
 
 def _header_values(design: Design, trace: KeyTrace) -> dict[str, str]:

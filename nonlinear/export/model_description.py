@@ -80,32 +80,20 @@ def _units(variables: Sequence[Variable], version: int) -> ET.Element:
     return definitions
 
 
-def _bounds(item: Variable) -> dict[str, str]:
-    """Unit, range and size of a number; an integer has a range alone."""
-    if item.kind not in ("real", "integer"):
-        return {}
+def _of_type(item: Variable) -> dict[str, str]:
+    """Unit, range, size and start of a variable; an integer has a range alone."""
     if item.kind == "integer":
-        return {"min": str(int(item.low)), "max": str(int(min(item.high, LARGEST_INTEGER)))}
-    result = {}
-    if item.unit != "1":
-        result["unit"] = item.unit
-        if item.shown:
-            result["displayUnit"] = item.shown
-    if item.low > -math.inf:
-        result["min"] = repr(float(item.low))
-    if item.high < math.inf:
-        result["max"] = repr(float(item.high))
-    if item.nominal is not None:
-        result["nominal"] = repr(float(item.nominal))
-    return result
-
-
-def _start(item: Variable) -> dict[str, str]:
-    if item.start is None:
-        return {}
-    if isinstance(item.start, str):
-        return {"start": item.start}
-    return {"start": str(int(item.start)) if item.kind == "integer" else repr(float(item.start))}
+        result = {"min": str(int(item.low)), "max": str(int(min(item.high, LARGEST_INTEGER)))}
+    else:
+        numbers = {"min": item.low, "max": item.high, "nominal": item.nominal}
+        known = {name: x for name, x in numbers.items() if x is not None and math.isfinite(x)}
+        result = {name: repr(float(x)) for name, x in known.items()} if item.kind == "real" else {}
+        if item.kind == "real" and item.unit != "1":
+            shown = {"displayUnit": item.shown} if item.shown else {}
+            result = {"unit": item.unit, **shown, **result}
+    if item.start is None or isinstance(item.start, str):
+        return result if item.start is None else {**result, "start": item.start}
+    return {**result, "start": str(int(item.start)) if item.kind == "integer" else repr(float(item.start))}
 
 
 def _common(item: Variable) -> dict[str, str]:
@@ -133,7 +121,7 @@ def _variables(root: ET.Element, variables: Sequence[Variable], version: int) ->
             variability="continuous", unit="s", description="simulation time",
         )  # fmt: skip
     for item in variables:
-        kind, own = _TYPES[version][item.kind], {**_bounds(item), **_start(item)}
+        kind, own = _TYPES[version][item.kind], _of_type(item)
         if version == 2:
             ET.SubElement(ET.SubElement(listed, "ScalarVariable", _common(item)), kind, own)
         elif item.kind == "string":

@@ -11,7 +11,7 @@ from actuator_lti.drive.signals import Limiter
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.limiters import limiter_places
 from nonlinear._kernels import layout as at
-from nonlinear.export.linear_limiters import SIGNALS as SEEN
+from nonlinear.export.linear_loops import SIGNALS as SEEN
 from nonlinear.export.statement import Statement, used
 from nonlinear.export.trace import Tape, Traced, followed, reached
 
@@ -28,7 +28,7 @@ LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in
 
 
 def line_of(limiter: Limiter) -> int | None:
-    """The line of `linear_limiters.limiter_sizes` in front of a limiter; None where there is none."""
+    """The line of `linear_loops.limiter_sizes` in front of a limiter; None where there is none."""
     if limiter.signal not in SEEN or limiter.kind not in ("value", "rate"):
         return None
     return SEEN.index(limiter.signal) + (len(SEEN) if limiter.kind == "rate" else 0)

@@ -21,16 +21,11 @@ class Statement:
     Where another outcome of a condition is followed too, a branch with its end stands for the condition;
     each way ends with all being allowed, or a refusal.
 
-    Attributes
-    ----------
-    kind : {"value", "condition", "store", "branch", "end", "allowed", "refusal"}
-    target : int
-        Number of the value, or place in the row; of a condition or branch 1 where it has to hold, else 0.
-    does : str
-        A sign between two terms, the name of a function of the C library, ``where`` (condition, yes, no),
-        ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: its words, the form of
-        ``printf`` where a term is shown.
-    terms : tuple of str or float
+    ``target``: number of the value, or place in the row; of a condition or branch 1 where it has to hold,
+    else 0.
+    ``does``: a sign between two terms, the name of a function of the C library, ``where`` (condition,
+    yes, no), ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: its words, the
+    form of ``printf`` where a term is shown.
     """
 
     kind: Literal["value", "condition", "store", "branch", "end", "allowed", "refusal"]

@@ -185,18 +185,11 @@ class Traced:
 class Key:
     """One numeric key of a design as a parameter.
 
-    Attributes
-    ----------
-    path : str
-        Dotted path.
-    value, low, high : float
-        SI; ``low_open`` makes the lower bound exclusive.
-    unit : str
-        SI unit; ``"1"``: none.
-    whole : bool
-        A count.
-    fixed : bool
-        Only before the run begins, because the state's shape or clock depends on it.
+    ``path``: dotted path.
+    ``value``, ``low``, ``high``: SI; ``low_open`` makes the lower bound exclusive.
+    ``unit``: SI unit; ``"1"``: none.
+    ``whole``: a count.
+    ``fixed``: only before the run begins, because the state's shape or clock depends on it.
     """
 
     path: str

@@ -10,7 +10,7 @@ outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage
 its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
 (`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
 ``step_of(stage, count)`` its step response, both at ``y_at()``; ``limiters(count)`` the gains from the
-command to what stands in front of the limits (`nonlinear.export.linear_limiters`).
+command to what stands in front of the limits (`nonlinear.export.linear_loops`).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from actuator_lti.compiled import Program, emit_c
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.files.tree import Tree
-from nonlinear.export import linear, linear_limiters, linear_loops
+from nonlinear.export import linear, linear_loops
 from nonlinear.export.program import ENTRIES, HEAD, header_text, template
 
 MOST_BYTES = 100_000
@@ -43,8 +43,8 @@ _LINEAR: dict[Any, tuple[Kind, ...]] = {
     linear_loops.lead_of: (_ROW,),
     linear_loops.figures: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 12),
     linear_loops.responded: ("int", _ROW, _ROW, _ROW, "int", *(_ROW,) * 5),
-    linear_limiters.limiters_assembled: (_ROW,) * 11,
-    linear_limiters.limiter_sizes: (_ROW, "int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
+    linear_loops.limiters_assembled: (_ROW,) * 11,
+    linear_loops.limiter_sizes: (_ROW, "int", _ROW, _ROW, _ROW, "int", "int", *(_ROW,) * 4),
     linear_loops.stepped: ("int", _ROW, _ROW, _ROW, "float", "int", *(_ROW,) * 3),
     _withheld.rounding_decides: ("int", *(_ROW,) * 8),
     _quoted.quoted: (_ROW, "float", _ROW),
@@ -53,7 +53,7 @@ _SIZES = {
     **{name: getattr(linear, name) for name in ("MOST", "MOST_TICKS", "SEEN", "POSITION", "COMMAND")},
     **{name: getattr(linear_loops, name) for name in ("MOST_STATES", "MOST_PHASES", "BLOCK")},
     **{name: getattr(_response, name) for name in ("DEEPEST", "CAPACITY")},
-    "SHOWN": linear_limiters.SHOWN,
+    "SHOWN": linear_loops.SHOWN,
     "STAGES": linear.AT_VOLTAGE + 1,
     "COLUMNS": _figures.COLUMNS,
     "FIRST_CLOSED": _figures.PEAK_T,

@@ -44,16 +44,11 @@ class Running:
     A run keeps to itself what it does; this hands its state over between two ticks, so that it may begin in
     any state and be cut anywhere.  It is the same compiled code (`nonlinear.native`).
 
-    Attributes
-    ----------
-    p, s : ndarray
-        Parameters with what is derived from them, and the state; write into them between two calls.
-    tables : ndarray
-        Time series that the parameters refer to.
-    start : ndarray
-        The state that it began in.
-    work : int
-        Ticks that `advance` went on by, and integration steps within them.
+    ``p``, ``s``: parameters with what is derived from them, and the state; write into them between two
+    calls.
+    ``tables``: time series that the parameters refer to.
+    ``start``: the state that it began in.
+    ``work``: ticks that `advance` went on by, and integration steps within them.
 
     Examples
     --------

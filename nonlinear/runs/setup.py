@@ -23,6 +23,16 @@ Floats = npt.NDArray[np.float64]
 
 
 CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
+STATE_PLACES = {  # where a run begins with each number of a `State` (in the row), and ends with it
+    "motor_angle_rad": (at.ANGLE_START, at.S_ANGLE),
+    "motor_speed_rad_s": (at.SPEED_START, at.S_SPEED),
+    "current_A": (at.CURRENT_START, at.S_CURRENT),
+    "current_integral_V": (at.CURRENT_INTEGRATOR_START, at.S_CURRENT_INTEGRATOR),
+    "velocity_integral": (at.VELOCITY_INTEGRATOR_START, at.S_VELOCITY_INTEGRATOR),
+    "speed_command_rad_s": (at.SPEED_COMMAND_START, at.S_SPEED_COMMAND),
+    "current_command_A": (at.CURRENT_COMMAND_START, at.S_CURRENT_REFERENCE),
+    "voltage_V": (at.VOLTAGE_START, at.S_VOLTAGE),
+}
 
 
 @dataclass
@@ -91,7 +101,7 @@ class Run:
     duration_s: float
     load_Nm: float | LoadMoment = 0.0
     bias: Command | None = None
-    probes: tuple[Probe, ...] = ()
+    probes: Sequence[Probe] = ()
     initial: State | None = None
     friction_on: bool = True
     limits_on: bool = True
@@ -218,7 +228,10 @@ def put_state(row: Floats, state: State) -> None:
     for name, value in vars(state).items():
         if name != "law" and value is not None:
             finite_number(f"initial.{name}", value)
-    row[at.ANGLE_START], row[at.SPEED_START] = state.motor_angle_rad, state.motor_speed_rad_s
+    for name, (place, _) in STATE_PLACES.items():
+        row[place] = getattr(state, name)
+    if row[at.SOURCE]:
+        row[at.CURRENT_START] = 0.0
     if row[at.ELASTIC_DRIVE]:
         angle, speed = state.motor_angle_rad / row[at.RATIO], state.motor_speed_rad_s / row[at.RATIO]
         behind = row[at.RATIO] / row[at.RATIO_TO_COUPLING]
@@ -226,12 +239,6 @@ def put_state(row: Floats, state: State) -> None:
             row[at.TWIST_START] = behind * (angle - state.output_angle_rad)
         output_speed = speed if state.output_speed_rad_s is None else state.output_speed_rad_s
         row[at.LOAD_SPEED_START] = behind * output_speed
-    row[at.CURRENT_START] = 0.0 if row[at.SOURCE] else state.current_A
-    row[at.CURRENT_INTEGRATOR_START] = state.current_integral_V
-    row[at.VELOCITY_INTEGRATOR_START] = state.velocity_integral
-    row[at.SPEED_COMMAND_START] = state.speed_command_rad_s
-    row[at.CURRENT_COMMAND_START] = state.current_command_A
-    row[at.VOLTAGE_START] = state.voltage_V
     law, order = numbers_of("initial.law", state.law), int(row[at.OWN_STATES])
     if law.size:
         if law.size != order or not np.isfinite(law).all():

@@ -35,6 +35,8 @@ _AS_LARGE = (  # states that are as large as a signal, or rounded as coarsely
     ([*range(at.S_TORQUE_CHAIN, at.S_PROBE_PLACES)], _CURRENT_COMMAND),
     ([at.S_SPEED_COMMAND, at.S_SPEED_REFERENCE, at.S_POSITION_INTEGRATOR], _SPEED_COMMAND),
 )
+_STATES = np.array([state for states, _ in _AS_LARGE for state in states])
+_SIGNALS = np.array([signal for states, signal in _AS_LARGE for _ in states])
 
 
 def stays_overloaded(drive: Running) -> bool:
@@ -84,8 +86,7 @@ class Scales:
         np.maximum(signals, np.abs(piece.columns[: at.HISTORY_PROBES]).max(axis=1), out=signals)
         if self._p[at.HAS_POSITION] > 0.0:
             self._by_angle()
-        for places, column in _AS_LARGE:
-            states[places] = np.maximum(states[places], signals[column])
+        states[_STATES] = np.maximum(states[_STATES], signals[_SIGNALS])
         queue = slice(at.S_QUEUE, at.S_QUEUE + int(self._p[at.DELAY_LINE]))
         states[queue] = np.maximum(states[queue], signals[_VOLTAGE])
 

@@ -53,6 +53,8 @@ AveragesOption = Annotated[
 ]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
+SHOWN = 8  # of what is not met or not proven
+
 
 def report(
     design: DesignArgument = DEFAULT_DESIGN,
@@ -84,7 +86,7 @@ def report(
     from reports.cli.progress import progress
     from reports.document import dumps, load
     from reports.terminal import print_verdict
-    from reports.verdict_summary import verdict_words
+    from reports.verdict_summary import open_items, verdict_words
 
     if summary and not pdf:
         raise InputError("--summary: allowed with --pdf, of which it makes a short one")
@@ -111,5 +113,7 @@ def report(
     else:
         first, *more = verdict_words(made["verdict"])
         print_verdict(Verdict(made["verdict"]["verdict"]), f"{drive.name}: {first}")
-        print_line("\n".join([*more, *map(str, written)]))
+        open_ones = open_items(made["sections"])
+        left = [f"{len(open_ones) - SHOWN} more, see the page"] * (len(open_ones) > SHOWN)
+        print_line("\n".join([*more, *open_ones[:SHOWN], *left, *map(str, written)]))
     leave_with(made["verdict"]["passed"])

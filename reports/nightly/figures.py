@@ -72,11 +72,12 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
     if distance is not None and (what == REQUIREMENTS or item["verdict"] == "not met"):
         of = str(item.get("quantity", ""))
         left = distance if limit is None or value is None else reserve(of, value, limit, distance)
+    words = "" if limit is None else f"{item['comparison']} {limit:.6g}".strip()
     return {
         "id": name,
         "label": item["label"] or name,
         "what": what,
-        "limit": "" if limit is None else f"{item['comparison']} {limit:.6g}".strip(),
+        "limit": words,
         "bound": number(limit),
         "relative": left,
         "role": role(item),
@@ -91,10 +92,9 @@ def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:
         name, unit = verdict["id"], verdict["unit"]
         kind = "requirement" if verdict["what"] == REQUIREMENTS else "check"
         met = {"met": 1.0, "not met": 0.0}.get(verdict["verdict"])
+        left = verdict["distance"]
         yield Figure(name=f"{name}: value", value=verdict["value"], unit=unit, kind=kind)
-        yield Figure(
-            name=f"{name}: distance", value=verdict["distance"], unit=unit, better=1, kind="distance"
-        )
+        yield Figure(name=f"{name}: distance", value=left, unit=unit, better=1, kind="distance")
         yield Figure(name=f"{name}: met", value=met, kind="verdict")
     first: dict[str, Figure] = {}
     for section, block in _blocks(document):

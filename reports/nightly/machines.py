@@ -7,8 +7,7 @@ from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
 from actuator_lti.files.tree import Tree
-from reports.nightly.changes import Comparison
-from reports.nightly.headline import cause_lines
+from reports.nightly.changes import Comparison, cause_lines
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import STATES, DesignView, Overview
 from reports.numbers import or_none
@@ -79,11 +78,8 @@ def junit(night: Overview) -> str:
     """JUnit XML: a suite a design, a case a requirement, one for its build and one for regressions."""
     top = Xml.Element("testsuites", name=_line(night.study.name))
     for design in night.designs:
-        suite = Xml.SubElement(
-            top, "testsuite", name=_line(design.name), time=f"{design.result.seconds:.3f}",
-            timestamp=night.run.started.rstrip("Z"),
-        )  # fmt: skip
-        _cases(suite, design)
+        about = {"time": f"{design.result.seconds:.3f}", "timestamp": night.run.started.rstrip("Z")}
+        _cases(Xml.SubElement(top, "testsuite", name=_line(design.name), **about), design)
     tags = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
     for element in (*top, top):
         for name, tag in tags.items():

@@ -14,13 +14,20 @@ from reports.charts import style
 from reports.charts.chart import Chart
 from reports.charts.svg import page_svg
 from reports.html import render
-from reports.nightly.changes import SHOWN_CHANGES, Columns
+from reports.nightly.changes import (
+    SHOWN_CHANGES,
+    Columns,
+    cause_lines,
+    cause_words,
+    change_words,
+    headlines,
+    main_changes,
+)
 from reports.nightly.figures import Figure
-from reports.nightly.headline import cause_lines, cause_words, change_words, headlines, main_changes
 from reports.nightly.history import History
+from reports.nightly.moves import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.records import Result
 from reports.nightly.text import csv_text, one_line, to_seconds
-from reports.nightly.trend import LOOK_BACK, ChangePoint, change_points, flaps
 from reports.nightly.view import STATES, DesignView, Overview, outcomes, report_folder
 from reports.numbers import significant
 from reports.scripts import asset, bundled

@@ -21,7 +21,7 @@ from functools import partial
 from pkgutil import resolve_name
 from queue import SimpleQueue
 from threading import Lock, Thread, Timer, get_ident
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 from actuator_lti.errors import InputError
 from analyses.studies.engine import Engine
@@ -150,10 +150,9 @@ class _Child:
             said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
             limit_s = self._limits.time_limit_s * task.limits
             answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
-            if answer is None and self._late:
-                answer = Answer("timeout", self._end(limit_s))
-            elif answer is None:
-                answer = Answer("crash", self._end(limit_s), self._last_words(said))
+            if answer is None:
+                last = "" if self._late else self._last_words(said)
+                answer = Answer("timeout" if self._late else "crash", self._end(limit_s), last)
             return answer._replace(seconds=time.monotonic() - start)
 
     def _answer(self, limit_s: float, question: Any = None) -> Any:
@@ -215,7 +214,17 @@ def main(build: str, memory_bytes: int) -> None:
     os.dup2(2, 1)  # what a build prints is no answer
     _limit_memory(memory_bytes)
     questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
-    Thread(target=_listen, args=(os.fdopen(os.dup(0), "rb"), questions), daemon=True).start()
+    source = os.fdopen(os.dup(0), "rb")
+
+    def listen() -> None:
+        """Hand on what is asked; the end of the pipe is that of the parent."""
+        try:
+            while True:
+                questions.put(pickle.load(source))
+        except EOFError:
+            os._exit(0)
+
+    Thread(target=listen, daemon=True).start()
     function = resolve_name(build)
     _say(answers, READY)
     while True:
@@ -243,15 +252,6 @@ def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) 
         return Answer("done", entry=sealed(key, meta, files))
     except (TypeError, ValueError) as error:
         return Answer("error", f"result is no JSON: {one_line(str(error), 300)}")
-
-
-def _listen(source: BinaryIO, questions: SimpleQueue[Any]) -> None:
-    """Hand on what is asked; the end of the pipe is that of the parent."""
-    while True:
-        try:
-            questions.put(pickle.load(source))
-        except EOFError:
-            os._exit(0)
 
 
 def _say(pipe: Any, what: Any) -> None:

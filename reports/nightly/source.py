@@ -27,8 +27,8 @@ from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, is_study, study_from_tree, study_of
 from analyses.toml_tables import Table
+from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.text import one_line, sha256
-from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.provenance import LIBRARIES, git, package_version
 
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
@@ -41,8 +41,8 @@ _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 class Job:
     """One report to build: a design or variant (any text is a name), or the comparison of a whole study.
 
-    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters`` are dotted
-    keys with texts as written: what is shown when a figure has moved.
+    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters``, dotted keys
+    with texts as written, are shown when a figure has moved.
     """
 
     name: str
@@ -171,13 +171,10 @@ def _design_job(variant: Variant, settings: Mapping[str, Any]) -> Job:
     name, design = variant.name, variant.design
     if design is None:
         return Job(name=name, payload={"name": name, "refused": variant.error}, parameters=_texts(variant))
-    return Job(
-        name=name,
-        payload={"name": name, "design": write_design(design), "settings": dict(settings)},
-        design_hash=design_hash(design),
-        parameters={path: parameter.text for path, parameter in design.parameters.items()},
-        revision=design.revision,
-    )
+    payload = {"name": name, "design": write_design(design), "settings": dict(settings)}
+    parameters = {path: parameter.text for path, parameter in design.parameters.items()}
+    about = {"design_hash": design_hash(design), "revision": design.revision}
+    return Job(name=name, payload=payload, parameters=parameters, **about)
 
 
 def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:

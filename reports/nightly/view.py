@@ -15,10 +15,10 @@ from analyses.slugs import hashed
 from reports.nightly.cache import Cache
 from reports.nightly.changes import Between, Change, Comparison
 from reports.nightly.history import History
+from reports.nightly.moves import WINDOW, missing_nights
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.source import Study
 from reports.nightly.state import Memory
-from reports.nightly.trend import WINDOW, missing_nights
 
 BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
 STRIP = 30

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analyses.large_signal.at_rest import RestSweep
 from analyses.large_signal.conditional import Conditional, Prediction
+from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
@@ -36,10 +36,8 @@ def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Sectio
 
 
 def findings_of(conditional: Conditional, axis: str = "rotary") -> list[doc.Finding]:
-    if not conditional.diverges:
-        return []
     text = _words(conditional, *output_unit(axis))[0]
-    return [doc.Finding(severity="fail", text=text, where="conditional")]
+    return [doc.Finding(severity="fail", text=text, where="conditional")] if conditional.diverges else []
 
 
 def _words(conditional: Conditional, scale: float, unit: str) -> list[str]:
@@ -231,7 +229,5 @@ def described(sweep: RestSweep) -> str:
         return "The describing function is not compared: dry friction holds the rotor."
     gain = float(np.abs(20.0 * np.log10(np.abs(ratio))).max())
     phase = float(np.abs(np.degrees(np.angle(ratio))).max())
-    return (
-        f"The describing function at the simulated speed amplitude differs from the simulation by up to "
-        f"{gain:.2g} dB and {phase:.2g} deg."
-    )
+    words = "The describing function at the simulated speed amplitude differs from the simulation by up to"
+    return f"{words} {gain:.2g} dB and {phase:.2g} deg."

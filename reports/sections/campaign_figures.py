@@ -19,9 +19,11 @@ def surface_figure(fit: SurfaceFit) -> doc.Block:
     """Runs and fitted lines over speed, a line for each load; runs that were left out are ringed."""
     chart = style.Chart(width=style.WIDE, height=380.0, legend=True)
     panel = chart.panel("motor speed, rad/s", "friction torque at the motor, mN m")
-    loads = np.array([p.load_Nm for p in fit.points])
     line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
-    for k, centre in enumerate(_levels(loads)):
+    levels: list[float] = []  # loads that differ by more than 0.5 N m, up to ten
+    for load in sorted(p.load_Nm for p in fit.points):
+        levels += [load] if not levels or load - levels[-1] > 0.5 else []
+    for k, centre in enumerate(levels[:10]):
         here = [p for p in fit.points if abs(p.load_Nm - centre) <= 0.25]
         mean = float(np.mean([p.load_Nm for p in here]))
         label = f"{mean:.2g} N m"
@@ -40,15 +42,6 @@ def surface_figure(fit: SurfaceFit) -> doc.Block:
 def _ring(panel: style.Panel, at: tuple[float, float], words: str, size: float) -> None:
     panel.points([at[0]], [at[1]], size=size, hollow=True, colour=style.RED, read=False)
     panel.note(words, at)
-
-
-def _levels(loads: np.ndarray) -> list[float]:
-    """Loads that differ by more than 0.5 N m, up to ten."""
-    result: list[float] = []
-    for load in np.sort(loads):
-        if not result or load - result[-1] > 0.5:
-            result.append(float(load))
-    return result[:10]
 
 
 def residual_figure(fit: SurfaceFit) -> doc.Block:

@@ -195,18 +195,18 @@ def worst(comparison: Comparison) -> list[doc.Block]:
     if whole is None:
         return []
     count, items = len(whole.all), list[doc.VerdictItem]()
+
+    def rank(pair: tuple[Compared, RequirementVerdict]) -> tuple[int, float]:
+        near = nearness(pair[1])
+        return _ORDER[pair[1].verdict], math.inf if near is None else near
+
     for wanted in whole.base.verdicts:
         found = _judged(whole, wanted)
-        one, verdict = min(found, key=lambda pair: _rank(pair[1]))
+        one, verdict = min(found, key=rank)
         made, met = item(verdict), tally(v for _, v in found).met
         words = f"{made['label']}: met by {met} of {count} designs; the worst is {one.variant.name}"
         items.append({**made, "id": f"worst/{made['id']}", "label": words})
     return [doc.verdicts(items)]
-
-
-def _rank(verdict: RequirementVerdict) -> tuple[int, float]:
-    near = nearness(verdict)
-    return _ORDER[verdict.verdict], math.inf if near is None else near
 
 
 def shown_words(comparison: Comparison) -> str:

@@ -28,7 +28,7 @@ def section(result: LimitCycles) -> doc.Section:
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine, small) if result.confirmations else none
-    told: doc.Severity = "info" if _judged(result) is Verdict.MET else "warn"
+    told: doc.Severity = "info" if verdict_of(result.design, result.hunting) is Verdict.MET else "warn"
     return doc.section(
         "cycles", "Limit cycles", [predicted, _rests(result, fine, small)], result=summary(result),
         intro=intro, status=told, told=told,
@@ -49,13 +49,9 @@ def summary(result: LimitCycles) -> str:
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",
         Verdict.NOT_PROVEN: "is not known to come to rest",
-    }[_judged(result)]
+    }[verdict_of(result.design, swing)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
     return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
-
-
-def _judged(result: LimitCycles) -> Verdict:
-    return verdict_of(result.design, result.hunting)
 
 
 def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:

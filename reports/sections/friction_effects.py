@@ -221,7 +221,8 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     swing = noticed(result.design, settlings)
     if swing is not None:
-        return f"Friction keeps the drive from rest after a step: {told(result.design, swing, fine, small)}."
+        ends = told(result.design, swing, fine, small)
+        return f"Friction alone keeps the drive from rest after a step: {ends}."
     left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
     if left:
         most = max(settlings, key=lambda one: abs(one.rest.error))
@@ -230,7 +231,5 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
         return f"{_integrates(result)}; an error of up to {size} is left at rest{under}."
     if not result.integrator:
         return f"{_integrates(result)}; the steps leave no error at rest."
-    return (
-        f"After steps dry friction alone leaves no steady-state error and causes no hunting: the "
-        f"{result.integrator} integrator removes the error."
-    )
+    words = "After steps dry friction alone leaves no steady-state error and causes no hunting"
+    return f"{words}: the {result.integrator} integrator removes the error."

@@ -10,7 +10,6 @@ from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.joint_model import JointModel, RecordFit
-from analyses.identification.output_error import OutputErrorResult
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
@@ -24,7 +23,15 @@ def section(result: BenchResult) -> doc.Section:
     if result.design_values:
         blocks.append(_against_design(result.design_values, axis))
     if result.refined is not None:
-        blocks.append(_refined(result.refined, axis))
+        refined = result.refined
+        note = (
+            "Simulation with each record's own command: the relative error of the signal that is fitted "
+            f"falls from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
+            f"{refined.iterations} iterations. These values are the design's."
+        )
+        ended = "ended at a bound of its key: these records do not tell it."
+        note += "".join(f" {key} {ended}" for key in refined.at_bound)
+        blocks.append(parameter_table("Refined by simulation", refined, note, axis=axis))
     if result.electrical is not None:
         residual = 100.0 * result.electrical.relative_residual
         note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
@@ -115,19 +122,6 @@ def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
         "The design's numbers against the records", values, columns, note,
         status=lambda one: "pass" if one.agrees else "warn",
     )  # fmt: skip
-
-
-def _refined(refined: OutputErrorResult, axis: str) -> doc.Block:
-    """The values refined by simulation, which are those of the design."""
-    note = (
-        "Simulation with each record's own command: the relative error of the signal that is fitted falls "
-        f"from {100 * refined.error_before:.3f} % to {100 * refined.error_after:.3f} % in "
-        f"{refined.iterations} iterations. These values are the design's."
-        + "".join(
-            f" {key} ended at a bound of its key: these records do not tell it." for key in refined.at_bound
-        )
-    )
-    return parameter_table("Refined by simulation", refined, note, axis=axis)
 
 
 def law_table(result: BenchResult, axis: str) -> doc.Block:

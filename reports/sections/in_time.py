@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.large_signal.by_amplitude import AmplitudeMargin
+from analyses.large_signal.from_rest import AmplitudeMargin
 from analyses.validation import Validation
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown

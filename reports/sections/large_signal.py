@@ -71,15 +71,15 @@ def _result(amplitude_bode: AmplitudeBode, scale: float, unit: str, model: str =
     if linear is None or not math.isfinite(linear):
         return "The linear loop has no −3 dB bandwidth in the range of the map."
     value = amplitude_bode.minus3db_hz[place]
+    found, falls = f"{value:.3g} Hz", value < linear
     if not math.isfinite(value):
-        found = _between(amplitude_bode, place)
-        if amplitude_bode.below_from_start[place]:
-            return f"The −3 dB bandwidth falls from {linear:.3g} Hz ({model}) to {found} at {size}."
-        return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
-    if f"{value:.3g}" == f"{linear:.3g}":
+        found, falls = _between(amplitude_bode, place), amplitude_bode.below_from_start[place]
+        if not falls:
+            return f"The −3 dB bandwidth is {linear:.3g} Hz ({model}); at {size} it is {found}."
+    if found == f"{linear:.3g} Hz":
         return f"The −3 dB bandwidth stays at {linear:.3g} Hz up to {size}."
-    does = "falls" if value < linear else "rises"
-    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {value:.3g} Hz at {size}."
+    does = "falls" if falls else "rises"
+    return f"The −3 dB bandwidth {does} from {linear:.3g} Hz ({model}) to {found} at {size}."
 
 
 def _between(amplitude_bode: AmplitudeBode, place: int) -> str:

@@ -10,14 +10,13 @@ from reports import document as doc
 
 def section(result: Any) -> doc.Section:
     listed = [value for value in vars(result).values() if isinstance(value, tuple) and value]
-    blocks = [doc.listing("", rows, columns) for rows in listed if (columns := _columns(type(rows[0])))]
+    blocks = []
+    for rows in listed:
+        hints = get_type_hints(type(rows[0]), include_extras=True).items()
+        headed = {name: get_args(hint)[1] for name, hint in hints if get_origin(hint) is Annotated}
+        columns = [doc.of(partial(_text, name), name, heading) for name, heading in headed.items()]
+        blocks += [doc.listing("", rows, columns)] if columns else []
     return doc.section("list", "List", blocks, result=str(result))
-
-
-def _columns(kind: type) -> list[doc.Shown]:
-    hints = get_type_hints(kind, include_extras=True).items()
-    headed = {name: get_args(hint)[1] for name, hint in hints if get_origin(hint) is Annotated}
-    return [doc.of(partial(_text, name), name, heading) for name, heading in headed.items()]
 
 
 def _text(name: str, row: Any) -> Any:

@@ -106,7 +106,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += [doc.text(note) for note in _notes(result, known)]
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}. {judged['result']}"
+    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
     said += _below_custom(result)
@@ -159,12 +159,27 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
     for words, sound in (("not stable", False), ("stability not known", None)):
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
-    held = [
-        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
-        for label, one in named.items()
-        if one.held is not None
-    ]
+    apart = [(label, one.loop.name) for label, one in named.items() if one.held is not None]
+    held = [f"{label} with the {HELD[name]} (by itself, {OPEN[name]}, {AWAY})" for label, name in apart]
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
+
+
+def _elsewhere(result: Margins) -> str:
+    """Name the operating points at which a loop that is stable as asked for is not."""
+    places: dict[str, list[str]] = {}
+    for point in result.operating_points:
+        for name, one in point.figures.items():
+            if one.sound is False and name in result.loops and result.loops[name].sound:
+                places.setdefault(point.place or "sliding", []).append(LOOPS[name])
+    return "".join(f"; not stable {place}: {', '.join(names)}" for place, names in places.items())
+
+
+def _cogging(result: Margins) -> str:
+    """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
+    away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
+    unstable = any(one.sound is False for one in result.loops.values())
+    words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
+    return words if unstable and away else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:

@@ -10,9 +10,7 @@ from typing import Any
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import Driver, MonteCarloResult, Odds, WorstCase
-from analyses.monte_carlo.statistics import ColumnStatistics
-from analyses.specification.requirements import RequirementVerdict
+from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, or_none
@@ -26,7 +24,10 @@ _SHOWN = (1, 5, 50, 95, 99)  # per cent
 
 def section(result: MonteCarloResult) -> doc.Section:
     items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
-    items += [_not_sampled(one) for one in result.left_out]
+    for one in result.left_out:  # not sampled
+        words, waiver = f"{label(one)}: met within the tolerances", one.waiver.words if one.waiver else ""
+        id = f"tolerance/{one.id}"
+        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
     blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
     if result.odds:
         blocks.append(_odds_table(result))
@@ -75,27 +76,14 @@ def _result(result: MonteCarloResult) -> str:
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     wanted = 1.0 if result.at_least is None else result.at_least
-    passed = result.judged(odds) is Verdict.MET
+    passed, share = result.judged(odds) is Verdict.MET, odds.probability
     reason = "" if passed else _why(odds, result.case(odds))
     if result.at_least is not None:
-        reason = f"{100 * odds.low:.3f} % with 95 % confidence"
+        share, reason = odds.low, f"{100 * odds.low:.3f} % with 95 % confidence"
     return doc.verdict(
-        f"tolerance/{odds.id}",
-        f"{capital(odds.label)}: met within the tolerances",
-        value=100.0 * odds.probability,
-        limit=100.0 * wanted,
-        unit="%",
-        distance=100.0 * ((odds.low if result.at_least is not None else odds.probability) - wanted),
-        passed=passed,
-        reason=reason,
-        comparison=">=",
-    )
-
-
-def _not_sampled(one: RequirementVerdict) -> doc.VerdictItem:
-    return doc.verdict(
-        f"tolerance/{one.id}", f"{label(one)}: met within the tolerances", passed=None, reason=one.reason,
-        waiver=one.waiver.words if one.waiver else "",
+        f"tolerance/{odds.id}", f"{capital(odds.label)}: met within the tolerances", unit="%",
+        value=100.0 * odds.probability, limit=100.0 * wanted, distance=100.0 * (share - wanted),
+        passed=passed, reason=reason, comparison=">=",
     )  # fmt: skip
 
 

@@ -9,30 +9,25 @@ from actuator_lti.files.tree import Tree
 from reports import document as doc
 from reports.nightly.machines import summary
 from reports.nightly.text import one_line
-from reports.nightly.view import STATES, DesignView
+from reports.nightly.view import STATES
 
 if TYPE_CHECKING:
     from reports.nightly.view import Overview
 
 
 def section(night: Overview) -> doc.Section:
-    columns = [
-        doc.of(lambda design: STATES[design.state][1], "state", "State"),
-        doc.of(lambda design: one_line(design.name, 60), "name", "Design"),
-        doc.of(_why, "why", "Why"),
-    ]
-    bad = [design for design in night.designs if design.state != "pass"]
+    rows = []
+    for design in (one for one in night.designs if one.state != "pass"):
+        why = design.why or design.result.worst_id
+        if design.state == "regression":
+            worst = design.regressions
+            why = f"{len(worst)} figures worse than the baseline, {worst[0].figure}"
+        rows.append((STATES[design.state][1], one_line(design.name, 60), one_line(why, 300)))
+    columns = [doc.column("state", "State"), doc.column("name", "Design"), doc.column("why", "Why")]
+    blocks = [doc.table("Designs that need a look", columns, rows)] if rows else []
     cached = sum(design.result.cached for design in night.designs)
     words = f"night {night.run.id}: {night.counts} ({cached} unchanged)"
-    blocks = [doc.listing("Designs that need a look", bad, columns)] if bad else []
     return doc.section("night", "Night", blocks, result=words)
-
-
-def _why(design: DesignView) -> str:
-    if design.state == "regression":
-        worst = design.regressions[0].figure
-        return one_line(f"{len(design.regressions)} figures worse than the baseline, {worst}", 300)
-    return one_line(design.why or design.result.worst_id, 300)
 
 
 def data(night: Overview) -> Tree:

@@ -45,19 +45,12 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
+    waiver = verdict.waiver.words if verdict.waiver else ""
     made = doc.verdict(
-        verdict.id,
-        label(verdict, load_unit),
-        value=verdict.value,
-        limit=limit,
-        comparison=comparison,
-        unit=unit_words(requirement.unit),
-        distance=verdict.distance,
-        passed=None,
-        source=source,
-        reason=verdict.reason or unlimited,
-        waiver=verdict.waiver.words if verdict.waiver else "",
-    )
+        verdict.id, label(verdict, load_unit), value=verdict.value, limit=limit, comparison=comparison,
+        unit=unit_words(requirement.unit), distance=verdict.distance, passed=None, source=source,
+        reason=verdict.reason or unlimited, waiver=waiver,
+    )  # fmt: skip
     return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
 
 

@@ -24,9 +24,8 @@ def section(result: TuningResult) -> doc.Section:
     ]
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
-    return doc.section(
-        "tuning", title, blocks, result=summary(result), status="pass" if result.feasible else "fail"
-    )
+    status: doc.Status = "pass" if result.feasible else "fail"
+    return doc.section("tuning", title, blocks, result=summary(result), status=status)
 
 
 def write(result: TuningResult, folder: Path | None) -> list[str]:
@@ -41,11 +40,10 @@ def summary(result: TuningResult) -> str:
     if result.corners == 1:
         over = "the nominal design (no value has a tolerance)"
     if not result.feasible:
-        missed = [r for r in result.requirements if r.relative < 0.0]
+        missed = ", ".join(f"{r.id} by {_amount(r)}" for r in result.requirements if r.relative < 0.0)
         if not missed:
             return f"The search meets every requirement over {over}; certified margins do not confirm it."
-        worst = ", ".join(f"{r.id} by {_amount(r)}" for r in missed)
-        return f"No gains meet every requirement over {over}. The best compromise misses {worst}."
+        return f"No gains meet every requirement over {over}. The best compromise misses {missed}."
     words = [f"Every requirement is met over {over}."]
     if result.placed:
         words.append(f"Gains alone do not do; added: {', '.join(result.placed)}.")
@@ -54,12 +52,12 @@ def summary(result: TuningResult) -> str:
     if result.aim == "least-change":
         if not changed(result):
             return f"{words[0]} Nothing needs to change."
-        words.append(f"This is the least change that does; binding: {names}." if binding else "")
+        words += [f"This is the least change that does; binding: {names}."] if binding else []
     elif binding:
         words.append(f"Nothing better is possible because of {names}.")
     else:
         words[0] = f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
-    return " ".join(word for word in words if word)
+    return " ".join(words)
 
 
 def changed(result: TuningResult) -> bool:

@@ -26,21 +26,12 @@ from actuator_lti.compiled.form import Form
 
 COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
 STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
-HELPERS = """
-static inline double t_min(double a, double b) { return b < a ? b : a; }
-static inline double t_max(double a, double b) { return b > a ? b : a; }
-static inline int t_min_int(int a, int b) { return b < a ? b : a; }
-"""
 
 
 def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] = ()) -> ctypes.CDLL:
     """The entries compiled with every warning an error."""
-    program = emit_c(entries, "t_", forms)
-    heads = "#include <math.h>\n#include <stdbool.h>\n#include <stdlib.h>\n"
-    declared = "\n".join(program.declarations.values())
-    text = "\n".join([heads, program.constants_text(), HELPERS, program.types, declared, program.functions])
     source, binary = folder / "t.c", folder / "t.so"
-    source.write_text(text)
+    source.write_text(emit_c(entries, "t_", forms).source)
     assert COMPILER is not None
     subprocess.run([COMPILER, *STRICT, "-shared", "-fPIC", str(source), "-o", str(binary), "-lm"], check=True)
     return ctypes.CDLL(str(binary))

@@ -5,11 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design
+from actuator_lti.design import load_design, with_values
 from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.compare import compare_signals
 from analyses.records.open_record import open_record
+from nonlinear import commands, simulate
 from tests.identification.bench_records import write
 
 
@@ -40,8 +41,6 @@ def test_emps_begins_in_motion_and_so_does_the_model(emps: CorrelationResult) ->
 
 def test_one_sample_more_of_delay_in_the_design_is_seen(emps_file: Path) -> None:
     """The comparison can tell a wrong model: 1 ms of computing delay makes the force 40 % worse."""
-    from actuator_lti.design import with_values
-
     late = with_values(load_design("emps"), {"control.computing_delay": 1e-3})
     assert 100.0 * correlate_record(late, open_record(emps_file))["force"].relative_error > 7.0
 
@@ -92,16 +91,11 @@ def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
 
 
 def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path) -> None:
-    from nonlinear import commands, simulate
-
     design = load_design("ilr33-amber")
     run = simulate(design, commands.step(0.05), 0.3)
-    rows = [
-        f"{t:.6f},{r!r},{a!r},5.0"
-        for t, r, a in zip(run.time_s, run.reference_rad.tolist(), run.output_angle_rad.tolist(), strict=True)
-    ]
-    (tmp_path / "r.csv").write_text("time_s,reference_rad,output_angle_rad,supply_V\n" + "\n".join(rows))
-    result = correlate_record(design, open_record(tmp_path / "r.csv"))
+    columns = {"time_s": run.time_s, "reference_rad": run.reference_rad}
+    columns |= {"output_angle_rad": run.output_angle_rad, "supply_V": np.full(len(run.time_s), 5.0)}
+    result = correlate_record(design, open_record(write(tmp_path / "r.csv", columns)))
     assert result["output_angle"].relative_error > 1e-3
     assert result.limits["voltage"] > 0.0
     assert any("supply" in note for note in result.notes)

@@ -288,7 +288,9 @@ def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns, 
     wrong = with_values(drive, {"friction.load_coefficient": factor * drive.friction.load_coefficient})
     result = identify_bench(wrong, [_record(columns), second])
     assert not result.passed
-    assert "Load friction is" in next(item.reason for item in result.items if item.id == "size")
+    reason = next(item.reason for item in result.items if item.id == "size")
+    assert "Load friction is" in reason
+    assert ("times the design's: factor 1000" in reason) == (factor < 1.0)
 
 
 def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> None:

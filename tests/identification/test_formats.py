@@ -1,6 +1,7 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
 import json
+from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
@@ -27,55 +28,24 @@ def _text(separator: str, decimal: str) -> str:
     return "\n".join([separator.join(NAMES), *rows]) + "\n"
 
 
-def _csv(path: Path, separator: str, decimal: str) -> Path:
-    file = path / "r.csv"
-    file.write_text(_text(separator, decimal))
-    return file
-
-
-def _parquet(path: Path) -> Path:
-    file = path / "r.parquet"
+def _parquet(path: Path, time: pa.Array, *names: str) -> None:
     text = pa.array(["a"] * len(TIME))
-    columns = [*(pa.array(TABLE[:, k]) for k in range(3)), text]
-    pq.write_table(pa.table(columns, names=[*NAMES, "remark"]), file)
-    return file
+    columns = [time, *(pa.array(TABLE[:, k]) for k in (1, 2)), text]
+    pq.write_table(pa.table(columns, names=[*names, *NAMES[1:], "remark"]), path / "r.parquet")
 
 
-def _matrix(path: Path) -> Path:
-    file = path / "r.mat"
-    savemat(file, {"log": TABLE, "columns": np.array(NAMES, dtype=object), "Ts": 1e-2})
-    return file
+def _stamps_of_arrow() -> pa.Array:
+    since = (1e9 * TIME).round().astype("int64")
+    return pa.array(since + 1_700_000_000_000_000_000, pa.timestamp("ns", "UTC"))
 
 
-def _characters(path: Path) -> Path:
-    file = path / "r.mat"
-    savemat(file, {"log": TABLE, "names": list(NAMES)}, do_compression=True)
-    return file
-
-
-def _structure(path: Path) -> Path:
-    savemat(path / "s.mat", {"d": {"t": TIME, "phi": np.degrees(ANGLE), "I": CURRENT}})
-    (path / "r.toml").write_text(
-        'file = "s.mat"\ntime = { column = "d.t" }\nsignals.angle = { column = "d.phi", unit = "deg" }\n'
-        'signals.current = { column = "d.I", unit = "A" }\n'
-    )
-    return path / "r.toml"
-
-
-def _structure_by_itself(path: Path) -> Path:
-    named = {"t_ms": TABLE[:, 0], "motor_angle_deg": TABLE[:, 1], "i_mA": TABLE[:, 2]}
-    savemat(path / "s.mat", {"d": named, "Ts": 1e-2})
-    return path / "s.mat"
-
-
-def _units_row(path: Path) -> Path:
+def _units_row(path: Path) -> None:
     first, *rows = _text("\t", ",").splitlines()
     names = "\t".join(name.split(" [")[0].split(" (")[0] for name in first.split("\t"))
     (path / "r.txt").write_text("\n".join(["# made by hand", names, "[ms]\t[deg]\t[mA]", *rows]))
-    return path / "r.txt"
 
 
-def _stamps(path: Path) -> Path:
+def _stamps(path: Path) -> None:
     """From the last second of a year in one zone on; the same instants in another zone from row 100 on."""
     made = ["Time;Motor angle [deg];I [mA];state"]
     for k, (t, angle, current) in enumerate(zip(TIME, TABLE[:, 1], TABLE[:, 2], strict=True)):
@@ -83,72 +53,67 @@ def _stamps(path: Path) -> Path:
         at = (at + timedelta(seconds=float(t))).astimezone(timezone(timedelta(hours=1 if k < 100 else 0)))
         made.append(f"{at.isoformat(sep='T' if k % 2 else ' ')};{angle:.9f};{current:.9f};on")
     (path / "r.csv").write_text("\n".join(made).replace(".", ","))
-    return path / "r.csv"
 
 
-def _parquet_stamps(path: Path) -> Path:
-    stamps = pa.array(
-        (1e9 * TIME).round().astype("int64") + 1_700_000_000_000_000_000, pa.timestamp("ns", "UTC")
-    )
-    table = pa.table([stamps, *(pa.array(TABLE[:, k]) for k in (1, 2))], names=["time", *NAMES[1:]])
-    pq.write_table(table, path / "r.parquet")
-    return path / "r.parquet"
+def _described(path: Path, *lines: str) -> None:
+    (path / "r.toml").write_text("\n".join(lines))
 
 
-def _json(path: Path, *, rows: bool) -> Path:
-    tree: object = {"log": dict(zip(NAMES, TABLE.T.tolist(), strict=True)), "by": "hand"}
-    if rows:
-        tree = [dict(zip(NAMES, row, strict=True)) for row in TABLE.tolist()]
-    (path / "r.json").write_text(json.dumps(tree))
-    return path / "r.json"
+def _structure(path: Path) -> None:
+    savemat(path / "s.mat", {"d": {"t": TIME, "phi": np.degrees(ANGLE), "I": CURRENT}})
+    angle = 'signals.angle = { column = "d.phi", unit = "deg" }'
+    current = 'signals.current = { column = "d.I", unit = "A" }'
+    _described(path, 'file = "s.mat"', 'time = { column = "d.t" }', angle, current)
 
 
-def _sum(path: Path) -> Path:
+def _sum(path: Path) -> None:
     """A difference of two columns, with offset and scale; a column named like a sum is itself."""
     half = np.column_stack([TABLE[:, 0], TABLE[:, 1] + 7.0, 0.5 * TABLE[:, 2] - 3.0, np.full(len(TIME), 7.0)])
     rows = "\n".join(",".join(f"{v:.9f}" for v in row) for row in half)
-    (path / "r.csv").write_text("t,a,i - 3,seven\n" + rows + "\n")
-    (path / "r.toml").write_text(
-        'file = "r.csv"\ntime = { column = "t", unit = "ms" }\n'
-        'signals.angle = { column = "a - seven", unit = "deg" }\n'
-        'signals.current = { column = "i - 3", unit = "mA", offset = 3.0, scale = 2.0 }\n'
-    )
-    return path / "r.toml"
+    (path / "s.csv").write_text("t,a,i - 3,seven\n" + rows + "\n")
+    angle = 'signals.angle = { column = "a - seven", unit = "deg" }'
+    current = 'signals.current = { column = "i - 3", unit = "mA", offset = 3.0, scale = 2.0 }'
+    _described(path, 'file = "s.csv"', 'time = { column = "t", unit = "ms" }', angle, current)
 
 
-def _named(path: Path) -> Path:
+def _named(path: Path) -> None:
     savemat(path / "s.mat", {"X": TABLE})
-    (path / "r.toml").write_text(
-        'file = "s.mat"\nmatrix = "X"\nnames = ["a", "b", "c"]\ntime = { column = "a", unit = "ms" }\n'
-        'signals.motor_angle = { column = "b", unit = "deg" }\n'
-        'signals.current = { column = 3, unit = "mA" }\n'
-    )
-    return path / "r.toml"
+    time = 'matrix = "X"\nnames = ["a", "b", "c"]\ntime = { column = "a", unit = "ms" }'
+    angle = 'signals.motor_angle = { column = "b", unit = "deg" }'
+    _described(path, 'file = "s.mat"', time, angle, 'signals.current = { column = 3, unit = "mA" }')
 
 
-FORMATS = {
-    "comma": lambda path: _csv(path, ",", "."),
-    "semicolon and decimal comma": lambda path: _csv(path, ";", ","),
-    "semicolon and point": lambda path: _csv(path, ";", "."),
-    "tab and decimal comma": lambda path: _csv(path, "\t", ","),
-    "Parquet": _parquet,
-    "a matrix with a cell of names": _matrix,
-    "a matrix with a character array of names": _characters,
+BY_COLUMNS = {"log": dict(zip(NAMES, TABLE.T.tolist(), strict=True)), "by": "hand"}
+BY_ROWS = [dict(zip(NAMES, row, strict=True)) for row in TABLE.tolist()]
+FIELDS = dict(zip(("t_ms", "motor_angle_deg", "i_mA"), TABLE.T, strict=True))
+MATRIX = {"log": TABLE, "columns": np.array(NAMES, dtype=object), "Ts": 1e-2}
+FORMATS: dict[str, Callable[[Path], object]] = {
+    "comma": lambda path: (path / "r.csv").write_text(_text(",", ".")),
+    "semicolon and decimal comma": lambda path: (path / "r.csv").write_text(_text(";", ",")),
+    "semicolon and point": lambda path: (path / "r.csv").write_text(_text(";", ".")),
+    "tab and decimal comma": lambda path: (path / "r.csv").write_text(_text("\t", ",")),
+    "Parquet": lambda path: _parquet(path, pa.array(TABLE[:, 0]), NAMES[0]),
+    "Parquet with time stamps": lambda path: _parquet(path, _stamps_of_arrow(), "time"),
+    "a matrix with a cell of names": lambda path: savemat(path / "r.mat", MATRIX),
+    "a matrix with a character array of names": lambda path: savemat(
+        path / "r.mat", {"log": TABLE, "names": list(NAMES)}, do_compression=True
+    ),
     "a structure": _structure,
-    "a structure by itself": _structure_by_itself,
+    "a structure by itself": lambda path: savemat(path / "r.mat", {"d": FIELDS, "Ts": 1e-2}),
     "a row of units": _units_row,
     "time stamps": _stamps,
-    "Parquet with time stamps": _parquet_stamps,
-    "JSON by columns": lambda path: _json(path, rows=False),
-    "JSON by rows": lambda path: _json(path, rows=True),
+    "JSON by columns": lambda path: (path / "r.json").write_text(json.dumps(BY_COLUMNS)),
+    "JSON by rows": lambda path: (path / "r.json").write_text(json.dumps(BY_ROWS)),
     "a difference of columns": _sum,
     "a matrix named by the record file": _named,
 }
+"""Each writes ``r`` with the ending of its format."""
 
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_one_record_in_many_formats(form: str, tmp_path) -> None:
-    record = open_record(FORMATS[form](tmp_path))
+    FORMATS[form](tmp_path)
+    record = open_record(next(tmp_path.glob("r.*")))
     assert record.time_s == pytest.approx(TIME, abs=1e-9)
     assert record["angle"] == pytest.approx(ANGLE, abs=1e-9)
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)
@@ -191,11 +156,9 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) 
 def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
     options: str, factor: float, tmp_path
 ) -> None:
-    (tmp_path / "r.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
-    (tmp_path / "r.toml").write_text(
-        'file = "r.csv"\ntime = { column = "t" }\n'
-        f'signals.voltage = {{ column = "u", unit = "V"{options} }}\n'
-    )
+    (tmp_path / "s.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
+    voltage = f'signals.voltage = {{ column = "u", unit = "V"{options} }}'
+    _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', voltage)
     record = open_record(tmp_path / "r.toml")
     assert record["voltage"] == pytest.approx(factor * np.arange(9.0))
     assert bool(record.inputs[1].note) == bool(options)
@@ -206,11 +169,16 @@ def _uneven(keep: np.ndarray, jitter: float = 0.0) -> Record:
     return record_of(time[keep], angle=3.0 * np.sin(5.0 * time[keep]))
 
 
+def _errors(record: Record) -> tuple[float, float]:
+    """The real error of a resampled record, over its range, and the stated one."""
+    stated = float(record.notes[-1].split("error up to ")[1].split(" %")[0]) / 100.0
+    return float(np.max(np.abs(record["angle"] - 3.0 * np.sin(5.0 * record.time_s))) / 6.0), stated
+
+
 def test_jitter_is_resampled_with_an_error_that_holds() -> None:
     """The stated error bounds that of linear interpolation: h^2/8 of the curvature, here 0.3 per mille."""
     record = _uneven(np.ones(len(TIME), dtype=bool), 2e-3).resampled()
-    real = np.max(np.abs(record["angle"] - 3.0 * np.sin(5.0 * record.time_s))) / 6.0
-    stated = float(record.notes[-1].split("error up to ")[1].split(" %")[0]) / 100.0
+    real, stated = _errors(record)
     assert 0.5 * real < stated < 5.0 * real
     assert stated < 1e-3
 
@@ -223,8 +191,7 @@ def test_a_gap_is_bridged_only_within_the_tolerance() -> None:
     short = np.ones(len(TIME), dtype=bool)
     short[80:84] = False
     record = _uneven(short).resampled()
-    real = np.max(np.abs(record["angle"] - 3.0 * np.sin(5.0 * record.time_s))) / 6.0
-    stated = float(record.notes[-1].split("error up to ")[1].split(" %")[0]) / 100.0
+    real, stated = _errors(record)
     assert real <= 1.3 * stated < 0.01
 
 
@@ -262,13 +229,10 @@ def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> N
 @pytest.mark.parametrize("value", ["rms", "peak"])
 def test_ac_currents_carry_the_power_of_the_equivalent_dc_motor(value: str, tmp_path) -> None:
     """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
-    (tmp_path / "r.csv").write_text("t,i,u\n" + "".join(f"{k},{k + 1},{k + 1}\n" for k in range(9)))
-    (tmp_path / "r.toml").write_text(
-        'file = "r.csv"\ntime = { column = "t" }\n'
-        f'signals.current = {{ column = "i", unit = "A", value = "{value}" }}\n'
-        f'signals.voltage = {{ column = "u", unit = "V", value = "{value}", between = "phase" }}\n'
-    )
+    (tmp_path / "s.csv").write_text("t,i,u\n" + "".join(f"{k},{k + 1},{k + 1}\n" for k in range(9)))
+    current = f'signals.current = {{ column = "i", unit = "A", value = "{value}" }}'
+    voltage = f'signals.voltage = {{ column = "u", unit = "V", value = "{value}", between = "phase" }}'
+    _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', current, voltage)
     record = open_record(tmp_path / "r.toml")
-    written = np.arange(1.0, 10.0) ** 2
-    power = 3.0 * written if value == "rms" else 1.5 * written
+    power = (3.0 if value == "rms" else 1.5) * np.arange(1.0, 10.0) ** 2
     assert record["current"] * record["voltage"] == pytest.approx(power)

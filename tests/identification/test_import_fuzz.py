@@ -1,12 +1,16 @@
 """Fuzz: whatever a file holds, there is a record with every row accounted for, or one InputError."""
 
+import io
 import tempfile
 from pathlib import Path
 
+import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.io import savemat
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.mat5 import read_mat5
 from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.readers import read_mat_record
@@ -100,20 +104,11 @@ def test_any_text_as_campaign(text: str) -> None:
 
 
 def test_a_compressed_and_a_plain_file_read_alike() -> None:
-    import io
-
-    import numpy as np
-    from scipy.io import savemat
-
-    from actuator_lti.files.mat5 import read_mat5
-
     values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
-    result = []
     for packed in (False, True):
         stream = io.BytesIO()
         savemat(stream, values, do_compression=packed)
-        result.append(read_mat5(stream.getvalue()))
-    for content in result:
+        content = read_mat5(stream.getvalue())
         assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
         assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
         assert content.arrays["k"].item() == 3.5
@@ -127,11 +122,6 @@ def _check_one_line(error: InputError) -> None:
 
 
 def _mat_bytes() -> bytes:
-    import io
-
-    import numpy as np
-    from scipy.io import savemat
-
     stream = io.BytesIO()
     savemat(stream, {"t": np.arange(20.0), "x": np.arange(20.0) ** 2})
     return stream.getvalue()

@@ -174,12 +174,9 @@ def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() ->
 
 def _voltage_record(noise: float, *, fast: bool) -> Record:
     """u = R i + kE w + L di/dt with R 0.5 ohm, kE 0.02, L 3 mH; fast: the current has a part at 60 Hz."""
-    w = 200.0 * _waves(1)
-    rate = 2.0 * _waves(1)
-    current = 2.0 * _waves(0)
-    if fast:
-        current = current + 0.5 * np.sin(2.0 * np.pi * 60.0 * TIME)
-        rate = rate + 0.5 * 2.0 * np.pi * 60.0 * np.cos(2.0 * np.pi * 60.0 * TIME)
+    w, turn, part = 200.0 * _waves(1), 2.0 * np.pi * 60.0, 0.5 * fast
+    current = 2.0 * _waves(0) + part * np.sin(turn * TIME)
+    rate = 2.0 * _waves(1) + part * turn * np.cos(turn * TIME)
     rng = np.random.default_rng(2)
     voltage = 0.5 * current + 0.02 * w + 3e-3 * rate + noise * rng.standard_normal(len(TIME))
     return _record(angle=200.0 * _waves(0), current=current, voltage=voltage, speed=w)

@@ -22,73 +22,72 @@ def _bare(name: str) -> Design:
 
 
 def _wrong(design: Design) -> Design:
-    friction = replace(
-        design.friction,
-        dry_torque_Nm=0.6 * design.friction.dry_torque_Nm,
-        viscous_Nms_rad=0.6 * design.friction.viscous_Nms_rad,
-        load_coefficient=0.6 * design.friction.load_coefficient,
-    )
+    keys = ("dry_torque_Nm", "viscous_Nms_rad", "load_coefficient")
+    friction = replace(design.friction, **{key: 0.6 * getattr(design.friction, key) for key in keys})
     motor = replace(design.motor, rotor_inertia_kgm2=1.4 * design.motor.rotor_inertia_kgm2)
     return replace(design, motor=motor, friction=friction)
 
 
-def _linear(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _noise(run: Trajectory, rms: float) -> np.ndarray:
+    return rms * np.random.default_rng(7).standard_normal(len(run.time_s))
+
+
+def _linear(run: Trajectory) -> Columns:
     return {
         "time [ms]": 1e3 * run.time_s,
         "position_reference [mm]": 1e3 * run.reference_rad,
         "position [mm]": 1e3 * run.output_angle_rad,
-        "Irms [A]": run.current_A / np.sqrt(1.5) + 0.01 * noise.standard_normal(len(run.time_s)),
+        "Irms [A]": run.current_A / np.sqrt(1.5) + _noise(run, 0.01),
     }
 
 
-def _fin(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _fin(run: Trajectory) -> Columns:
     count = 2.0 * np.pi / 65536
     return {
         "time_s": run.time_s,
         "cmd_deg": np.degrees(run.reference_rad),
         "fin_angle_deg": np.degrees(np.floor(run.output_angle_rad / count) * count),
         "motor_angle_deg": np.degrees(run.motor_angle_rad),
-        "current_mA": 1e3 * run.current_A + 20.0 * noise.standard_normal(len(run.time_s)),
+        "current_mA": 1e3 * run.current_A + _noise(run, 20.0),
         "voltage_V": run.voltage_V,
     }
 
 
-def _joint(run: Trajectory, noise: np.random.Generator) -> Columns:
-    return {
+def _joint(run: Trajectory, but: str = "") -> Columns:
+    columns = {
         "time_s": run.time_s,
         "goal_position_deg": np.degrees(run.reference_rad),
         "joint_angle_deg": np.degrees(run.output_angle_rad),
         "motor_position_rad": run.motor_angle_rad,
-        "iq_A": run.current_A + 0.02 * noise.standard_normal(len(run.time_s)),
+        "iq_A": run.current_A + _noise(run, 0.02),
     }
+    return {name: values for name, values in columns.items() if name != but}
 
 
-def _joint_motor(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _joint_motor(run: Trajectory) -> Columns:
     """The motor's encoder alone: the load's motion follows by the design's coupling."""
-    return {name: values for name, values in _joint(run, noise).items() if name != "joint_angle_deg"}
+    return _joint(run, "joint_angle_deg")
 
 
-def _joint_output(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _joint_output(run: Trajectory) -> Columns:
     """The output's encoder alone: the motor's motion is that and the twist."""
-    return {name: values for name, values in _joint(run, noise).items() if name != "motor_position_rad"}
+    return _joint(run, "motor_position_rad")
 
 
-def _voltage(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _voltage(run: Trajectory) -> Columns:
+    angle = run.motor_angle_rad + _noise(run, 1e-4)
     return {
-        "time_s": run.time_s,
-        "reference_rad": run.reference_rad,
-        "angle_rad": run.motor_angle_rad + 1e-4 * noise.standard_normal(len(run.time_s)),
+        "time_s": run.time_s, "reference_rad": run.reference_rad, "angle_rad": angle,
         "voltage_V": run.voltage_V,
-    }
+    }  # fmt: skip
 
 
-def _servo(run: Trajectory, noise: np.random.Generator) -> Columns:
+def _servo(run: Trajectory) -> Columns:
+    current = run.current_A + _noise(run, 0.01)
     return {
-        "time_s": run.time_s,
-        "reference_rad": run.reference_rad,
-        "motor_angle_rad": run.motor_angle_rad,
-        "current_A": run.current_A + 0.01 * noise.standard_normal(len(run.time_s)),
-    }
+        "time_s": run.time_s, "reference_rad": run.reference_rad, "motor_angle_rad": run.motor_angle_rad,
+        "current_A": current,
+    }  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -122,18 +121,12 @@ CASES = [
 
 
 def _logged(case: Case) -> Columns:
-    run = simulate(_bare(case.name), case.command, case.seconds, record_every=case.every)
-    return case.log(run, np.random.default_rng(7))
+    return case.log(simulate(_bare(case.name), case.command, case.seconds, record_every=case.every))
 
 
 def _truth(design: Design, name: str) -> float:
-    friction = design.friction
-    return {
-        "inertia": design.inertia_kgm2,
-        "dry": friction.dry_torque_Nm,
-        "viscous": friction.viscous_Nms_rad,
-        "load_coefficient": friction.load_coefficient,
-    }[name]
+    keys = {"dry": "dry_torque_Nm", "viscous": "viscous_Nms_rad"}
+    return design.inertia_kgm2 if name == "inertia" else getattr(design.friction, keys.get(name, name))
 
 
 @pytest.mark.parametrize("case", CASES, ids=[case.log.__name__[1:] for case in CASES])
@@ -235,7 +228,7 @@ def test_a_stepped_command_is_taken_as_steps(tmp_path, cli) -> None:
 def test_correlate_begins_with_its_result_and_judges_on_demand(tmp_path, cli) -> None:
     design = _bare("ctms-motor-position")
     run = simulate(design, commands.multisine(1.0, [0.5, 1.1], 4.0, 1e-3, seed=2), 4.0)
-    table = _voltage(run, np.random.default_rng(1))
+    table = _voltage(run)
     write(tmp_path / "r.csv", table)
     (tmp_path / "w.toml").write_text(write_design(_wrong(design)))
     for limit, verdict in (

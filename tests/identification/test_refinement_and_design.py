@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +32,13 @@ WINDOW = SteadyWindow(
 
 def _points(seed: int, noise: float = 2e-6) -> list[SteadyPoint]:
     rng = np.random.default_rng(seed)
-    points = []
-    for k, (speed, load) in enumerate(
-        (w, m) for m in (0.0, 2.0, 5.0, 8.9) for w in np.linspace(105.0, 942.0, 6)
-    ):
-        torque = float(TABLE_1 @ np.array([1.0, speed, load])) + noise * rng.standard_normal()
-        point = SteadyPoint(
+    grid = product((0.0, 2.0, 5.0, 8.9), np.linspace(105.0, 942.0, 6).tolist())
+    return [
+        SteadyPoint(
             run=f"{k:02d}",
             direction=1,
-            torque_Nm=torque,
-            speed_rad_s=float(speed),
+            torque_Nm=float(TABLE_1 @ np.array([1.0, speed, load])) + noise * rng.standard_normal(),
+            speed_rad_s=speed,
             load_Nm=load,
             covariance=np.diag([noise**2, 1e-6, 1e-10]),
             window=WINDOW,
@@ -48,8 +46,8 @@ def _points(seed: int, noise: float = 2e-6) -> list[SteadyPoint]:
             correlation_samples=(1.0, 1.0, 1.0),
             load_is_zero=load == 0.0,
         )
-        points.append(point)
-    return points
+        for k, (load, speed) in enumerate(grid)
+    ]
 
 
 @pytest.fixture(scope="module")
@@ -119,18 +117,16 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
     assert spread.slopes[0] == pytest.approx(slope, rel=0.05)
 
 
-def test_the_determinant_is_served_by_extreme_points(fit: SurfaceFit) -> None:
+def test_the_determinant_is_served_by_extreme_points_and_what_no_run_reduces_is_named(
+    fit: SurfaceFit,
+) -> None:
     result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
     assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
     assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
-    with pytest.raises(InputError, match="criterion"):
-        suggest_runs(load_design("ilr33-amber"), fit, criterion="E")
-
-
-def test_what_no_run_reduces_is_named(fit: SurfaceFit) -> None:
-    result = suggest_runs(load_design("ilr33-amber"), fit, count=1)
     assert 0.5 < result.shared_part <= 1.0
     assert result.largest_shared in fit.shared_shifts
+    with pytest.raises(InputError, match="criterion"):
+        suggest_runs(load_design("ilr33-amber"), fit, criterion="E")
 
 
 def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:

@@ -51,7 +51,10 @@ def held(result: FrequencyResult) -> dict[str, bool]:
 
 
 def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
-    """Six draws (100 by hand): of some 54 intervals at 95 % all but six hold the truth (odds 0.98)."""
+    """Six draws (100 by hand): of some 54 intervals at 95 % all but six hold the truth (odds 0.98).
+
+    Of seed 25 the start from the response itself leads astray: another one is taken.
+    """
     results = [_identified(seed) for seed in range(6)]
     kept = [held(result) for result in results]
     assert sum(sum(one.values()) for one in kept) >= sum(len(one) for one in kept) - 6
@@ -62,6 +65,9 @@ def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
         assert result.fit["stiffness"] == pytest.approx(400.0, rel=0.03)
         assert result.fit.resonance_rad_s[0] == pytest.approx(RESONANCE, rel=1e-3)
         assert result.design.coupling.play_rad == pytest.approx(2.0 * HALF_PLAY, rel=0.02)
+    astray = _identified(25)
+    assert astray.passed
+    assert astray.fit["stiffness"] == pytest.approx(400.0, rel=0.03)
 
 
 def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
@@ -83,13 +89,6 @@ def test_a_small_friction_is_not_held_at_zero() -> None:
         found.append((fit["damping"] - 0.02) / fit.std("damping"))
     assert abs(np.mean(found)) < 2.6 / np.sqrt(10.0)
     assert np.std(found) < 1.6
-
-
-def test_a_response_whose_valley_drowns_is_fitted_from_another_start() -> None:
-    """Seed 25: the start from the response itself leads astray."""
-    result = _identified(25)
-    assert result.passed
-    assert result.fit["stiffness"] == pytest.approx(400.0, rel=0.03)
 
 
 def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:

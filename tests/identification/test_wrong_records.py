@@ -47,16 +47,6 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
-def test_a_load_in_another_unit_shows_in_the_load_friction(tmp_path, cli) -> None:
-    """N m written as kN m: all else is right, and the load friction comes out a thousand times too large."""
-    free, loaded = columns_of(motion(2), 1, load_Nm=0.0), columns_of(motion(5, load_Nm=5.0), 3, load_Nm=5e-3)
-    files = [write(tmp_path / name, table) for name, table in (("free.csv", free), ("loaded.csv", loaded))]
-    ran = cli("identify", *files, "--design", "ilr33-amber", "--json")
-    size = {check["id"]: check for check in ran.data["items"]}["size"]
-    assert ran.status == 1
-    assert "times the design's: factor 1000" in size["reason"]
-
-
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
     right: Columns, tmp_path, cli
 ) -> None:
@@ -109,19 +99,15 @@ def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path) -> None:
 
     design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
     run = simulate(design, commands.sine(0.08, 2.0), 0.6)
-    run.to_csv(tmp_path / "whole.csv")
-    _without(tmp_path / "whole.csv", "load_Nm", tmp_path / "r.csv")
+    run.to_csv(tmp_path / "r.csv")
+    rows = [line.split(",") for line in (tmp_path / "r.csv").read_text().splitlines()]
+    left_out = rows[0].index('"load_Nm"')
+    kept = [",".join(row[:left_out] + row[left_out + 1 :]) for row in rows]
+    (tmp_path / "r.csv").write_text("\n".join(kept) + "\n")
     result = correlate_record(design, open_record(tmp_path / "r.csv"))
     assert max(signal.relative_error for signal in result.signals.values()) < 1e-9
     without = correlate_record(load_design("ilr33-amber"), open_record(tmp_path / "r.csv"))
     assert without["current"].relative_error > 0.1
-
-
-def _without(path: Path, column: str, to: Path) -> None:
-    """Copy a CSV without one of its columns."""
-    rows = [line.split(",") for line in path.read_text().splitlines()]
-    left_out = rows[0].index(f'"{column}"')
-    to.write_text("".join(",".join(row[:left_out] + row[left_out + 1 :]) + "\n" for row in rows))
 
 
 def _slow_sensor(folder: Path) -> None:
@@ -131,12 +117,8 @@ def _slow_sensor(folder: Path) -> None:
         file.write_text("\n".join([head, names, *(f"{float(t) * 1.05:.4f},{m}" for t, m in pairs)]) + "\n")
 
 
-def _other_sensor(folder: Path) -> None:
-    shutil.copy(folder / "run09_torque.csv", folder / "run05_torque.csv")
-
-
-def _other_drive(folder: Path) -> None:
-    shutil.copy(folder / "run09_drive.csv", folder / "run08_drive.csv")
+def _copied(run: str, to: str) -> Callable[[Path], object]:
+    return lambda folder: shutil.copy(folder / f"run{run}.csv", folder / f"run{to}.csv")
 
 
 def _replaced(*pairs: tuple[str, str]) -> Callable[[Path], None]:
@@ -157,8 +139,8 @@ WRONG_BENCH = {
     "N m read as N cm": (_replaced(('"torque", unit = "N*m"', '"torque", unit = "N*cm"')), "factor 100"),
     "two columns swapped": (_replaced(*SWAP), "usable runs"),
     "the sensor's clock 5 % off": (_slow_sensor, "a clock is off"),
-    "another run's sensor file": (_other_sensor, "that of run 09 as well"),
-    "another run's drive file": (_other_drive, "set speed"),
+    "another run's sensor file": (_copied("09_torque", "05_torque"), "that of run 09 as well"),
+    "another run's drive file": (_copied("09_drive", "08_drive"), "set speed"),
 }
 
 

@@ -6,8 +6,15 @@ from pathlib import Path
 import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 
-from reports.nightly.changes import Cause, Change, Comparison
-from reports.nightly.headline import cause_words, change_words, headlines, main_changes
+from reports.nightly.changes import (
+    Cause,
+    Change,
+    Comparison,
+    cause_words,
+    change_words,
+    headlines,
+    main_changes,
+)
 from reports.nightly.night import run_night
 
 

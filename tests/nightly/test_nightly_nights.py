@@ -13,10 +13,9 @@ from actuator_lti.bounds import NIGHTLY_JOBS
 from actuator_lti.errors import InputError
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure
+from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
 from reports.nightly.night import approve, run_night
 from reports.nightly.source import Job
-from reports.nightly.tolerance import Tolerances, read_tolerances
-from reports.nightly.trend import change_points, flaps, missing_nights
 
 
 class Nights:

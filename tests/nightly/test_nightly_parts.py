@@ -16,10 +16,10 @@ from analyses.validation.row import judged
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, digest, figures_of
+from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.source import code_version, commits_between
 from reports.nightly.state import hold
 from reports.nightly.text import csv_cell, one_line
-from reports.nightly.tolerance import Tolerances, read_tolerances
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
 from reports.sections.validation import table
 

@@ -2,44 +2,77 @@
 
     python -m tests.nonlinear.rest_agreement FIRST COUNT
 
-For each stable position drive a step of 1 % of full deflection, as `cycles` waits for it, and as `simulate`
-judges it after runs of two lengths.
+For each stable position drive: every step that `cycles` waits for, as `validate` knows it and as `simulate`
+judges it after runs of two lengths; the steps before the cases of `failures` in the same way; and the
+sentences about rest of both sections of the report.
 """
 
 import sys
+from collections.abc import Iterable, Iterator
 
 from actuator_lti.design.model import Design
-from analyses.motion.settling import counted, outcome
+from actuator_lti.errors import InputError
+from analyses.failures import Asked, failures
+from analyses.limit_cycles.run import limit_cycles
+from analyses.motion.settling import Settling, counted, ending_of, words
+from analyses.validation import validate
+from analyses.validation.settings import QUICK
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import judge
+from reports.sections import cycles, validation
+from reports.sections.names import fine_unit
 from tests.validation.random_drives import stable_drives
 
-LENGTHS = (1_000, 20_000)  # ticks of the runs
+LENGTHS, WATCHED = (1_000, 20_000), 1_000  # ticks of the runs, and after a failure
 
 
-def answers(design: Design) -> list[str]:
-    """Verdicts on one step: of the wait, then of the runs."""
-    full = design.validation.full_deflection_rad
-    step = 0.01 * full
-    result = [outcome(design, 0.0, step).rest.verdict]
-    for ticks in LENGTHS:
-        run = simulate(design, commands.step(step), ticks * design.controller.period_s)
-        rest = None if run.running is None else judge(run.running)
-        result.append("none" if rest is None else counted(rest, full).verdict)
-    return result
+def simulated(design: Design, settlings: Iterable[Settling]) -> Iterator[str]:
+    """Steps that end otherwise in runs of `simulate`."""
+    full, tick_s = design.validation.full_deflection_rad, design.controller.period_s
+    for one in settlings:
+        for ticks in LENGTHS:
+            step = commands.step(one.amplitude_rad)
+            run = simulate(design, step, ticks * tick_s, one.load_Nm, raise_on_failure=False)
+            rest = None if run.running is None else judge(run.running)
+            verdict = "none" if rest is None else counted(rest, full).verdict
+            if verdict != one.rest.verdict:
+                yield f"{one.amplitude_rad:g} at {one.load_Nm:g}: {one.rest.verdict}, {ticks} ticks {verdict}"
+
+
+def contradictions(design: Design) -> Iterator[str]:
+    """Every pair of answers about rest that differ."""
+    waited, checked = limit_cycles(design), validate(design, QUICK)
+    if checked.settlings != waited.rests:
+        yield f"cycles {waited.rests}, validate {checked.settlings}"
+    if (waited.verdict, waited.hunting) != (checked.rest, checked.hunting):
+        yield f"cycles {waited.verdict}, validate {checked.rest}"
+    yield from simulated(design, waited.rests)
+    try:
+        watched = WATCHED * design.controller.period_s
+        asked = Asked.of(design, watched_s=watched, detection_s=watched)
+        yield from simulated(design, failures(design, asked).before)
+    except InputError as error:
+        yield f"failures: {error}"
+    swing, said = waited.hunting, [cycles.summary(waited), validation.result(checked)]
+    wanted = ["", ""]
+    if swing is not None:
+        wanted = [words(swing.rest, *fine_unit(design.axis)), ending_of(design, swing)]
+    for text, part in zip(said, wanted, strict=True):
+        if part not in text or (not part and "not come to rest" in text):
+            yield f"said: {text!r}, not {part!r}"
 
 
 def main(first: int, count: int) -> int:
-    """Print what differs; how many do."""
-    differ = 0
+    """Print what differs; of how many drives something does."""
+    differ, asked = 0, 0
     for design in stable_drives(first, count):
         if design.controller.outermost != "position":
             continue
-        given = answers(design)
-        if len(set(given)) > 1:
-            differ += 1
-            sys.stdout.write(f"{design.name}: {', '.join(given)}\n")
-    sys.stdout.write(f"{differ} of {count} differ\n")
+        found = list(contradictions(design))
+        asked, differ = asked + 1, differ + bool(found)
+        sys.stdout.writelines(f"{design.name}: {one}\n" for one in found)
+        sys.stdout.flush()
+    sys.stdout.write(f"{differ} of {asked} position drives of {count} differ\n")
     return differ
 
 

@@ -157,17 +157,6 @@ def test_speed_from_counts_is_floored_differenced_and_filtered() -> None:
         assert drive.value("measured_speed") == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_coarse_encoder_makes_the_drive_rough() -> None:
-    design = load_design("ilr33-amber")
-    runs = {}
-    for counts in (None, 1024, 65536):
-        encoder = replace(design.encoder, speed="difference", counts_per_rev=counts)
-        run = simulate(replace(design, encoder=encoder), commands.ramp(0.05), 0.5)
-        runs[counts] = np.std(run.current_A[2500:])
-    assert runs[None] < 1e-6
-    assert runs[1024] > 10.0 * runs[65536] > 0.0
-
-
 def test_a_record_holds_the_whole_load() -> None:
     """Slope and gravity at the angle that the output has, by their formulas."""
     made, load = (

@@ -181,7 +181,6 @@ HARD = {
         WAVE,
     ),
 }
-SEVERAL = two_mass(2e-2, coupling={"play_rad": 0.002})
 
 
 @pytest.mark.parametrize(
@@ -197,12 +196,6 @@ def test_hard_case(name: str, source: bool, fraction: float) -> None:
     assert run.status == layout.OK
     assert sum(run.events) > 0 or name == "bilateral"
     assert_close(run.states, expected)
-
-
-def test_play_crossed_several_times_in_a_tick() -> None:
-    run = run_plant(SEVERAL, SQUARE[:10])
-    assert max(run.events) >= 6
-    assert_close(run.states, reference(SEVERAL, SQUARE[:10]))
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -15,6 +15,7 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.compiled import emit_c
+from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from nonlinear import Probe, Rows, Trajectory, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh
@@ -40,38 +41,14 @@ def test_odd_symmetry(law: str) -> None:
 
 def test_scaling_of_torque_current_and_voltage() -> None:
     """Twice R and L, half of every inertia and torque: the same motion with half the current."""
-    base = load_design("ilr33-amber")
-    c = 2.0  # currents and torques become 1/c, voltages and speeds stay
-    motor = replace(
-        base.motor,
-        resistance_ohm=base.motor.resistance_ohm * c,
-        inductance_H=base.motor.inductance_H * c,
-        rotor_inertia_kgm2=base.motor.rotor_inertia_kgm2 / c,
-    )
-    gears = tuple(
-        replace(g, input_inertia_kgm2=g.input_inertia_kgm2 / c, output_inertia_kgm2=g.output_inertia_kgm2 / c)
-        for g in base.gears
-    )
-    friction = replace(
-        base.friction,
-        dry_torque_Nm=base.friction.dry_torque_Nm / c,
-        viscous_Nms_rad=base.friction.viscous_Nms_rad / c,
-        load_coefficient=base.friction.load_coefficient / c,
-    )
-    control = replace(
-        base.controller,
-        velocity=replace(base.controller.velocity, gain=base.controller.velocity.gain / c),
-        current=replace(base.controller.current, gain_V_A=base.controller.current.gain_V_A * c),
-    )
-    scaled = replace(
-        base,
-        motor=motor,
-        gears=gears,
-        load=replace(base.load, inertia_kgm2=base.load.inertia_kgm2 / c),
-        friction=friction,
-        controller=control,
-        limits=replace(base.limits, peak_current_A=base.limits.peak_current_A / c),
-    )
+    base, c = load_design("ilr33-amber"), 2.0  # currents and torques become 1/c, voltages and speeds stay
+    gears = [f"gear.{gear.name}.{side}_inertia" for gear in base.gears for side in ("input", "output")]
+    friction = [f"friction.{name}" for name in ("dry_torque", "viscous", "load_coefficient")]
+    less = ["motor.rotor_inertia", *gears, "load.inertia", *friction, "control.velocity.gain"]
+    factors = dict.fromkeys([*less, "limits.peak_current"], 1.0 / c)
+    factors |= dict.fromkeys(("motor.resistance", "motor.inductance", "control.current.gain"), c)
+    values = {path: parameter_value(base, path) * factor for path, factor in factors.items()}
+    scaled = with_values(base, values, check=False)
     a, b = (simulate(d, commands.sine(0.05, 3.0), 0.8, 6.0) for d in (base, scaled))
     assert a.limits["current"].active
     np.testing.assert_allclose(b.current_A * c, a.current_A, rtol=0, atol=1e-9)

@@ -8,7 +8,7 @@ from built_report import Built
 
 from actuator_lti import load_design
 from analyses.corners import corners
-from analyses.large_signal.by_amplitude import AmplitudeMargin
+from analyses.large_signal.from_rest import AmplitudeMargin
 from reports import document as doc
 from reports.build import design_report
 from reports.sections.in_time import remark

@@ -34,30 +34,35 @@ def scattered(name: str, count: int, seed: int) -> Population:
     return Population(design, values, count)
 
 
+def each(population: Population, figures):
+    """Number and loops of every design, made one by one."""
+    for k in range(population.count):
+        changed = {path: float(array[k]) for path, array in population.values.items()}
+        present = assemble_loops(with_values(population.design, changed)).present
+        for loop in figures.loops:
+            yield k, loop, present[loop]
+
+
 @pytest.mark.parametrize("name", NAMES)
 def test_every_crossover_is_that_of_the_margin_engine(name):
     population = scattered(name, 12, seed=5)
     figures = linear_figures(population, time_figures=False)
-    for k in range(population.count):
-        changed = {path: float(array[k]) for path, array in population.values.items()}
-        loops = assemble_loops(with_values(population.design, changed))
-        for loop in figures.loops:
-            truth = stability_margins(getattr(loops, loop).open_loop)
-            gain, phase = figures.gain_crossovers(loop), figures.phase_crossovers(loop)
-            assert figures.stable(loop)[k] == truth.stable
-            assert gain.crossings[k] == len(truth.phase_margins)
-            assert phase.crossings[k] == len(truth.gain_margins)
-            for j, margin in enumerate(truth.phase_margins):
-                assert gain.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
-                assert gain.margin[k, j] == pytest.approx(margin.deg, rel=1e-6, abs=1e-6)
-            for j, margin in enumerate(truth.gain_margins):
-                assert phase.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
-                assert phase.margin[k, j] == pytest.approx(margin.ratio, rel=1e-6)
-            for quantity in ("gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin"):
-                mine = figures.quantity(
-                    quantity.removesuffix("_db").removesuffix("_deg").removesuffix("_s"), loop
-                )
-                assert mine[k] == pytest.approx(getattr(truth, quantity), rel=1e-6)
+    for k, loop, own in each(population, figures):
+        truth = stability_margins(own.open_loop)
+        assert figures.stable(loop)[k] == truth.stable
+        for seen, wanted, size in (
+            (figures.gain_crossovers(loop), truth.phase_margins, "deg"),
+            (figures.phase_crossovers(loop), truth.gain_margins, "ratio"),
+        ):
+            assert seen.crossings[k] == len(wanted)
+            for j, margin in enumerate(wanted):
+                assert seen.frequency_rad_s[k, j] == pytest.approx(margin.frequency_rad_s, rel=1e-6)
+                close = pytest.approx(getattr(margin, size), rel=1e-6, abs=1e-6 if size == "deg" else None)
+                assert seen.margin[k, j] == close
+        for quantity, unit in (("gain_margin", "_db"), ("phase_margin", "_deg"), ("delay_margin", "_s"),
+                               ("modulus_margin", "")):  # fmt: skip
+            wanted = getattr(truth, quantity + unit)
+            assert figures.quantity(quantity, loop)[k] == pytest.approx(wanted, rel=1e-6)
 
 
 def of_response(system) -> dict[str, float | None]:
@@ -77,17 +82,13 @@ def of_response(system) -> dict[str, float | None]:
 def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     population = scattered(name, 5, seed=8)
     figures = linear_figures(population)
-    for k in range(population.count):
-        changed = {path: float(array[k]) for path, array in population.values.items()}
-        loops = assemble_loops(with_values(population.design, changed))
-        for loop in figures.loops:
-            if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
-                continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
-            closed = getattr(loops, loop).closed_loop
-            for quantity, truth in of_response(closed).items():
-                mine = figures.quantity(quantity, loop)[k]
-                expected = np.nan if truth is None else truth
-                assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)
+    for k, loop, own in each(population, figures):
+        if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
+            continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
+        for quantity, truth in of_response(own.closed_loop).items():
+            mine = figures.quantity(quantity, loop)[k]
+            expected = np.nan if truth is None else truth
+            assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.9])
@@ -146,15 +147,14 @@ def test_bits_do_not_depend_on_threads_neighbours_or_order():
     assert np.array_equal(linear_figures(alone).raw[0], whole[7], equal_nan=True)
 
 
-def test_rest_and_describing_function_change_the_slope_as_the_loops_do():
-    design = load_design("ilr33-amber")
-    for point, extra in (("rest", {}), ("describing-function", {"speed_amplitude_rad_s": 30.0})):
-        figures = linear_figures(Population(design, {}, 1), operating_point=point, load_Nm=8.0, **extra)
-        loops = assemble_loops(design, operating_point=point, load_Nm=8.0, **extra)
-        truth = stability_margins(loops.velocity.open_loop)
-        assert figures.quantity("phase_margin", "velocity")[0] == pytest.approx(
-            truth.phase_margin_deg, rel=1e-6
-        )
+@pytest.mark.parametrize(
+    ("point", "extra"), [("rest", {}), ("describing-function", {"speed_amplitude_rad_s": 30.0})]
+)
+def test_rest_and_describing_function_change_the_slope_as_the_loops_do(point, extra):
+    design, at = load_design("ilr33-amber"), {"operating_point": point, "load_Nm": 8.0, **extra}
+    mine = linear_figures(Population(design, {}, 1), **at).quantity("phase_margin", "velocity")[0]
+    truth = stability_margins(assemble_loops(design, **at).velocity.open_loop)
+    assert mine == pytest.approx(truth.phase_margin_deg, rel=1e-6)
 
 
 def test_drive_figures_of_the_paper():
@@ -165,12 +165,12 @@ def test_drive_figures_of_the_paper():
     assert drive_figures(population, "motor_current", 8.0)[0] == pytest.approx(torque / 5.9e-3)
 
 
-def test_what_cannot_vary_is_refused():
-    design = load_design("ilr33-amber")
-    with pytest.raises(InputError, match=r"motor\.color"):
-        Population(design, {"motor.color": np.ones(2)}, 2)
-    with pytest.raises(InputError, match="finite"):
-        Population(design, {"motor.resistance": np.array([np.nan])}, 1)
+@pytest.mark.parametrize(("path", "values", "message"), [
+    ("motor.color", [1.0, 1.0], r"motor\.color"), ("motor.resistance", [np.nan], "finite"),
+])  # fmt: skip
+def test_what_cannot_vary_is_refused(path, values, message):
+    with pytest.raises(InputError, match=message):
+        Population(load_design("ilr33-amber"), {path: np.array(values)}, len(values))
 
 
 @pytest.mark.parametrize("above", [1e-2, 1.0, 1e3, 1e5])

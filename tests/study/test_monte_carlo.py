@@ -1,5 +1,7 @@
 """Monte Carlo studies: closed-form odds, worst cases in corners, the same bits however computed, resuming."""
 
+from dataclasses import replace
+
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
@@ -9,7 +11,7 @@ from actuator_lti import load_design, read_design_text
 from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.judging import Reduction, reduced, unpacked
-from analyses.monte_carlo.statistics import MOST
+from analyses.monte_carlo.result import MOST
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
@@ -20,16 +22,18 @@ def design():
     return read_design_text(toleranced(friction={"load_coefficient": 60}, motor={"resistance": 20}))
 
 
+PLAIN = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
+
+
 @pytest.fixture(scope="module")
 def study(design, tmp_path_factory):
-    settings = MonteCarloSettings(samples=1000, seed=3, chunk=400, worst_cases=False)
-    return monte_carlo(design, tmp_path_factory.mktemp("study"), settings)
+    return monte_carlo(design, tmp_path_factory.mktemp("study"), replace(PLAIN, chunk=400))
 
 
 @pytest.fixture(scope="module")
 def searched(design, tmp_path_factory):
     """The same with its worst cases, which take most of the time."""
-    return monte_carlo(design, tmp_path_factory.mktemp("searched"), MonteCarloSettings(samples=1000, seed=3))
+    return monte_carlo(design, tmp_path_factory.mktemp("searched"), replace(PLAIN, worst_cases=True))
 
 
 def test_odds_of_a_current_limit_are_the_closed_form(study):
@@ -74,8 +78,8 @@ def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(searched, des
 
 
 def test_same_bits_whatever_the_chunks_and_threads(searched, design, tmp_path):
-    settings = MonteCarloSettings(samples=1000, seed=3, chunk=77)
-    other = monte_carlo(design, tmp_path / "b", settings, engine=Engine(threads=1))
+    settings = replace(PLAIN, chunk=77, worst_cases=True)
+    other = monte_carlo(design, tmp_path, settings, engine=Engine(threads=1))
     assert other.columns == searched.columns
     assert other.odds == searched.odds
     assert [w.parameters for w in other.worst] == [w.parameters for w in searched.worst]
@@ -89,14 +93,6 @@ def test_a_single_sample_is_replayed_by_its_number(study, design):
     assert result.friction.load_coefficient == row["parameter.friction.load_coefficient"]
     alone = SampleTask(design, sampler)((617, 1))
     assert alone["position.phase_margin"][0] == row["position.phase_margin"]
-
-
-def test_permuting_samples_changes_nothing(design):
-    task = SampleTask(design, sampler_of(design, seed=1))
-    draws = task.sampler.draw(0, 50)
-    order = np.random.default_rng(0).permutation(50)
-    straight, mixed = task.figures(draws), task.figures(draws[order])
-    assert all(np.array_equal(straight[k][order], mixed[k], equal_nan=True) for k in straight)
 
 
 def in_parts(monkeypatch, **sizes):
@@ -117,7 +113,7 @@ def interrupted(design, folder, settings, after):
 
 
 def test_an_interrupted_study_goes_on(study, design, tmp_path):
-    settings = MonteCarloSettings(samples=1000, seed=3, chunk=100, worst_cases=False)
+    settings = replace(PLAIN, chunk=100)
     interrupted(design, tmp_path, settings, after=300)
     left = sorted(tmp_path.glob("*.parquet"))
     assert 3 <= len(left) < 10
@@ -130,15 +126,14 @@ def test_an_interrupted_study_goes_on(study, design, tmp_path):
 
 def test_another_study_does_not_mix_into_a_folder(study, design):
     with pytest.raises(InputError, match="another study"):
-        monte_carlo(design, study.folder, MonteCarloSettings(samples=1000, seed=4))
+        monte_carlo(design, study.folder, replace(PLAIN, seed=4))
 
 
 @pytest.mark.parametrize("engine", [Engine(threads=2), Engine(workers=1)])
 def test_more_samples_than_are_kept_come_to_the_same(engine, study, design, tmp_path, monkeypatch):
     """Reduced where they are computed, in parts of another size: the same to the last bit, none kept."""
     in_parts(monkeypatch, PARTS=4, BLOCK=70)
-    settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
-    result = monte_carlo(design, tmp_path, settings, engine=engine)
+    result = monte_carlo(design, tmp_path, PLAIN, engine=engine)
     assert result.columns == study.columns
     assert result.odds == study.odds
     assert not list(tmp_path.glob("*.parquet"))
@@ -149,14 +144,13 @@ def test_more_samples_than_are_kept_come_to_the_same(engine, study, design, tmp_
 def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp_path, monkeypatch):
     """With what was noted, or from the beginning where that is damaged."""
     in_parts(monkeypatch, PARTS=10, BLOCK=25)
-    settings = MonteCarloSettings(samples=1000, seed=3, worst_cases=False)
-    interrupted(design, tmp_path, settings, after=400)
+    interrupted(design, tmp_path, PLAIN, after=400)
     (noted,) = tmp_path.glob("reduced-*.npz")
     if damage is not None:
         data = noted.read_bytes()
         noted.write_bytes(data[:damage] + bytes(8) + data[damage:][8:])
     steps = []
-    result = monte_carlo(design, tmp_path, settings, progress=lambda *step: steps.append(step))
+    result = monte_carlo(design, tmp_path, PLAIN, progress=lambda *step: steps.append(step))
     assert result.columns == study.columns
     assert result.odds == study.odds
     assert steps[-1] == ((600, 600) if damage is None else (1000, 1000))

@@ -8,18 +8,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_equal
 from scipy.stats import binom
+from toleranced import normal, uniform
 
 from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.batch import Population
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
 from actuator_lti.errors import InputError
-from analyses.monte_carlo.statistics import MOST, SHARES, Sketch, clopper_pearson, column_statistics
+from analyses.monte_carlo.result import MOST, SHARES, Sketch, clopper_pearson, column_statistics
 from analyses.monte_carlo.task import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 from nonlinear import Reducers, Run, commands, simulate_many
 
 R, L = "motor.resistance", "motor.inductance"
+BOX, BELL = uniform(R, 10.0, 2.0), normal(L, 5.0)
 
 
 def sampler(*factors, correlation=None, seed=0, table=None):
@@ -28,38 +30,30 @@ def sampler(*factors, correlation=None, seed=0, table=None):
     return Sampler(tuple(factors), matrix, table, seed)
 
 
-def uniform(path=R, nominal=10.0, half_width=2.0):
-    return Factor(path, nominal, Tolerance(kind="uniform", half_width=half_width))
-
-
-def normal(path=L, nominal=5.0, std=1.0):
-    return Factor(path, nominal, Tolerance(kind="normal", std=std))
-
-
 def test_a_sample_is_the_same_alone_and_in_any_chunk():
-    study = sampler(uniform(), normal(), correlation=0.5, seed=7)
+    study = sampler(BOX, BELL, correlation=0.5, seed=7)
     whole = study.draw(0, 1000)
     assert np.array_equal(np.vstack([study.draw(0, 1), study.draw(1, 332), study.draw(333, 667)]), whole)
     assert np.array_equal(study.draw(777, 1)[0], whole[777])
 
 
 def test_seed_zero_is_a_seed():
-    zero, again, one = (sampler(uniform(), seed=s).draw(0, 8) for s in (0, 0, 1))
+    zero, again, one = (sampler(BOX, seed=s).draw(0, 8) for s in (0, 0, 1))
     assert np.array_equal(zero, again)
     assert not np.array_equal(zero, one)
     with pytest.raises(InputError, match="seed"):
-        sampler(uniform(), seed=-1)
+        sampler(BOX, seed=-1)
 
 
 def test_uniform_fills_its_width_evenly():
-    values = sampler(uniform()).draw(0, 4096)[:, 0]
+    values = sampler(BOX).draw(0, 4096)[:, 0]
     assert 8.0 <= values.min() < values.max() <= 12.0
     counts, _ = np.histogram(values, bins=64, range=(8, 12))
     assert np.all(counts == 64)  # what a Sobol sequence promises and random numbers do not
 
 
 def test_normal_and_truncated_normal_have_their_moments():
-    values = sampler(normal()).draw(0, 8192)[:, 0]
+    values = sampler(BELL).draw(0, 8192)[:, 0]
     assert values.mean() == pytest.approx(5.0, abs=1e-3)
     assert values.std() == pytest.approx(1.0, abs=2e-3)
     cut = Factor(L, 5.0, Tolerance(kind="truncated-normal", std=1.0, lower=4.0, upper=6.0))
@@ -71,7 +65,7 @@ def test_normal_and_truncated_normal_have_their_moments():
 
 
 def test_correlated_normals_have_their_coefficient():
-    pair = sampler(normal(R), normal(L), correlation=-0.8).draw(0, 8192)
+    pair = sampler(normal(R, 5.0), normal(L, 5.0), correlation=-0.8).draw(0, 8192)
     assert np.corrcoef(pair.T)[0, 1] == pytest.approx(-0.8, abs=2e-3)
 
 
@@ -98,14 +92,11 @@ def test_bad_tables_are_refused(tmp_path, text, message):
         read_table(path, ["motor.resistance"])
 
 
-def test_a_design_without_tolerances_is_refused():
+def test_tolerances_that_are_none_or_reach_a_negative_inertia_are_refused():
     with pytest.raises(InputError, match="tolerance"):
         sampler_of(load_design("ctms-motor-position"))
-
-
-def test_a_normal_tolerance_that_reaches_a_negative_inertia_is_refused():
-    text = write_design(load_design("ilr33-amber"))
-    text = text.replace('tolerance = "50 %"', 'tolerance = { kind = "normal", std = "50 %" }')
+    wide = 'tolerance = { kind = "normal", std = "50 %" }'
+    text = write_design(load_design("ilr33-amber")).replace('tolerance = "50 %"', wide)
     with pytest.raises(InputError, match="truncated-normal"):
         sampler_of(read_design_text(text))
 
@@ -168,7 +159,7 @@ def test_sketches_of_parts_are_that_of_the_whole_in_any_order(values, cuts, seed
     column = np.array(values)
     parts = np.split(column, sorted({cut for cut in cuts if cut < len(column)}))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("analyses.monte_carlo.statistics.MOST", 16)
+        patch.setattr("analyses.monte_carlo.result.MOST", 16)
         whole = Sketch.of(column)
         shuffled = [Sketch.of(parts[k]) for k in np.random.default_rng(seed).permutation(len(parts))]
         made = merged(shuffled)
@@ -200,8 +191,7 @@ def test_the_interval_covers_for_sobol_points_too():
     """400 studies of 128 points of a known probability: P(x + y < 0.3) = 0.045 in the unit square."""
     covered = 0
     for seed in range(400):
-        factors = tuple(Factor(p, 0.5, Tolerance(kind="uniform", half_width=0.5)) for p in "xy")
-        points = Sampler(factors, np.eye(2), seed=seed).draw(0, 128)
+        points = Sampler((uniform("x", 0.5, 0.5), uniform("y", 0.5, 0.5)), np.eye(2), seed=seed).draw(0, 128)
         low, high = clopper_pearson(int((points.sum(axis=1) < 0.3).sum()), 128)
         covered += low <= 0.045 <= high
     assert covered >= 0.95 * 400

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from toleranced import QUICK, need
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
@@ -18,22 +19,13 @@ from actuator_lti.design.model import (
     Load,
     Motor,
     PositionLoop,
-    Requirement,
     Validation,
     VelocityLoop,
 )
 from actuator_lti.errors import InputError
-from analyses.tuning import TuningSettings, tune
+from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
 from analyses.tuning.start import allowed_range, place, step_of_gain
-
-QUICK = TuningSettings(curve=False, check=False)
-
-
-def need(quantity, minimum=None, maximum=None, loop="velocity", unit="dB"):
-    return Requirement(
-        id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, maximum=maximum, loop=loop
-    )
 
 
 def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
@@ -54,7 +46,7 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
 
 
 RESONANT = 0.5e-4 * (2 * np.pi * 700.0) ** 2  # 700 Hz, where the delay turns by more than 90 deg
-WIDE = (need("gain_margin", 6.0), need("phase_margin", 30.0, unit="deg"), need("bandwidth", 60.0, unit="Hz"))
+WIDE = (need("gain_margin", 6.0, unit="dB"), need("phase_margin", 30.0), need("bandwidth", 60.0, unit="Hz"))
 
 
 def direct():
@@ -117,7 +109,7 @@ def nearest_drawn(design, most):
 
 def test_no_smaller_change_of_two_gains_meets_the_requirements():
     """Every point of a dense grid over both gains that meets all limits is at least as far away."""
-    asked = (need("bandwidth", 50.0, unit="Hz"), need("phase_margin", 62.0, unit="deg"))
+    asked = (need("bandwidth", 50.0, unit="Hz"), need("phase_margin", 62.0))
     design = servo(*asked, gain=0.03, integral_time=0.01)
     tuned = tune(design, QUICK)
     assert tuned.feasible
@@ -138,7 +130,7 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
 
 
 def test_a_design_that_meets_all_is_left_as_it_is():
-    design = servo(need("phase_margin", 30.0, unit="deg"))
+    design = servo(need("phase_margin", 30.0))
     tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
     assert tuned.feasible
     assert tuned.placed == ()
@@ -160,11 +152,9 @@ def test_neutral_elements_change_nothing():
 
 def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
     """A P loop of 80 deg falls by 3 dB far below the velocity loop; feed-forward reaches that one."""
-    band, margin = (
-        need(name, least, loop="position", unit=unit)
-        for name, least, unit in (("bandwidth", 60.0, "Hz"), ("phase_margin", 80.0, "deg"))
-    )
-    design = servo(band, margin, need("gain_margin", 15.0), gain=0.1, position=PositionLoop(gain=20.0))
+    band = need("bandwidth", 60.0, loop="position", unit="Hz")
+    asked = (band, need("phase_margin", 80.0, loop="position"), need("gain_margin", 15.0, unit="dB"))
+    design = servo(*asked, gain=0.1, position=PositionLoop(gain=20.0))
     assert not tune(design, QUICK).feasible
     tuned = tune(design, replace(QUICK, place=("feedforward",)))
     assert tuned.feasible
@@ -189,7 +179,7 @@ def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
     (("notch",), direct(), "no control.velocity"),
 ])  # fmt: skip
 def test_what_has_no_place_is_refused(words, design, message):
-    asked = replace(design, requirements=(need("gain_margin", 6.0, loop="every"),))
+    asked = replace(design, requirements=(need("gain_margin", 6.0, loop="every", unit="dB"),))
     with pytest.raises(InputError, match=message):
         tune(asked, replace(QUICK, place=words))
 

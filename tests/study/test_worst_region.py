@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
+from toleranced import normal, uniform
 
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Correlation, Design, Tolerance
@@ -13,16 +14,8 @@ from analyses.estimation.fit import Fit
 from analyses.identification.to_design import design_with_fit
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.monte_carlo.worst import Region
-from analyses.studies.sampling import Factor, Sampler, Table, correlation_of, sampler_of, semidefinite_root
+from analyses.studies.sampling import Sampler, Table, correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
-
-
-def _normal(path: str, nominal: float = 0.0, std: float = 1.0) -> Factor:
-    return Factor(path, nominal, Tolerance(kind="normal", std=std))
-
-
-def _uniform(path: str, nominal: float, half: float) -> Factor:
-    return Factor(path, nominal, Tolerance(kind="uniform", half_width=half))
 
 
 def _cube(region: Region, count: int = 4000) -> np.ndarray:
@@ -30,7 +23,7 @@ def _cube(region: Region, count: int = 4000) -> np.ndarray:
 
 
 def test_without_correlations_it_is_the_box_and_its_corners() -> None:
-    sampler = Sampler((_normal("a", 1.0, 0.1), _uniform("b", 5.0, 2.0)), np.eye(2))
+    sampler = Sampler((normal("a", 1.0, 0.1), uniform("b", 5.0, 2.0)), np.eye(2))
     region = Region(sampler)
     assert region.dimensions == 2
     assert region.values(np.array([[0.0, 1.0]]))[0].tolist() == pytest.approx([0.7, 7.0])
@@ -42,7 +35,7 @@ def test_without_correlations_it_is_the_box_and_its_corners() -> None:
 @pytest.mark.parametrize("r", [-0.97, -0.4, 0.2, 0.8, 0.999])
 def test_two_normal_parameters_stay_in_their_ellipse_and_reach_its_ends(r: float) -> None:
     """s' R^-1 s = (s1^2 - 2 r s1 s2 + s2^2) / (1 - r^2), of the probability that two boxes have."""
-    sampler = Sampler((_normal("a", 0.0, 2.0), _normal("b", 10.0, 0.5)), np.array([[1.0, r], [r, 1.0]]))
+    sampler = Sampler((normal("a", 0.0, 2.0), normal("b", 10.0, 0.5)), np.array([[1.0, r], [r, 1.0]]))
     region = Region(sampler)
     squared = chi2.ppf((1.0 - 2.0 * norm.sf(3.0)) ** 2, 2)
     values = region.values(_cube(region))
@@ -68,8 +61,8 @@ def test_two_normal_parameters_stay_in_their_ellipse_and_reach_its_ends(r: float
 def test_tied_parameters_move_as_one_and_reach_the_edges(sign: float) -> None:
     """kM = kE: one coordinate; a uniform one reaches its edge, a normal one three deviations."""
     tie = np.array([[1.0, sign], [sign, 1.0]])
-    uniform = (_uniform("kM", 2.0, 0.2), _uniform("kE", 4.0, 0.4))
-    for pair in (uniform, (_normal("kM", 2.0), _normal("kE", 4.0))):
+    boxes, bells = (uniform("kM", 2.0, 0.2), uniform("kE", 4.0, 0.4)), (normal("kM", 2.0), normal("kE", 4.0))
+    for pair in (boxes, bells):
         region = Region(Sampler(pair, tie))
         assert region.dimensions == 1
         values = region.values(_cube(region, 300))
@@ -84,7 +77,7 @@ def test_samples_of_a_table_are_taken_whole() -> None:
     """A table whose columns sum to one: no point of the region breaks that."""
     first = np.random.default_rng(3).uniform(size=40)
     table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
-    region = Region(Sampler((_normal("a"),), np.eye(1), table))
+    region = Region(Sampler((normal("a"),), np.eye(1), table))
     assert region.dimensions == 2
     values = region.values(_cube(region, 500))
     np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)

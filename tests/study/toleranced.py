@@ -1,10 +1,15 @@
-"""The baseline with tolerances of one's own."""
+"""What tests of studies are made of: tolerances of one's own, distributions, requirements."""
 
 import tomllib
 
 import tomli_w
 
 from actuator_lti import load_design, write_design
+from actuator_lti.design.model import Requirement, Tolerance
+from analyses.studies.sampling import Factor
+from analyses.tuning import TuningSettings
+
+QUICK = TuningSettings(curve=False, check=False)
 
 
 def toleranced(**percent: dict[str, float]) -> str:
@@ -14,3 +19,17 @@ def toleranced(**percent: dict[str, float]) -> str:
         for key, share in keys.items():
             tree[table][key]["tolerance"] = f"{share:g} %"
     return tomli_w.dumps(tree)
+
+
+def normal(path: str, nominal: float = 0.0, std: float = 1.0) -> Factor:
+    return Factor(path, nominal, Tolerance(kind="normal", std=std))
+
+
+def uniform(path: str, nominal: float, half: float) -> Factor:
+    return Factor(path, nominal, Tolerance(kind="uniform", half_width=half))
+
+
+def need(quantity, minimum=None, maximum=None, loop="velocity", unit="deg") -> Requirement:
+    return Requirement(
+        id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, maximum=maximum, loop=loop
+    )

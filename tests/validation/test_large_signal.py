@@ -12,8 +12,8 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import FrictionPoint
 from actuator_lti.drive.operating import rubs
 from analyses.large_signal import large_signals
-from analyses.large_signal.by_amplitude import TOO_MANY, margins_by_amplitude
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
+from analyses.large_signal.from_rest import TOO_MANY, margins_by_amplitude
 from analyses.large_signal.map import (
     MINUS_3DB,
     AmplitudeBode,

@@ -10,7 +10,7 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import shipped_designs
 from actuator_lti.design.model import Filter
 from actuator_lti.errors import NumericalError
-from analyses.large_signal.steady_start import LEFT_AT_REST, PLACES, linear_steady_state, without_value
+from analyses.large_signal.tones import LEFT_AT_REST, PLACES, linear_steady_state, without_value
 from analyses.limit_cycles.stick_slip import _slip
 
 

@@ -14,8 +14,15 @@ from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.result import ROUNDS, limit_shift
-from analyses.large_signal.steady_start import PLACES, linear_steady_state
-from analyses.large_signal.tones import LEAST_UPDATES, amplitudes, run_tones, tone, work_ticks
+from analyses.large_signal.tones import (
+    LEAST_UPDATES,
+    PLACES,
+    amplitudes,
+    linear_steady_state,
+    run_tones,
+    tone,
+    work_ticks,
+)
 from tests.nonlinear.elastic_drive import drive_f
 
 

@@ -9,7 +9,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement, Waiver
-from analyses.large_signal.at_rest import RestSweep
+from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles import LimitCycles
 from analyses.motion.settling import SMALL, Settling, noticed, settlings_of
 from analyses.motion.settling import verdict_of as verdict_of_swing

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from flint import acb, arb, ctx
 
 from actuator_lti.errors import NumericalError
@@ -84,11 +86,11 @@ def _crossings(axis: Axis, band: tuple[float, float] | None, merge: bool = False
     gains = [_crossing(axis, x) for x in zeros(axis, GAIN, axis.edges(loop.lowest, top))]
     reals = [_crossing(axis, x) for x in zeros(axis, IMAGINARY, axis.edges(loop.lowest, far))]
     reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= _FLOOR)]
-    N0, D0 = loop.N.series(1)[0], loop.D.series(1)[0]
-    at_rest = None if D0 == 0 else float((N0 / D0).p) / float((N0 / D0).q)
-    if at_rest is not None and at_rest < 0.0:
+    N0, D0 = (part[0] for part in loop.at_rest)
+    at_rest = float(arb(N0 / D0)) if D0 != 0 else math.inf
+    if at_rest < 0.0:
         reals = [Crossing(0.0, complex(at_rest)), *reals]
-    if merge and at_rest is not None and abs(at_rest - 1.0) <= TOUCH:
+    if merge and abs(at_rest - 1.0) <= TOUCH:
         gains = [c for c in gains if abs(c.L - at_rest) > _AT_REST]
     return tuple(gains), tuple(reals)
 

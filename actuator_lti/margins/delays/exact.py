@@ -18,7 +18,6 @@ from actuator_lti.margins.given import ULP, Given, moved
 
 _MOST_DELAYS = 8
 HIGHEST_ORDER = 16
-Terms = tuple[tuple[fmpq_poly, fmpq], ...]
 
 
 @dataclass(frozen=True)
@@ -167,22 +166,11 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
         raise InputError(
             "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
         )
-    N, D = _present(above), _present(below)
-    if reduced:
-        N, D, n = _without_common_s(N, D, n)
-    return ExactDelayLoop(Quasi(N).late(rational(form.series_s)), Quasi(D), n)
-
-
-def _without_common_s(N: Terms, D: Terms, degree: int) -> tuple[Terms, Terms, int]:
-    """Cancel a factor s that stands in every term of both: a mode at zero frequency that L does not show."""
-    while N and degree and all(p[0] == 0 for p, _ in (*N, *D)):
-        N, D = (tuple((p // fmpq_poly([0, 1]), tau) for p, tau in terms) for terms in (N, D))
-        degree -= 1
-    return N, D, degree
-
-
-def _present(terms: list[tuple[fmpq_poly, fmpq]]) -> Terms:
-    return tuple((p, tau) for p, tau in terms if p.degree() >= 0)
+    N, D = ([(p, tau) for p, tau in terms if p.degree() >= 0] for terms in (above, below))
+    while reduced and N and n and all(p[0] == 0 for p, _ in (*N, *D)):
+        N, D = ([(p // fmpq_poly([0, 1]), tau) for p, tau in terms] for terms in (N, D))
+        n -= 1
+    return ExactDelayLoop(Quasi(tuple(N)).late(rational(form.series_s)), Quasi(tuple(D)), n)
 
 
 def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:

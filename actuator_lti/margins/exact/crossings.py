@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from flint import acb, arb, fmpz, fmpz_poly
 
@@ -37,9 +37,7 @@ def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...
     gain = N.square - D.square
     if gain.degree() < 0:
         raise NumericalError("the gain of the loop is one at every frequency: it has no phase margin")
-    phase = N.odd * D.even - N.even * D.odd
-    if phase.degree() >= 0:
-        phase = free_of(free_of(phase, N.square), D.square)
+    phase = free_of(N.odd * D.even - N.even * D.odd, N.square, D.square)
 
     def off_circle(v: arb) -> arb:
         return (N.at(v).abs_upper() / D.at(v).abs_lower()).log()
@@ -48,28 +46,22 @@ def crossings(loop: ExactLoop, merge: bool = False) -> tuple[tuple[Crossing, ...
         L = N.at(v) / D.at(v)
         return L.imag / L.abs_lower()
 
-    ends = _touched_ends(loop, gain) if merge else (False, False)
-    gains = _crossings(N, D, gain, off_circle, ends)
+    both = (loop.N[0], loop.D[0]), loop.at_end
+    touched = [
+        merge and gain[k] != 0 and _near_one(*end) for k, end in zip((0, loop.degree), both, strict=True)
+    ]
+    gains = _crossings(N, D, gain, off_circle, touched)
     reals = [c for c in _crossings(N, D, phase, off_axis) if c.L.real < 0.0]
-    first, last = _end(0.0, loop.N[0], loop.D[0]), _end(math.inf, *loop.at_end)
-    reals = [*([first] if first else []), *reals, *([last] if last and loop.degree else [])]
-    return tuple(gains), tuple(reals)
+    first, last = (
+        [Crossing(w, complex(float(arb(n) / arb(d))))] if n * d < 0 else []
+        for w, (n, d) in zip((0.0, math.inf), both, strict=True)
+    )
+    return tuple(gains), (*first, *reals, *(last if loop.degree else []))
 
 
-def _end(w: float, N: fmpz, D: fmpz) -> Crossing | None:
-    if N == 0 or D == 0 or (N > 0) == (D > 0):
-        return None
-    return Crossing(w, complex(float(arb(N) / arb(D))))
-
-
-def _touched_ends(loop: ExactLoop, gain: fmpz_poly) -> tuple[bool, bool]:
-    """Whether the gain is one at zero frequency, at the end of the axis: within `TOUCH`, and not exactly."""
-
-    def touched(N: fmpz, D: fmpz) -> bool:
-        return N != 0 and D != 0 and abs(float(abs(arb(N) / arb(D)).log())) <= TOUCH
-
-    first = gain[0] != 0 and touched(loop.N[0], loop.D[0])
-    return first, gain[loop.degree] != 0 and touched(*loop.at_end)
+def _near_one(N: fmpz, D: fmpz) -> bool:
+    """Whether the gain at an end of the axis is one within `TOUCH`."""
+    return N != 0 and D != 0 and abs(float(abs(arb(N) / arb(D)).log())) <= TOUCH
 
 
 def _crossings(
@@ -77,7 +69,7 @@ def _crossings(
     D: Split,
     p: fmpz_poly,
     off: Callable[[arb], arb],
-    touched_ends: tuple[bool, bool] = (False, False),
+    touched_ends: Sequence[bool] = (False, False),
 ) -> list[Crossing]:
     """The positive roots of p, touches merged; ``off`` is the distance to the line."""
 
@@ -97,7 +89,7 @@ def _merged(
     places: list[tuple[arb, bool]],
     roots: list[tuple[acb, int]],
     off: Callable[[arb], arb],
-    touched_ends: tuple[bool, bool],
+    touched_ends: Sequence[bool],
 ) -> list[tuple[arb, bool]]:
     """Pairs of crossings, real or just missed, that count as one touch; and none at a touched end."""
     sizes = [float(abs(root).mid()) for root, _ in roots]

@@ -113,7 +113,10 @@ def exact_loop(given: Given) -> ExactLoop:
 
 def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator in s or z, hidden modes among them, times one power of two."""
-    return _by_coefficients(given) if given.A is None else _by_matrices(given)
+    if given.A is not None:
+        return _by_matrices(given)
+    (num, den), _ = integers(given.numerator, given.denominator)
+    return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
 
 
 def rational(x: Any) -> fmpq:
@@ -128,11 +131,6 @@ def integers(*arrays: Any) -> tuple[list[list[int]], int]:
     return [[above << (shift - below.bit_length() + 1) for above, below in part] for part in ratios], shift
 
 
-def _by_coefficients(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
-    (num, den), _ = integers(given.numerator, given.denominator)
-    return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
-
-
 def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     """D = det(sI - A), N = c adj(sI - A) b + d D."""
     n = given.b.size
@@ -143,14 +141,14 @@ def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
         return fmpz_poly(d), fmpz_poly([1 << shift])
     whole = [A[k * n : k * n + n] for k in range(n)]
     below = fmpz_mat(whole).charpoly()
-    above = numerator(whole, b, c, below)
+    above = _numerator(whole, b, c, below)
     # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
-    D, N = _unscaled(below, shift), _unscaled(above, shift)
+    D, N = (fmpz_poly([x * (1 << (shift * k)) for k, x in enumerate(p.coeffs())]) for p in (below, above))
     power = shift_b + shift_c
     return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
 
 
-def numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
+def _numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
     """c adj(z I - M) b, where ``below`` is det(z I - M).
 
     It is the polynomial part of ``below`` times the sum of c M^k b z^(-1-k).
@@ -163,11 +161,6 @@ def numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_pol
         state = M * state
     product = below * fmpz_poly(answer[::-1])
     return product.right_shift(n) if product.degree() >= n else fmpz_poly()
-
-
-def _unscaled(p: fmpz_poly, shift: int) -> fmpz_poly:
-    """From det(sI - 2^shift A) to 2^(shift n) det(sI - A)."""
-    return fmpz_poly([c * (1 << (shift * k)) for k, c in enumerate(p.coeffs())])
 
 
 def warped(p: Polynomial, degree: int) -> Polynomial:

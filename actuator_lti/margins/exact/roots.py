@@ -37,23 +37,16 @@ class Split:
 
 def split(p: fmpz_poly) -> Split:
     """Even and odd part on the imaginary axis."""
-    return Split(*even_and_odd(p))
-
-
-def even_and_odd(p: Polynomial) -> tuple[Polynomial, Polynomial]:
-    """The polynomials in v = w^2 of p(j w) = even(v) + j w odd(v)."""
-    c: list[Any] = p.coeffs()
+    c = p.coeffs()
     even, odd = ([-x if k % 2 else x for k, x in enumerate(part)] for part in (c[0::2], c[1::2]))
-    return type(p)(even), type(p)(odd)
+    return Split(fmpz_poly(even), fmpz_poly(odd))
 
 
-def free_of(p: fmpz_poly, q: fmpz_poly) -> fmpz_poly:
-    """p without any root that it has in common with q."""
-    while p.degree() > 0:
-        common = p.gcd(q)
-        if common.degree() < 1:
-            return p
-        p = p // common
+def free_of(p: fmpz_poly, *others: fmpz_poly) -> fmpz_poly:
+    """p without any root that it has in common with others."""
+    for q in others:
+        while p.degree() > 0 and (common := p.gcd(q)).degree() > 0:
+            p = p // common
     return p
 
 
