@@ -104,6 +104,14 @@ def correlate_record(
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+    driven = needed_command(design, record, command)
+    outermost = driven.stage == design.controller.outermost
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
+    used[driven.signal] = "command" if outermost else f"{driven.stage} command"
+    if design.effective_motor.source_gain_Nm_V is None:
+        used["supply"] = "supply"
+    if "force" in measured and "force" not in record.signals:
+        used["voltage"] = "force, by the source's gain"
     signals = {
         name: compare_signals(name, KNOWN_UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
@@ -117,23 +125,9 @@ def correlate_record(
         counts=str(record.counts),
         sha256=record.sha256,
         source=record,
-        used=_used(design, record, measured, command),
+        used={name: text for name, text in used.items() if name in record.signals},
         findings=findings,
     )
-
-
-def _used(
-    design: Design, record: Record, measured: Mapping[str, FloatArray], command: str | None
-) -> dict[str, str]:
-    driven = needed_command(design, record, command)
-    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
-    outermost = driven.stage == design.controller.outermost
-    used[driven.signal] = "command" if outermost else f"{driven.stage} command"
-    if design.effective_motor.source_gain_Nm_V is None:
-        used["supply"] = "supply"
-    if "force" in measured and "force" not in record.signals:
-        used["voltage"] = "force, by the source's gain"
-    return {name: text for name, text in used.items() if name in record.signals}
 
 
 def measured_signals(
