@@ -176,19 +176,16 @@ def model_signals(
     notes = [] if notes is None else notes
     notes.extend(driven.notes)
     time = record.time_s - record.time_s[0]
-    supplied = supply_of(driven, record, time)
-    if supplied is not None:
-        notes.append(supplied.note)
+    supply = supply_of(driven, record, time, notes)
     model, load = load_of(driven.design, record, time, notes)
     period = model.controller.period_s
     duration = float(time[-1]) + 2.0 * period
-    go = partial(
+    go: Callable[..., Trajectory] = partial(
         simulate,
         model,
         commands.sampled(*at_ticks(driven, time, duration), where=record.name),
         load_Nm=load,
-        supply=None if supplied is None else supplied.voltage,
-        supply_scales=supplied is not None and supplied.scales,
+        **supply,
     )
     initial, moving = first_states(driven, record, measured)
     if moving is not initial:
