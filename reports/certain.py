@@ -38,10 +38,8 @@ def certain(value: Any, name: str = "") -> Any:
     if isinstance(value, Mapping):
         if value.get("kind") == "table":
             units = {column["key"]: column["unit"] for column in value["columns"]}
-            rows = [
-                {k: certain(v, f"{k} {units.get(k, '')}".strip()) for k, v in r.items()}
-                for r in value["rows"]
-            ]
+            names = {key: f"{key} {units.get(key, '')}".strip() for row in value["rows"] for key in row}
+            rows = [{key: certain(cell, names[key]) for key, cell in row.items()} for row in value["rows"]]
             return {**value, "rows": rows}
         return {key: certain(item, f"{name} {key}") for key, item in value.items()}
     if isinstance(value, list):

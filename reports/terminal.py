@@ -194,14 +194,8 @@ def verdict_table(block: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _empty(caption: str) -> Table:
-    return Table(
-        title=Text(caption),
-        title_justify="left",
-        title_style="bold",
-        box=SIMPLE_HEAD,
-        pad_edge=False,
-        padding=(0, 1),
-    )
+    look: dict[str, Any] = {"title_justify": "left", "title_style": "bold", "box": SIMPLE_HEAD}
+    return Table(title=Text(caption), **look, pad_edge=False, padding=(0, 1))
 
 
 def _cell(value: Any, format: str) -> Text:

@@ -25,13 +25,12 @@ _SECTIONS: tuple[tuple[str, str, Role], ...] = (
 
 def tally(items: Iterable[Mapping[str, Any]]) -> Tally:
     """Count items of `reports.document.verdicts`, of some the checks that they gather."""
-    counts = (
-        Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
-        if (gathered := item.get("gathers")) is None
-        else Tally(**gathered)
-        for item in items
-    )
-    return sum(counts, Tally())
+    count = Tally()
+    for item in items:
+        gathered = item.get("gathers")
+        one = Tally.of([Verdict(item["verdict"])], [bool(item["waiver"])])
+        count += one if gathered is None else Tally(**gathered)
+    return count
 
 
 def role(item: Mapping[str, Any]) -> Role:

@@ -56,6 +56,7 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     k = int(gain.middle.argmax())
     peak = max(float(gain.middle[k]), 0.0)
     largest = float(np.log(np.maximum(np.abs(T) - at_once(radius), 1e-300)).max()) - rest.log_gain - rest.up
+    coarse = [f"{result.too_coarse(omega)}: the gain there is not known"] if result.unresolved.any() else []
     return Bandwidth(
         minus3db_rad_s=falls[0] if falls else None,
         minus90deg_rad_s=turns[0] if turns else None,
@@ -67,7 +68,7 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
         minus3db_range_rad_s=fall_range,
         minus90deg_range_rad_s=turn_range,
         resonance_range_db=(_db(max(largest, 0.0)), _db(max(float(gain.high.max()), 0.0))),
-        notes=(rest.note, *_coarse(omega, result), f"noise: {response.source or 'none'}"),
+        notes=(rest.note, *coarse, f"noise: {response.source or 'none'}"),
     )
 
 
@@ -116,16 +117,6 @@ def _falls(omega: Real, strip: Strip, level: float) -> tuple[tuple[float, ...], 
     first, last = groups[0], sure[0][0]
     low, high = between(omega, first.first, float(first.t0[0])), between(omega, last.last, float(last.t1[-1]))
     return tuple(between(omega, k, t) for _, (k, t) in sure), (low, high)
-
-
-def _coarse(omega: Real, result: Bounds) -> tuple[str, ...]:
-    if not result.unresolved.any():
-        return ()
-    k = int(result.unresolved.argmax())
-    return (
-        f"too coarse for the damping between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s: "
-        "the gain there is not known",
-    )
 
 
 def _db(log_gain: float) -> float:

@@ -34,7 +34,7 @@ class Along:
         self.factors, self.loop, self._band = factors, loop, band
         self._parts, self._listed_to, self._floor = axis_parts(factors, band)
         order = factors.at_zero
-        first = complex(math.inf if order < 0.0 else 0.0) if order else complex(loop.at(np.zeros(1))[0].real)
+        first = complex(math.inf if order < 0.0 else 0.0) if order else loop.at_rest()
         self.ends = first, loop.at_end()
 
     def polish(self) -> Along:

@@ -93,8 +93,10 @@ def stability_margins(
             return replace(_behind_delay(*plain, band_rad_s, certify), delay_s=delay_s)
         system = system.to_state_space()
     given = given_of(system)
-    samples = 0 if given.period_s is None else whole_samples(delay_s / given.period_s)
-    if samples is None or (delay_s and given.period_s is None):
+    if not delay_s:
+        return _rational(given, band_rad_s, certify)
+    samples = None if given.period_s is None else whole_samples(delay_s / given.period_s)
+    if samples is None:
         return _behind_delay(given, delay_s, band_rad_s, certify)
     return replace(_rational(replace(given, samples=samples), band_rad_s, certify), delay_s=delay_s)
 

@@ -44,10 +44,6 @@ def polished(loop: RationalLoop, w: Real, gain: bool) -> tuple[Real, Complex]:
     else:
         raise Doubtful("a crossing did not settle")
     L = L * (1.0 - rate * step)
-    if loop.in_z:  # near z = 1 the last digits of z are all there is: one more step with them
-        L = loop.late(x, loop.sharp_response(x))
-        step = _newton_step(L, rate, gain)
-        x, L = x - step, L * (1.0 - rate * step)
     in_order = (x[1:] > x[:-1]).all() and (not loop.in_z or x[-1] < math.pi)
     if not (in_order and (np.abs(x - start) <= _FAR_OFF * start).all()):
         raise Doubtful("a crossing of the factors is none of the loop, or two are one")

@@ -17,8 +17,7 @@ _MOST_SAMPLES = 100
 ULP = 8  # by how much the entries may be wrong: what this changes the data do not determine
 
 
-def _nothing() -> Real:
-    return np.empty(0)
+_NOTHING: Real = np.empty(0)
 
 
 @dataclass(frozen=True)
@@ -29,11 +28,11 @@ class Given:
     """
 
     period_s: float | None
-    numerator: Real = field(default_factory=_nothing)
-    denominator: Real = field(default_factory=_nothing)
+    numerator: Real = field(default_factory=lambda: _NOTHING)
+    denominator: Real = field(default_factory=lambda: _NOTHING)
     A: Real | None = None
-    b: Real = field(default_factory=_nothing)
-    c: Real = field(default_factory=_nothing)
+    b: Real = field(default_factory=lambda: _NOTHING)
+    c: Real = field(default_factory=lambda: _NOTHING)
     d: float = 0.0
     samples: int = 0
 
@@ -84,8 +83,14 @@ def given_of(system: Any) -> Given:
     period_s = period_of(system)
     if hasattr(system, "num"):
         num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
+        if not den.size:
+            raise InputError("the denominator of the loop is zero")
+        if num.size > den.size:
+            raise InputError(
+                f"the loop is improper (numerator of degree {num.size - 1} over {den.size - 1}): "
+                "it needs at least as many poles as zeros"
+            )
         given = Given(period_s, num, den)
-        _refuse_coefficients(num, den)
     else:
         A = np.asarray(system.A, dtype=float)
         b = np.asarray(system.B, dtype=float)[:, 0]
@@ -99,16 +104,6 @@ def _trimmed(coefficients: Any) -> Real:
     p = np.asarray(coefficients, dtype=float)
     used = p.nonzero()[0]
     return p[used[0] :] if used.size else p[:0]
-
-
-def _refuse_coefficients(num: Real, den: Real) -> None:
-    if not den.size:
-        raise InputError("the denominator of the loop is zero")
-    if num.size > den.size:
-        raise InputError(
-            f"the loop is improper (numerator of degree {num.size - 1} over {den.size - 1}): "
-            "it needs at least as many poles as zeros"
-        )
 
 
 def period_of(system: Any) -> float | None:

@@ -16,7 +16,6 @@ from actuator_lti.margins.given import Given, Real, given_of, unwarped
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 _AT_MINUS_ONE = 1e-13
-_REFINEMENTS = 1
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,8 @@ class RationalLoop:
 
     def behind(self, delay_s: float) -> RationalLoop:
         """The loop behind a delay in place of its own."""
-        return replace(self, delay=delay_s / (self.period_s or 1.0))
+        delay = delay_s / (self.period_s or 1.0)
+        return self if delay == self.delay else replace(self, delay=delay)
 
     def frequency(self, w: float) -> float:
         """Angular frequency in rad/s."""
@@ -73,6 +73,13 @@ class RationalLoop:
         p = np.array([math.exp(2.0 * math.atan(w)) if self.in_z else w], dtype=complex)
         p -= 1.0 if self._about_one else 0.0
         return float(self._values(p)[0].real)
+
+    def at_rest(self) -> complex:
+        """L at zero frequency."""
+        if self.coefficients is None or self.in_z:
+            return complex(self._values(self._variable(np.zeros(1)))[0].real)
+        above, below = self.coefficients[:, -1]
+        return complex(above / below)
 
     def at_end(self) -> complex:
         """L at the end of the axis: at infinity, or at Nyquist with the whole delay."""
@@ -117,21 +124,6 @@ class RationalLoop:
         first = np.linalg.solve(matrix, self.b[:, None])
         second = np.linalg.solve(matrix, first)
         return self.d + first[..., 0] @ self.c, -turn * (second[..., 0] @ self.c)
-
-    def sharp_response(self, x: Real) -> Complex:
-        """L without the delay, with the residual of the solution in extended precision."""
-        wide = np.asarray(x, dtype=np.longdouble) * 1j
-        p = np.expm1(wide) if self._about_one else np.exp(wide) if self.in_z else wide
-        if self.coefficients is not None:
-            above, below = horner(np.asarray(self.coefficients, np.longdouble), p)
-            return np.asarray((above / below).astype(complex))
-        A = np.asarray(self._state, np.longdouble)
-        matrix = self._resolvent(p.astype(complex))
-        X = np.zeros((p.size, self.order), dtype=np.clongdouble)
-        for _ in range(_REFINEMENTS + 1):
-            residual = self.b - p[:, None] * X + X @ A.T
-            X = X + np.linalg.solve(matrix, residual.astype(complex)[..., None])[..., 0]
-        return (X @ np.asarray(self.c, np.longdouble) + self.d).astype(complex)
 
     @cached_property
     def _with_slopes(self) -> Complex:

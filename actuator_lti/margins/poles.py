@@ -76,19 +76,14 @@ def _sorted(values: Complex, radius: Real, distance: Real, near: Mask, centre: f
     if not near.any():
         return SortedPoles(values, int(np.count_nonzero(distance > 0.0)))
     size = np.abs(values - centre)
-    on_border = (np.abs(distance) <= radius) & _placed(values, radius, size)
+    beyond = [size[size > 10.0 * max(r, s)].min(initial=np.inf) for r, s in zip(radius, size, strict=True)]
+    next_size = np.where(np.isinf(beyond), 0.0, beyond)
+    placed = radius <= _SHARP * np.where(size > radius, np.abs(values), next_size)
+    on_border = (np.abs(distance) <= radius) & placed
     unstable = int(np.count_nonzero((distance > 0.0) & ~on_border))
     at_dc = int(np.count_nonzero(on_border & (size <= 2.0 * radius)))
     doubtful = bool(near[values != centre].any())
     return SortedPoles(values, unstable, int(np.count_nonzero(on_border)), at_dc, doubtful)
-
-
-def _placed(values: Complex, radius: Real, size: Real) -> Mask:
-    """Whether each error is much smaller than the modulus, at zero frequency than that of the next pole."""
-    beyond = [size[size > 10.0 * max(r, s)].min(initial=np.inf) for r, s in zip(radius, size, strict=True)]
-    next_size = np.where(np.isinf(beyond), 0.0, beyond)
-    placed: Mask = radius <= _SHARP * np.where(size > radius, np.abs(values), next_size)
-    return placed
 
 
 def _with_error_bounds(matrices: Sequence[Real]) -> tuple[Complex, Real]:

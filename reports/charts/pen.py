@@ -77,9 +77,9 @@ class Pen:
         """Write a filled outline, hatched where asked for."""
         fill = look.fill or look.colour
         opacity = "" if look.opacity == 1.0 else f"{look.opacity:g}"
-        edge = (
-            {"stroke": look.colour, "stroke_width": f"{look.width:g}"} if look.width else {"stroke": "none"}
-        )
+        edge = {"stroke": "none"}
+        if look.width:
+            edge = {"stroke": look.colour, "stroke_width": f"{look.width:g}"}
         body = f'<path{more} d="{path}" {self.style(fill=fill, fill_opacity=opacity, **edge)}/>'
         if not look.hatch:
             return body

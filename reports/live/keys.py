@@ -90,10 +90,9 @@ def named(design: Design, path: str) -> Tree:
     field, value = located(design, path)[0], parameter_value(design, path)
     unit = field.unit(Structure.of(design))
     shown, factor = _written(design.parameters.get(path), value, unit)
+    about = {"path": path, "about": field.description, "value": value}
     return {
-        "path": path,
-        "about": field.description,
-        "value": value,
+        **about,
         "unit": "" if shown == "1" else shown,
         "factor": factor,
         "whole": field.kind == "integer",

@@ -150,10 +150,9 @@ class _Child:
             said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
             limit_s = self._limits.time_limit_s * task.limits
             answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
-            if answer is None and self._late:
-                answer = Answer("timeout", self._end(limit_s))
-            elif answer is None:
-                answer = Answer("crash", self._end(limit_s), self._last_words(said))
+            if answer is None:
+                last = "" if self._late else self._last_words(said)
+                answer = Answer("timeout" if self._late else "crash", self._end(limit_s), last)
             return answer._replace(seconds=time.monotonic() - start)
 
     def _answer(self, limit_s: float, question: Any = None) -> Any:

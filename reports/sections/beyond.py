@@ -229,7 +229,5 @@ def described(sweep: RestSweep) -> str:
         return "The describing function is not compared: dry friction holds the rotor."
     gain = float(np.abs(20.0 * np.log10(np.abs(ratio))).max())
     phase = float(np.abs(np.degrees(np.angle(ratio))).max())
-    return (
-        f"The describing function at the simulated speed amplitude differs from the simulation by up to "
-        f"{gain:.2g} dB and {phase:.2g} deg."
-    )
+    words = "The describing function at the simulated speed amplitude differs from the simulation by up to"
+    return f"{words} {gain:.2g} dB and {phase:.2g} deg."

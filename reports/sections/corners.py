@@ -54,11 +54,8 @@ def _failings(corner: Corner) -> list[str]:
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
     """The worst of a figure over the loops, and its loop; None where there is none."""
-    found = [
-        (value, name)
-        for name, one in corner.figures.items()
-        if one.sound and (value := quantity.read(one.judged)) is not None
-    ]
+    read = [(quantity.read(one.judged), name) for name, one in corner.figures.items() if one.sound]
+    found = [(value, name) for value, name in read if value is not None]
     return min(found, key=lambda each: quantity.better * each[0], default=None)
 
 

@@ -32,12 +32,9 @@ COLUMNS = [
 
 def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[str] = ()) -> doc.Section:
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
-    rows = [
-        _row(name, form, result[name], forms.get("ideal", {}).get(name))
-        for name in forms["sampled"]
-        for form, result in forms.items()
-        if name in result
-    ]
+    pairs = [(name, form) for name in forms["sampled"] for form in forms if name in forms[form]]
+    ideal = forms.get("ideal", {})
+    rows = [_row(name, form, forms[form][name], ideal.get(name)) for name, form in pairs]
     note = (
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay. No form uses a Padé approximation."
@@ -60,10 +57,8 @@ def _result(rows: Sequence[Mapping[str, Any]]) -> str:
     change = to_minus(f"{row['phase_cost_deg']:+.1f}")
     most = ", the largest change of all loops" if len(costs) > 1 else ""
     loop = row["loop"].lower() + "," * ("," in row["loop"])
-    return (
-        f"Sampling and delay change the phase margin of the {loop} by {change} deg{most}; "
-        "its crossover moves, too."
-    )
+    words = f"Sampling and delay change the phase margin of the {loop} by {change} deg{most}"
+    return f"{words}; its crossover moves, too."
 
 
 def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
@@ -79,11 +74,8 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=400.0)
     for name, sampled in forms["sampled"].items():
         grid = frequency_grid(sampled, points=130)
-        curves = [
-            (FORMS[form], curve(result[name].loop.plain_open, grid))
-            for form, result in forms.items()
-            if name in result
-        ]
+        known = [(form, result[name]) for form, result in forms.items() if name in result]
+        curves = [(FORMS[form], curve(one.loop.plain_open, grid)) for form, one in known]
         top, bottom = chart.column(1.0, 1.0, title=loop_words(name))
         both(curves, nyquist_hz(sampled), top, bottom, span=120.0)
         top.rule_y(0.0, colour=style.INK)
@@ -147,10 +139,8 @@ def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
     row = max(closed, key=lambda row: float(row["s_peak_db"]))
     unknown = [row["point"] for row in rows if row["others"] == "all closed" and row not in closed]
     of = f" (the {' and the '.join(unknown)} left out)" if unknown else ""
-    return (
-        f"With all loops closed the drive is most sensitive at the {row['point']}{of}: peak of S "
-        f"{row['s_peak_db']:.2f} dB."
-    )
+    place = f"{row['point']}{of}: peak of S {row['s_peak_db']:.2f} dB"
+    return f"With all loops closed the drive is most sensitive at the {place}."
 
 
 def _break_point(name: str, others: str, figures: LoopFigures | None) -> doc.Row:

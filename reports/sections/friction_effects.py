@@ -231,7 +231,5 @@ def _summary(result: FrictionEffects, fine: float, small: str) -> str:
         return f"{_integrates(result)}; an error of up to {size} is left at rest{under}."
     if not result.integrator:
         return f"{_integrates(result)}; the steps leave no error at rest."
-    return (
-        f"After steps dry friction alone leaves no steady-state error and causes no hunting: the "
-        f"{result.integrator} integrator removes the error."
-    )
+    words = "After steps dry friction alone leaves no steady-state error and causes no hunting"
+    return f"{words}: the {result.integrator} integrator removes the error."

@@ -38,10 +38,8 @@ def section(design: Design, border: Onset) -> doc.Section:
     blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption)]
     blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words, title = (
-        _result(rows, unit) if rows else _least(border, scale, unit),
-        "Validity of the linear model",
-    )
+    words = _result(rows, unit) if rows else _least(border, scale, unit)
+    title = "Validity of the linear model"
     return doc.section("limits", title, blocks, result=words, intro=intro, told="info")
 
 
@@ -154,9 +152,8 @@ EVERY = 2  # a glyph in every second column
 
 
 def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
-    made = style.Chart(
-        width=style.WIDE, height=500.0, legend=True, legend_title="waveform; first reached, linear loop"
-    )
+    title = "waveform; first reached, linear loop"
+    made = style.Chart(width=style.WIDE, height=500.0, legend=True, legend_title=title)
     panel, shown = made.panel("command frequency, Hz", f"command amplitude, {unit}", "xy"), result.map
     x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)

@@ -46,17 +46,11 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
         blocks.append(step(title, figures, locked, name=name))
     blocks.append(doc.details("Nichols chart", [loop_charts.nichols(title, figures, grid)]))
     corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
-    notes = [
-        *filter(None, [said_of(design, corner)]),
-        *by_itself_notes({title: figures}),
-        *evidence_notes({title: figures}),
-        *figures.margins.notes,
-        *figures.notes,
-    ]
-    blocks += [doc.remark(note) for note in notes]
-    return doc.section(
-        f"loop-{name}", title, blocks, result=result(figures), intro=_intro(name, figures), status=status
-    )
+    said, known = said_of(design, corner), {title: figures}
+    notes = [*([said] if said else []), *by_itself_notes(known), *evidence_notes(known)]
+    blocks += [doc.remark(note) for note in (*notes, *figures.margins.notes, *figures.notes)]
+    words, intro = result(figures), _intro(name, figures)
+    return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
 
 
 def result(figures: LoopFigures) -> str:
@@ -65,11 +59,10 @@ def result(figures: LoopFigures) -> str:
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
     ]
-    words = [
-        f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else "")
-        for name, value, unit, hz, write in parts
-        if value is not None
-    ]
+    words = []
+    for name, value, unit, hz, write in parts:
+        if value is not None:
+            words.append(f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else ""))
     if bandwidth is not None:
         to = " to the command" if figures.loop.name == "position" else ""
         words.append(f"bandwidth{to} {style.hertz(bandwidth)}")

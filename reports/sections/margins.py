@@ -159,11 +159,8 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
     for words, sound in (("not stable", False), ("stability not known", None)):
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
-    held = [
-        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
-        for label, one in named.items()
-        if one.held is not None
-    ]
+    apart = [(label, one.loop.name) for label, one in named.items() if one.held is not None]
+    held = [f"{label} with the {HELD[name]} (by itself, {OPEN[name]}, {AWAY})" for label, name in apart]
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
 
 

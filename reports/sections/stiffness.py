@@ -107,11 +107,9 @@ def _lost_motion(result: Stiffness) -> doc.Block:
     scale, unit = output_unit(result.design.axis)
     lost = result.lost_motion
     assert lost is not None
-    columns = [
-        doc.column("what", "What"),
-        doc.column("foreseen", "Predicted", unit, format="sig:4"),
-        doc.column("seen", "Simulated", unit, format="sig:4"),
-    ]
+    columns = [doc.column("what", "What")]
+    for key, words in (("foreseen", "Predicted"), ("seen", "Simulated")):
+        columns.append(doc.column(key, words, unit, format="sig:4"))
     seen = None if lost.seen_rad is None else scale * lost.seen_rad
     rows = [("play", scale * lost.play_rad, None), ("lost motion", scale * lost.foreseen_rad, seen)]
     note = (

@@ -165,14 +165,7 @@ def test_what_is_only_suspicious_is_warned_of(values: dict[str, object], says: s
 
 
 def test_limits_that_clamp_nothing_are_warned_of() -> None:
-    text = design_text("ctms-motor-position").replace(
-        "[control]", "speed = '100 rad/s'\npeak_current = '1 A'\n[control]"
-    )
-    lines = warnings_of(
-        read_design_text(text.replace("[validation]\nfull_deflection", "[fact2]\nx").split("[fact2]")[0])
-    )
-    assert [line.split(":")[0] for line in lines] == [
-        "limits.peak_current",
-        "limits.speed",
-        "validation.full_deflection",
-    ]
+    limits = "speed = '100 rad/s'\npeak_current = '1 A'\n[control]"
+    text = design_text("ctms-motor-position").replace("[control]", limits).partition("[validation]")[0]
+    told = [line.partition(":")[0] for line in warnings_of(read_design_text(text))]
+    assert told == ["limits.peak_current", "limits.speed", "validation.full_deflection"]

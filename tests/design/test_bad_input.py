@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from actuator_lti.bounds import TEXT_CHARACTERS, TOML_BYTES
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
@@ -102,7 +101,6 @@ CASES = {
     "amplitude above full": ([("0.5, 1.0]", "0.5, 2.0]")], ["amplitude_fractions[5] = 2.0"]),
     "broken TOML": ([("[motor]", "[motor")], ["not TOML", "line 11, column 7"]),
     "one table for many": ([("[[gear]]", "[gear]"), ("[[gear]]\nname = \"worm\"", "[load2]")], ["load2"]),
-    "long text": ([('title = "ILR', f'title = "{"x" * (TEXT_CHARACTERS.most + 1)}')], ["design.title", "at most 10000"]),
     "many gears": ([("[[gear]]", "[[gear]]\n" * 21)], ["gear: allowed: 1 to 20 items"]),
     "unknown object": ([(FACTS, "[objects.values]\n\"0x23\" = 1\n[[fact]]")], ["0x23", "0x2344.01"]),
 }  # fmt: skip
@@ -132,51 +130,24 @@ def test_many_mistakes_are_cut_short() -> None:
 def test_correlations_that_contradict_each_other_are_refused() -> None:
     keys = ("load.inertia", "gear.worm.input_inertia", "gear.planetary.input_inertia")
     pairs = [(keys[0], keys[1], 0.9), (keys[1], keys[2], 0.9), (keys[0], keys[2], -0.9)]
-    tables = "".join(
-        f'[[correlation]]\nfirst = "{a}"\nsecond = "{b}"\ncoefficient = {c}\n' for a, b, c in pairs
-    )
-    assert "contradict" in refused(AMBER + tables)
+    tables = [f'[[correlation]]\nfirst = "{a}"\nsecond = "{b}"\ncoefficient = {c}\n' for a, b, c in pairs]
+    assert "contradict" in refused(AMBER + "".join(tables))
 
 
 @pytest.mark.parametrize(
-    ("extra", "says"),
+    ("old", "new", "says"),
     [
-        ("[control.current]\ngain = '1 ohm'", "control.current"),
-        ("[motor]\nresistance = '1 ohm'", "motor.resistance = 1.0: not allowed beside motor.source_gain"),
-        ("feedforward", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
+        ("[control]", "[control.current]\ngain = '1 ohm'\n[control]", "control.current"),
+        (
+            "[motor]",
+            "[motor]\nresistance = '1 ohm'",
+            "resistance = 1.0: not allowed beside motor.source_gain",
+        ),
+        ("243.45 V*s/m", "1 A*s/m", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
     ],
 )
-def test_the_stages_of_a_force_source_are_held_apart(extra: str, says: str) -> None:
-    text = design_text("emps")
-    if extra.startswith("[motor]"):
-        text = text.replace("[motor]", extra)
-    elif extra == "feedforward":
-        text = text.replace('"243.45 V*s/m"', '"1 A*s/m"')
-    else:
-        text = text + extra + "\n"
-        text = text.replace('"243.45 V*s/m"', '"1 A*s/m"')
-    assert says in refused(text)
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "",
-        "a = 1",
-        "x = " + "[" * 5000,
-        "x = " + "{a=" * 5000,
-        "a." * 50_000 + "b = 1",
-        "[" + "a." * 50_000 + "b]",
-        "x = 1" + "0" * 10_000,
-        "\0",
-        "x = '" + "y" * TOML_BYTES.most + "'",
-        "x = [" + "1," * 30_000 + "]",
-        "\n".join(f"k{i} = 1" for i in range(30_000)),
-    ],
-    ids=range(11),
-)
-def test_nonsense_is_refused_quickly(text: str) -> None:
-    refused(text)
+def test_the_stages_of_a_force_source_are_held_apart(old: str, new: str, says: str) -> None:
+    assert says in refused(design_text("emps").replace(old, new))
 
 
 def test_files_that_are_no_design_are_refused(tmp_path) -> None:
@@ -188,12 +159,8 @@ def test_files_that_are_no_design_are_refused(tmp_path) -> None:
     assert "no such file; allowed" in line(tmp_path / "missing.toml")
     (tmp_path / "misssing.toml").write_text("", encoding="utf-8")
     assert 'no such file (there is "misssing.toml")' in line(tmp_path / "missing.toml")
-    assert "is a directory" in line(tmp_path)
     (tmp_path / "binary.toml").write_bytes(b"[design]\nname = '\xff\xfe'")
     assert "byte 17 is not UTF-8" in line(tmp_path / "binary.toml")
-    (tmp_path / "large.toml").write_bytes(b"#" * (TOML_BYTES.most + 1))
-    assert "at most 1 MiB" in line(tmp_path / "large.toml")
-    assert "no regular file" in line(Path("/dev/null"))
 
 
 def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path) -> None:

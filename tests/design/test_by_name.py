@@ -24,17 +24,14 @@ def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> 
     for given in ("ilr33-amber", str(file), file):
         result = assemble_loops(given).position.open_loop
         assert all(np.array_equal(getattr(result, part), getattr(wanted, part)) for part in "ABCD")
-        assert np.array_equal(
-            simulate(given, commands.step(0.01), 0.02).output_angle_rad, run.output_angle_rad
-        )
+        again = simulate(given, commands.step(0.01), 0.02)
+        assert np.array_equal(again.output_angle_rad, run.output_angle_rad)
 
 
 @pytest.mark.parametrize("given", [None, 3, b"ilr33-amber", ["ilr33-amber"]])
 def test_anything_else_is_refused_in_one_line(given: object) -> None:
     for call in (lambda: assemble_loops(given), lambda: simulate(given, commands.step(0.01), 0.02)):
-        with pytest.raises(
-            InputError, match="allowed: a Design, a shipped name, or the path of a design file"
-        ):
+        with pytest.raises(InputError, match="a Design, a shipped name, or the path of a design file"):
             call()
     with pytest.raises(InputError, match='nearest known: "ilr33-amber"'):
         assemble_loops("ilr33-ambre")

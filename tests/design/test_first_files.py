@@ -53,6 +53,15 @@ def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> 
     assert with_law(nested).controller == with_law(flat).controller
 
 
+def test_what_could_not_be_read_is_not_shown_where_it_is_asked_for_again() -> None:
+    """Names that are none, in a drive without gears and without tolerances, which they could be among."""
+    bare = DRIVE.replace('[[gear]]\nname = "R22"\nratio = 19.2\n', "[load]\nlocking_gear = 3\n")
+    text = told(f'{bare}[[correlation]]\nsecond = "motor.resistance"\ncoefficient = 0.5\n')
+    assert "object at" not in text
+    for words in ("load.locking_gear = 3: allowed: text", "locking_gear: is no gear", "first: missing"):
+        assert words in text
+
+
 STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]"
 
 
@@ -159,9 +168,8 @@ def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings
     ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
 )
 def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
-    assert (
-        read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n').encoder.counts_per_rev == counts
-    )
+    design = read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n')
+    assert design.encoder.counts_per_rev == counts
 
 
 @pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
@@ -171,15 +179,9 @@ def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
     assert 'write "lines" (4 counts each) or "counts"' in text
 
 
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ('acceleration = "1500 1/s²"', "write rev or rad into it"),
-        ('speed = "100 1/s"', "write rev or rad into it"),
-    ],
-)
-def test_a_speed_without_an_angle_is_asked_for_it(table: str, words: str) -> None:
-    assert words in told(DRIVE.replace("[limits]\n", f"[limits]\n{table}\n"))
+@pytest.mark.parametrize("limit", ['acceleration = "1500 1/s²"', 'speed = "100 1/s"'])
+def test_a_speed_without_an_angle_is_asked_for_it(limit: str) -> None:
+    assert "write rev or rad into it" in told(DRIVE.replace("[limits]\n", f"[limits]\n{limit}\n"))
 
 
 def test_a_gain_in_torque_is_told_how_to_become_one_in_amperes() -> None:

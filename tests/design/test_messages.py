@@ -36,7 +36,6 @@ def test_a_wrong_unit_is_named_with_what_is_wanted(name: str, key: str, value: s
     [
         ("[motor]\nresistance = 55 mohm\n", 'line 2.*in quotes: resistance = "55 mohm"'),
         ("[motor]\nresistance = 0,6\n", "line 2.*decimal point: resistance = 0.6"),
-        ("", "is empty"),
         ("# only a comment\n", "is empty"),
     ],
 )

@@ -4,11 +4,14 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import log, nan, pi, sqrt
 
+import numpy as np
 import pytest
 
-from actuator_lti.design import check_design, load_design, read_design_text, write_design
+from actuator_lti.design import check_design, design_tree, load_design, read_design_text, write_design
+from actuator_lti.design.access import stacked
 from actuator_lti.design.checks_control import TRACKING_LIMIT
 from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.sections import part_at, template_of, with_part
 from actuator_lti.design.suspicions import elastic_warnings
 from actuator_lti.design.writing import with_overrides
@@ -42,9 +45,8 @@ def test_the_two_meanings_of_a_peak_time() -> None:
     base = {"limits.peak_time": "1 s"}
     assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(1 / log(9 / 8), rel=1e-14)
     assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(8.490187, abs=5e-7)
-    assert with_overrides(
-        AMBER, base | {"limits.overload": "excess"}
-    ).limits.overload_time_s == pytest.approx(8.0)
+    excess = with_overrides(AMBER, base | {"limits.overload": "excess"})
+    assert excess.limits.overload_time_s == pytest.approx(8.0)
 
 
 @pytest.mark.parametrize("constants", ["rms-line", "peak-phase"])
@@ -85,17 +87,13 @@ def test_a_mixed_up_convention_is_named() -> None:
 
 
 def test_a_warm_motor() -> None:
-    motor = with_overrides(
-        AMBER, {"temperature.winding": "125 degC", "temperature.magnet": "75 °C"}
-    ).effective_motor
+    warm = {"temperature.winding": "125 degC", "temperature.magnet": "75 °C"}
+    motor = with_overrides(AMBER, warm).effective_motor
     assert motor.resistance_ohm == pytest.approx(0.055 * 1.393, rel=1e-14)
     assert motor.torque_constant_Nm_A == pytest.approx(5.9e-3 * (1 - 0.0011 * 50), rel=1e-14)
 
 
 def test_a_speed_drive_has_no_position_loop() -> None:
-    from actuator_lti.design.loader import design_from_tree
-    from actuator_lti.design.writing import design_tree
-
     tree = design_tree(AMBER)
     del tree["control"]["position"]
     tree["requirement"] = []
@@ -173,7 +171,6 @@ def test_a_rigid_stage_that_cannot_hold_its_load_is_warned_of() -> None:
 
 def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
     """The tracking loop of section 7: th+ = p + 2 w0 T r, w+ = w + w0^2 T r, p = th + T w, r = y - p."""
-    import numpy as np
 
     def radius(x: float) -> float:
         A = np.array([[1 - 2 * x, (1 - 2 * x)], [-(x**2), 1 - x**2]])
@@ -184,20 +181,14 @@ def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
 
 def test_the_overload_time_of_stacked_designs_is_that_of_each() -> None:
     """tau = t_peak/ln(r^2/(r^2 - 1)) by the exact numbers of each design."""
-    import numpy as np
-
-    from actuator_lti.design.access import stacked
-
     base = with_overrides(AMBER, {"limits.peak_current": "12 A", "limits.continuous_current": "4 A",
                                   "limits.peak_time": "1 s"})  # fmt: skip
     peaks, times = np.array([8.0, 12.0, 20.0]), np.array([0.5, 1.0, 3.0])
     many = stacked(base, {"limits.peak_current": peaks, "limits.peak_time": times}).limits.overload_time_s
-    assert many == pytest.approx(
-        [t / log((p / 4) ** 2 / ((p / 4) ** 2 - 1)) for p, t in zip(peaks, times, strict=True)]
-    )
-    assert stacked(base, {"limits.peak_time": times}).limits.overload_time_s == pytest.approx(
-        times * 8.490187, rel=1e-6
-    )
+    squares = (peaks / 4) ** 2
+    assert many == pytest.approx(times / np.log(squares / (squares - 1)))
+    many = stacked(base, {"limits.peak_time": times}).limits.overload_time_s
+    assert many == pytest.approx(times * 8.490187, rel=1e-6)
 
 
 def _taken(call: Callable[[], object]) -> bool:
@@ -227,6 +218,7 @@ def test_what_the_check_of_a_design_accepts_its_file_may_hold() -> None:
     [
         ("motor.resistance", -1.0, "-1 ohm"),
         ("motor.inductance", nan, "nan H"),
+        ("limits.voltage", (), "-1 V"),
         ("control.period", 0.0, "0 s"),
         ("control.position.every", 0, 0),
         ("control.position.gain", 1e13, "1e13 1/s"),

@@ -40,17 +40,8 @@ def fill(folder: Path, leave: int) -> Path:
     return ballast
 
 
-def attempt(site: Path, margin: float) -> str:
-    """Run a night; the words with which it was refused, empty where it was not."""
-    try:
-        nightly(site, margin)
-    except InputError as error:
-        return str(error)
-    return ""
-
-
-def nightly(site: Path, margin: float):
-    return run_night(study(*(job(f"d{k}", margin) for k in range(5))), site, INLINE, code=CODE)
+def nightly(site: Path, margin: float, **more):
+    return run_night(study(*(job(f"d{k}", margin) for k in range(5))), site, INLINE, code=CODE, **more)
 
 
 def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Path) -> None:
@@ -60,7 +51,11 @@ def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Pat
     for step, leave in enumerate(range(0, 690_000, 23_000)):
         ballast = fill(small_disk, leave)
         before = (site / "index.html").read_bytes()
-        words = attempt(site, 11.0 + step)
+        words = ""
+        try:
+            nightly(site, 11.0 + step)
+        except InputError as error:
+            words = str(error)
         assert words or leave
         if words:
             refused += 1
@@ -78,12 +73,8 @@ def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Pat
 def test_a_read_only_site_keeps_the_old_night_and_catches_up(tmp_path) -> None:
     site = tmp_path / "site"
     nightly(site, 10.0)
-    done = subprocess.run(
-        ["sh", "-c", 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1"', "sh", str(site)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    command = ["sh", "-c", 'mount --bind "$1" "$1" && mount -o remount,ro,bind "$1"', "sh", str(site)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
         pytest.skip(f"may not make a read-only mount: {done.stderr.strip()}")
     before = (site / "index.html").read_bytes()
@@ -127,9 +118,7 @@ def test_a_corrupt_cache_entry_is_told_and_built_again(tmp_path, damage: str) ->
         data = entry.read_bytes()
         changed = {"flip": data[:200] + b"?" + data[201:], "truncate": data[:-9], "empty": b""}[damage]
         entry.write_bytes(changed)
-    night = run_night(
-        study(*(job(f"d{k}", 10.0) for k in range(5))), site, INLINE, code=CODE, say=said.append
-    )
+    night = nightly(site, 10.0, say=said.append)
     assert len(said) == 5
     assert all("is corrupt" in line and "built again" in line for line in said)
     assert not any(d.result.cached for d in night.designs)

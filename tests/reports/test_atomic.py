@@ -10,11 +10,13 @@ from actuator_lti.files import atomic
 
 
 def test_a_file_replaces_the_old_one_and_leaves_nothing_beside_it(tmp_path) -> None:
-    target = tmp_path / "new" / "a.txt"
+    target, plain = tmp_path / "new" / "a.txt", tmp_path / "plain"
     atomic.write_text(target, "one")
     atomic.write_text(target, "two µ")
     assert target.read_text(encoding="utf-8") == "two µ"
     assert os.listdir(target.parent) == ["a.txt"]
+    plain.write_text("x")
+    assert target.stat().st_mode == plain.stat().st_mode  # the rights that any new file gets
 
 
 def test_files_written_together_stay_old_if_one_cannot_be_written(tmp_path) -> None:
@@ -67,13 +69,6 @@ def test_all_is_on_the_disk_before_anything_is_in_its_place(tmp_path, monkeypatc
     atomic.write_together({tmp_path / "a": b"x" * 7, tmp_path / "b": b"y" * 9})
     assert steps[:4] == ["flush 7", "flush 9", "move a", "move b"]
     assert [step[:5] for step in steps[4:]] == ["flush"] * (os.name == "posix")  # the folder's names
-
-
-def test_the_file_gets_the_rights_that_any_new_file_gets(tmp_path) -> None:
-    plain, written = tmp_path / "plain", tmp_path / "written"
-    plain.write_text("x")
-    atomic.write_text(written, "x")
-    assert written.stat().st_mode == plain.stat().st_mode
 
 
 def test_a_folder_in_the_way_is_named(tmp_path) -> None:

@@ -50,14 +50,12 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     design = load_design("emps")
     result = stiffness(design)
     told = as_json(result)
-    assert set(told) == {field.name for field in fields(Stiffness)} | {
-        "verdict", "passed", "lost_motion_difference",
-    }  # fmt: skip
+    derived = {"verdict", "passed", "lost_motion_difference"}
+    assert set(told) == {field.name for field in fields(Stiffness)} | derived
     assert told["design"] == {"name": "emps", "hash": design_hash(design)}
     own, seen = told["checks"][0], result.checks[0]
-    number = cmath.rect(
-        own["foreseen_Nm_rad"]["size"], cmath.pi * own["foreseen_Nm_rad"]["phase_deg"] / 180.0
-    )
+    size, phase_deg = (own["foreseen_Nm_rad"][key] for key in ("size", "phase_deg"))
+    number = cmath.rect(size, cmath.pi * phase_deg / 180.0)
     assert number == pytest.approx(seen.foreseen_Nm_rad, rel=1e-12)
     assert own["difference"] == seen.difference
     json.dumps(told, allow_nan=False)

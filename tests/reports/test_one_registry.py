@@ -38,11 +38,9 @@ def test_the_first_screen_and_the_loop_show_what_the_registry_says(monkeypatch) 
 def test_the_live_page_knows_no_figure_by_itself(monkeypatch) -> None:
     columns = {one["name"]: one for one in live_model(DESIGN)["figures"]}
     assert set(columns) == {name for name, of in LOOP_QUANTITIES.items() if of.followed}
-    assert columns["settling_time"]["unit"] == "ms"
-    assert columns["settling_time"]["factor"] == 1e3
-    assert [name for name, one in columns.items() if one["response"]] == [
-        "bandwidth", "overshoot", "settling_time",
-    ]  # fmt: skip
+    assert (columns["settling_time"]["unit"], columns["settling_time"]["factor"]) == ("ms", 1e3)
+    of_response = [name for name, one in columns.items() if one["response"]]
+    assert of_response == ["bandwidth", "overshoot", "settling_time"]
     monkeypatch.setitem(LOOP_QUANTITIES, "modulus_margin", NEW)
     assert "New figure" in [one["label"] for one in live_model(DESIGN)["figures"]]
     words = script(live=True).lower()
@@ -68,9 +66,8 @@ def test_a_margin_downwards_that_shrinks_is_worse() -> None:
     better = dict(zip(names, (2, 2, 1, -2), strict=True))
     columns = Columns([Figure(name=n, value=None, better=b) for n, b in better.items()], Tolerances())
     changes = columns.compare(np.array([10.0, -10.0, -10.0, -10.0]), np.array([8.0, -8.0, -8.0, -8.0]))
-    assert {one.figure: one.worse for one in changes} == {
-        "up": True, "down": True, "signed": False, "peak": False,
-    }  # fmt: skip
+    worse = {one.figure: one.worse for one in changes}
+    assert worse == {"up": True, "down": True, "signed": False, "peak": False}
 
 
 def test_a_figure_of_the_corners_has_its_corner(monkeypatch) -> None:

@@ -114,11 +114,8 @@ AMBER = load_design("ilr33-amber")
 def test_a_value_below_zero_has_both_signs(value: float) -> None:
     design = AMBER.with_values({"friction.offset_torque": value})
     one = next(s for s in followed(design).free if s["path"] == "friction.offset_torque")
-    ends = (-SLIDER_FACTOR * abs(value), SLIDER_FACTOR * abs(value))
-    if value < 0.0:
-        assert (one["low"], one["high"]) == pytest.approx(ends)
-    else:
-        assert (one["low"], one["high"]) == pytest.approx((value / SLIDER_FACTOR, ends[1]))
+    low = SLIDER_FACTOR * value if value < 0.0 else value / SLIDER_FACTOR
+    assert (one["low"], one["high"]) == pytest.approx((low, SLIDER_FACTOR * abs(value)))
 
 
 def test_whole_numbers_and_all_values_lie_inside() -> None:

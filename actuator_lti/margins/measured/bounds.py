@@ -75,6 +75,11 @@ class Bounds:
     turn: Real  # (m - 1,): measured phase from point to point, rad, without the extra delay
     lost: Mask  # (m,): points whose phase is lost in noise
 
+    def too_coarse(self, omega: Real) -> str:
+        """Where the first of the unresolved intervals lies."""
+        k = int(self.unresolved.argmax())
+        return f"too coarse for the damping between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s"
+
 
 def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:
     """Bounds of L exp(-j omega delay_s), all arrays (m,), m >= 2."""

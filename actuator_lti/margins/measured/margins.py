@@ -219,10 +219,9 @@ def _reason(omega: Real, result: Bounds) -> str:
     reason = "measured points: the figures lie in their ranges, stability is not determined"
     if not result.unresolved.any():
         return reason
-    k, count = int(result.unresolved.argmax()), np.count_nonzero(result.unresolved)
-    where = f"between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s"
+    count = np.count_nonzero(result.unresolved)
     more = f" and in {count - 1} more places" if count > 1 else ""
-    return f"{reason}; too coarse for the damping {where}{more}: margins there may be missing"
+    return f"{reason}; {result.too_coarse(omega)}{more}: margins there may be missing"
 
 
 def _hidden(omega: Real, result: Bounds) -> list[str]:
