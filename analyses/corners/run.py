@@ -119,10 +119,9 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
         name, values = f"worst {QUANTITIES[quantity].words}", worst_ends(design, quantity)
         if values:
             worse = "lowers" if QUANTITIES[quantity].better > 0 else "raises"
-            nominal = {path: float(design.parameters[path].value) for path in values}
-            up = [path for path, value in values.items() if value > nominal[path]]
-            down = [path for path, value in values.items() if value < nominal[path]]
-            ends = [f"{', '.join(paths)} {way}" for paths, way in ((up, "high"), (down, "low")) if paths]
+            away = {path: value - float(design.parameters[path].value) for path, value in values.items()}
+            sides = [([path for path in away if way * away[path] > 0.0], way) for way in (1, -1)]
+            ends = [f"{', '.join(paths)} {'high' if way > 0 else 'low'}" for paths, way in sides if paths]
             words = f"each tolerance at the end that {worse} it: {'; '.join(ends)}"
             yield name, words, with_values(design, values)
 
@@ -136,8 +135,7 @@ def at_temperature(design: Design, degC: float) -> Design:
 def _thickened(design: Design, factor: float) -> Design:
     """The design with its viscous friction times a factor."""
     friction, load = design.friction, design.load
-    back = friction.viscous_reverse_Nms_rad
-    back = None if back is None else factor * back
+    back = None if friction.viscous_reverse_Nms_rad is None else factor * friction.viscous_reverse_Nms_rad
     viscous = factor * friction.viscous_Nms_rad
     if load.friction is not None:
         behind = replace(load.friction, viscous_Nms_rad=factor * load.friction.viscous_Nms_rad)

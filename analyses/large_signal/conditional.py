@@ -20,9 +20,10 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import stage_gain
+from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
@@ -106,8 +107,6 @@ def saturation_gain(ratio: float) -> float:
 
 def saturation_ratio(gain: float) -> float:
     """Amplitude over limit at which saturation has so much gain left (0 < gain <= 1)."""
-    from scipy.optimize import brentq
-
     return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
 
 
@@ -266,23 +265,17 @@ def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 
 
 def _standing(design: Design) -> float:
     """Error (output, rad) that dry friction can hold up against a controller without integral."""
-    control, friction, motor = design.controller, design.friction, design.effective_motor
-    velocity = control.velocity
-    gain = abs(stage_gain(control.position_loop.gain, control.position_loop.law))
-    gain *= abs(stage_gain(velocity.gain, velocity.law)) if velocity else 1.0
+    velocity, friction, behind = design.controller.velocity, design.friction, design.load.friction
+    gain = abs(float(torque_gain_Nm_rad(design)))
     if gain == 0.0:
         return inf
-    if control.velocity is not None and control.velocity.integral_time_s is not None:
+    if velocity is not None and velocity.integral_time_s is not None:
         gain *= 10.0  # the integral brings it on in time
-    per_unit = motor.source_gain_Nm_V or motor.torque_constant_Nm_A or 1.0
-    if motor.resistance_ohm is not None and control.current is None:
-        per_unit /= motor.resistance_ohm
     dry = friction.dry_Nm(0.0) * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
     dry += max((point.torque_Nm for point in friction.points), default=0.0)
-    if design.load.friction is not None:
-        dry += design.load.friction.dry_torque_Nm / design.ratio_to_coupling
+    dry += 0.0 if behind is None else behind.dry_torque_Nm / design.ratio_to_coupling
     play = 0.0 if design.coupling is None else design.coupling.play_rad / design.ratio_behind_coupling
-    return 2.0 * dry / (per_unit * gain) / design.total_ratio + play
+    return 2.0 * dry / gain + play
 
 
 def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> Rows:

@@ -123,7 +123,7 @@ def amplitude_map(
     `MOST_TICKS`.
     """
     part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
-    given, counts = counts, tuple(max(int(part * count), 2) for count in counts)
+    given, counts = counts, (max(int(part * counts[0]), 2), max(int(part * counts[1]), 2))
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import reduce
 from itertools import pairwise
 from math import exp, log, nan, pi
 from typing import Literal
@@ -206,10 +207,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
 def mode_at(design: Design, at: Operating) -> Mode | None:
     """The least damped oscillation of the linear loop at an operating point; None without any."""
     program = TickProgram(wire(design, at), "position")
-    A = np.eye(len(program.states))
-    for k in range(program.ticks):
-        A = program.tick(k).A @ A
-    return _oscillation(A, program.states, design)
+    return _oscillation([program.tick(k).A for k in range(program.ticks)], program.states, design)
 
 
 def output_of(design: Design, state: dict[str, complex]) -> complex:
@@ -267,10 +265,8 @@ def _border_at_output(free: Design) -> tuple[float, Mode] | None:
     if not np.isfinite(border):  # none, or the linear loop is unstable
         return None
     blocks = point_blocks(wire(free, Operating()), point)
-    A = np.eye(len(blocks[0].states))
-    for block in blocks:
-        A = (block.A - border * block.B @ block.C) @ A
-    mode = _oscillation(A, blocks[0].states, free, at_border=True)
+    ticks = [block.A - border * block.B @ block.C for block in blocks]
+    mode = _oscillation(ticks, blocks[0].states, free, at_border=True)
     return None if mode is None else (border, mode)
 
 
@@ -287,13 +283,11 @@ def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
         control = replace(free.controller, velocity=replace(velocity, filters=filters))
         programs.append(TickProgram(wire(replace(free, controller=control), Operating()), "position"))
     plain, double = programs
-    ticks = [(plain.tick(k).A, double.tick(k).A) for k in range(plain.ticks)]
+    both = [(plain.tick(k).A, double.tick(k).A) for k in range(plain.ticks)]
 
     def mode(log_gain: float, _: Mode | None) -> Mode | None:
-        A = np.eye(len(plain.states))
-        for one, two in ticks:
-            A = (one + (exp(log_gain) - 1.0) * (two - one)) @ A
-        return _oscillation(A, plain.states, free)
+        ticks = [one + (exp(log_gain) - 1.0) * (two - one) for one, two in both]
+        return _oscillation(ticks, plain.states, free)
 
     found = next(kept_up(mode, np.log(np.geomspace(1.0, MOST_GAIN, GAINS))), None)
     if found is None or found[2]:  # unstable from the first
@@ -302,10 +296,10 @@ def _border_of_speed(free: Design) -> tuple[float, Mode] | None:
 
 
 def _oscillation(
-    A: np.ndarray, states: Sequence[str], design: Design, *, at_border: bool = False
+    ticks: Sequence[np.ndarray], states: Sequence[str], design: Design, *, at_border: bool = False
 ) -> Mode | None:
-    """The largest eigenvalue that turns, or that nearest to the unit circle; None without any."""
-    values, vectors = np.linalg.eig(A)
+    """The largest eigenvalue of ticks that turns, or that nearest to the unit circle; None without any."""
+    values, vectors = np.linalg.eig(reduce(lambda A, tick: tick @ A, ticks))
     turning = np.flatnonzero(np.angle(values) > _TURNS)
     if not turning.size:
         return None

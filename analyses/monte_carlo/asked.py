@@ -13,7 +13,6 @@ from analyses.request import LOAD, POINT, OnMachines, Option
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from analyses.monte_carlo.result import MonteCarloResult
-    from analyses.monte_carlo.run import MonteCarloSettings
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,19 +48,6 @@ class Asked(OnMachines):
         if self.at_least is not None and not 0.0 <= self.at_least <= 1.0:
             raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
 
-    def settings(self, design: Design) -> MonteCarloSettings:
-        """What the study is to do."""
-        from actuator_lti.batch import variable_paths
-        from analyses.monte_carlo.run import MonteCarloSettings
-        from analyses.monte_carlo.task import StepCheck
-        from analyses.studies.sampling import read_table
-
-        table = None if self.from_samples is None else read_table(self.from_samples, variable_paths(design))
-        check = None if self.step is None else StepCheck(self.step, self.duration_s, self.load_Nm)
-        return MonteCarloSettings(
-            self.samples, self.seed, self.operating_point, self.load_Nm, check, table, self.worst  # type: ignore[arg-type]
-        )  # fmt: skip
-
 
 def study(
     design: Design, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
@@ -70,13 +56,23 @@ def study(
 
     Raises `InputError`: if nothing has a tolerance, or what is asked is no study.
     """
-    from analyses.monte_carlo.run import monte_carlo, sample_folder
-    from analyses.monte_carlo.task import replay
-    from analyses.studies.sampling import sampler_of
+    from actuator_lti.batch import variable_paths
+    from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo, sample_folder
+    from analyses.monte_carlo.task import StepCheck, replay
+    from analyses.studies.sampling import read_table, sampler_of
 
-    settings = asked.settings(design)
+    table = None if asked.from_samples is None else read_table(asked.from_samples, variable_paths(design))
+    settings = MonteCarloSettings(
+        samples=asked.samples,
+        seed=asked.seed,
+        operating_point=asked.operating_point,  # type: ignore[arg-type]
+        load_Nm=asked.load_Nm,
+        step=None if asked.step is None else StepCheck(asked.step, asked.duration_s, asked.load_Nm),
+        table=table,
+        worst_cases=asked.worst,
+    )
     if asked.sample is not None:
-        return replay(design, sampler_of(design, seed=settings.seed, table=settings.table), asked.sample)
+        return replay(design, sampler_of(design, seed=settings.seed, table=table), asked.sample)
     folder = sample_folder(design, settings, out)
     result = monte_carlo(design, folder, settings, engine=asked.engine, progress=progress)
     return replace(result, at_least=asked.at_least)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from os import PathLike
@@ -13,7 +13,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Requirement
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
@@ -22,6 +22,7 @@ from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requir
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import (
+    Element,
     Placed,
     RuleGains,
     checked,
@@ -33,6 +34,7 @@ from analyses.tuning.start import (
 )
 
 Progress = Callable[[int, int], None]
+Tried = tuple[Placed, Problem, Solution]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
 
 
@@ -68,17 +70,10 @@ def tune(
     tell = progress or (lambda done, total: None)
     tell(0, stages)
     rules = rule_gains(design)
-    tried: list[tuple[Placed, Problem, Solution]] = []
-    for k, elements in enumerate(choices):
-        placed, last = place(design, elements), k + 1 == len(choices)
-        left = MOST_DESIGNS - sum(one.evaluations for _, one, _ in tried)
-        most = max(left if last else left // 2, MOST_DESIGNS // 12)  # designs that this choice may look at
-        problem = problem_of(placed.design, wanted, rules.values, placed.variables, most)
-        seek = least_change if settings.aim == "least-change" else solve
-        tried.append((placed, problem, seek(problem, give_up=not last)))
-        tell(k + 1, stages)
-        if tried[-1][2].slack >= 0.0:
-            break
+    tried: list[Tried] = []
+    for one in _tried(design, wanted, choices, rules, settings.aim):
+        tried.append(one)
+        tell(len(tried), stages)
     placed, problem, solution = max(tried, key=lambda one: one[2].slack)
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
     result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
@@ -111,6 +106,26 @@ def tune(
         placed=placed.elements,
         confirmed=confirmed,
     )
+
+
+def _tried(
+    design: Design,
+    wanted: tuple[Requirement, ...],
+    choices: Sequence[tuple[Element, ...]],
+    rules: RuleGains,
+    aim: Aim,
+) -> Iterator[Tried]:
+    """What each choice of elements comes to, up to the first that does."""
+    seek, left = least_change if aim == "least-change" else solve, MOST_DESIGNS
+    for elements in choices:
+        placed, last = place(design, elements), elements == choices[-1]
+        most = max(left if last else left // 2, MOST_DESIGNS // 12)  # designs that it may look at
+        problem = problem_of(placed.design, wanted, rules.values, placed.variables, most)
+        solution = seek(problem, give_up=not last)
+        left -= problem.evaluations
+        yield placed, problem, solution
+        if solution.slack >= 0.0:
+            return
 
 
 def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:

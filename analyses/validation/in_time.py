@@ -116,9 +116,8 @@ def _agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: fl
     """What a run by its size comes to, over that of none, and what two successive sizes differ in.
 
     The largest size of which two agree well enough, else where they agree best; a size that ends in an event
-    is none.  A tangent's steps (`nonlinear.bench.differences`) stop at the first that agrees no better, as
-    they begin where what bends says.  How far a whole run moves is not known before it is run: large ones may
-    pass many periods of a torque, and agree no better twice.
+    is none.  A tangent's steps (`nonlinear.bench.differences`) begin where what bends says.  How far a whole
+    run moves is not known before it is run: large ones may pass many periods of a torque.
     """
     calm, large = run(0.0), setup.range if np.isfinite(setup.range) else 1.0
     last: Numbers | None = None

@@ -12,6 +12,7 @@ from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_series import rounding_of, slopes_of
+from nonlinear._kernels.elastic_steps import COEFFICIENTS, COLUMNS, ROWS
 
 
 @kernel
@@ -214,19 +215,14 @@ def load_rest_guard(p, s, sign, event):
 @kernel
 def put_curvature(p, s, mode, g):
     """Bound of |g''| over the norm of x': the norm of G A dual to that of the energy."""
-    gi, gw, gv, gd = s[g + at.G_I], s[g + at.G_W], s[g + at.G_V], s[g + at.G_D]
-    row_i = gi * p[mode + at.A_II] + gw * p[mode + at.A_WI]
-    row_w = gi * p[mode + at.A_IW] + gw * p[mode + at.A_WW] + gv * p[mode + at.A_VW] + gd * p[mode + at.A_DW]
-    row_v = gw * p[mode + at.A_WV] + gv * p[mode + at.A_VV] + gd * p[mode + at.A_DV]
-    row_d = gw * p[mode + at.A_WD] + gv * p[mode + at.A_VD]
     total = 0.0
-    at_weight = mode + at.MODE_WEIGHT
-    if p[at_weight] > 0.0:
-        total += (row_i / p[at_weight]) * (row_i / p[at_weight])
-    total += (row_w / p[at_weight + 1]) * (row_w / p[at_weight + 1])
-    total += (row_v / p[at_weight + 2]) * (row_v / p[at_weight + 2])
-    if p[at_weight + 3] > 0.0:
-        total += (row_d / p[at_weight + 3]) * (row_d / p[at_weight + 3])
+    for column in range(4):
+        row, weight = 0.0, p[mode + at.MODE_WEIGHT + column]
+        for j in range(COEFFICIENTS):
+            if COLUMNS[j] == column:
+                row += s[g + ROWS[j]] * p[mode + j]
+        if weight > 0.0:
+            total += (row / weight) * (row / weight)
     s[g + at.G_CURVE] = math.sqrt(total)
 
 

@@ -50,7 +50,7 @@ def simulate_many(
     Examples
     --------
     >>> from actuator_lti.design import load_design
-    >>> from nonlinear import commands
+    >>> from nonlinear import Reducers, Run, commands
     >>> design = load_design("ilr33-amber")
     >>> steps = [Run(design=design, command=commands.step(a), duration_s=0.2,
     ...              reducers=Reducers(step_target_rad=a)) for a in (0.01, 0.02)]

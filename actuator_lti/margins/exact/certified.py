@@ -38,7 +38,7 @@ def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = Non
     if below and abs(above + below) <= abs(below) * 2 * ULP // (1 << 53):
         raise InputError("1 + L is zero at infinite frequency: the closed loop is not well posed")
     others = neighbours(given, loop)
-    poles, hidden, figures = _poles(loop, others), loop.hidden_modes, None
+    poles, hidden, figures = _poles(given, loop, others), loop.hidden_modes, None
     found = Shared((), (), problem=poles.problem)
     if poles.problem is None:
         found = shared(*(crossings(each) for each in (loop, *others)))
@@ -75,13 +75,13 @@ class _Poles:
     note: str = ""  # what 8 ulp of the entries change of these numbers
 
 
-def _poles(base: ExactLoop, others: list[ExactLoop]) -> _Poles:
+def _poles(given: Given, base: ExactLoop, others: list[ExactLoop]) -> _Poles:
     counts = {(f.unstable, f.on_border, f.hidden_modes.at_zero) for f in (base, *others)}
     closed = _values(base, closed=True)
     size = np.sort(np.abs(closed[closed != 0.0]))
     if len(counts) == 1 and not (size.size and size[0] < _TOLD * size[size.size // 2]):
         return _Poles(*counts.pop())
-    return _by_movement(base, others, closed)
+    return _by_movement(base, others, closed, scattered=given.A is None and base.sampled)
 
 
 def _values(loop: ExactLoop, closed: bool) -> Complex:
@@ -90,12 +90,13 @@ def _values(loop: ExactLoop, closed: bool) -> Complex:
     return np.array(seen.values + loop.hidden_modes.values, dtype=complex)
 
 
-def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex) -> _Poles:
+def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex, scattered: bool) -> _Poles:
     """Count with each pole's own error: how far it moves among the neighbours.
 
     On the border is a pole that lies there exactly; one that the neighbours only carry across it may lie on
-    either side, which is no answer, unless others lie in the right half plane whatever is meant. A hidden
-    mode at zero frequency alone is known by its place.
+    either side, which is no answer, unless others lie in the right half plane whatever is meant (of
+    coefficients in z, which scatter all poles near one, that is not asked: their crossings are hardly ever
+    told). A hidden mode at zero frequency alone is known by its place.
     """
     radius = _movements(closed, [_values(f, closed=True) for f in others])
     size, exact = np.abs(closed), _exactly_on_border(base, closed)
@@ -105,7 +106,7 @@ def _by_movement(base: ExactLoop, others: list[ExactLoop], closed: Complex) -> _
     at_dc = near & ((radius > _SHARP * size) | (size == 0.0)) & (radius <= _SHARP * np.array(beyond))
     unsure, hidden = int(np.count_nonzero(at_dc & ~exact)), int(np.count_nonzero(at_dc))
     across = bool(np.count_nonzero(near & ~exact & ~at_dc))
-    if unstable and (across or unsure > 1):
+    if unstable and not scattered and (across or unsure > 1):
         return _Poles(base.unstable, base.on_border, base.hidden_modes.at_zero, note=_COUNTED)
     if across:
         return _Poles(problem=ACROSS)
