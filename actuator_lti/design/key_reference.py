@@ -8,9 +8,9 @@ from typing import Annotated
 
 from actuator_lti.design.data_sheet import FROM, SHEET
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.fields import ALL_FIELDS, field_of
+from actuator_lti.design.fields import ALL_FIELDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
-from actuator_lti.design.sections import SECTIONS
+from actuator_lti.design.sections import RECORDS, SECTIONS
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,15 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     return tuple(_entry(field, Structure(axis)) for field in listed)
 
 
+def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
+    """The keys of the lists at the end of a file: requirements, waivers, correlations, facts."""
+    return tuple(_entry(field, Structure(axis)) for record in RECORDS for field in fields_in(record.template))
+
+
 def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
     same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
+    unit = "of its quantity" if field.kind == "limit" else unit
     default = "" if field.required else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
 

@@ -11,7 +11,7 @@ from analyses.request import Option
 
 if TYPE_CHECKING:
     from actuator_lti.design.key_reference import Explained, KeyEntry
-    from actuator_lti.design.model import Design
+    from actuator_lti.design.model import Axis, Design
     from actuator_lti.drive.sheet_figures import SheetFigure
 
 
@@ -58,7 +58,7 @@ def keys(asked: Asked) -> Keys:
         If none does, or the design that is to be explained is refused.
     """
     from actuator_lti.design import load_design
-    from actuator_lti.design.key_reference import explained, key_reference
+    from actuator_lti.design.key_reference import explained, key_reference, record_reference
     from actuator_lti.drive.sheet_figures import sheet_figures
 
     text = asked.match.lower()
@@ -66,7 +66,8 @@ def keys(asked: Asked) -> Keys:
         design = load_design(asked.explain)
         figures = tuple(one for one in sheet_figures(design) if text in one.name.lower())
         return Keys(tuple(item for item in explained(design) if text in item.path), design, figures)
-    listed = key_reference("linear" if asked.linear else "rotary")
+    axis: Axis = "linear" if asked.linear else "rotary"
+    listed = (*key_reference(axis), *record_reference(axis))
     found = tuple(key for key in listed if _is_called(key, text))
     if not found:
         raise InputError(
