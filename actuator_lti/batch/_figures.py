@@ -195,12 +195,6 @@ def closed_size(rr, ri, x, lead):
 
 
 @kernel
-def _closed_at(k, xs, rs, lead):
-    """|T| at a scanned point."""
-    return closed_size(rs[2 * k], rs[2 * k + 1], xs[k], lead)
-
-
-@kernel
 def falls_after(after, mode, count, xs, rs, ss, level, lead):
     """The next interval of the scan in which a quantity falls through zero; the last point: there is none."""
     k = after + 1
@@ -219,8 +213,7 @@ def zero_in(k, mode, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged
     """The angle in an interval of the scan where a quantity is zero, and L there."""
     f1 = quantity_at(mode, k, xs, rs, ss, level, lead)
     f2 = quantity_at(mode, k + 1, xs, rs, ss, level, lead)
-    x, rr, ri = root(mode, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
-    return x, rr, ri
+    return root(mode, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
 
 
 @kernel
@@ -228,14 +221,16 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
     best = 0.0
     for k in range(count):
-        size = _closed_at(k, xs, rs, lead)
+        size = closed_size(rs[2 * k], rs[2 * k + 1], xs[k], lead)
         if size > best:
             best = size
             row[PEAK_T_X] = xs[k]
     row[PEAK_T] = best
     k = falls_after(-1, RESONANCE, count, xs, rs, ss, 1.0, lead)
     while k < count - 1:
-        if not max(_closed_at(k, xs, rs, lead), _closed_at(k + 1, xs, rs, lead)) < 0.7 * best:
+        before = closed_size(rs[2 * k], rs[2 * k + 1], xs[k], lead)
+        after = closed_size(rs[2 * k + 2], rs[2 * k + 3], xs[k + 1], lead)
+        if not max(before, after) < 0.7 * best:
             x, rr, ri = zero_in(k, RESONANCE, xs, rs, ss, 1.0, lead, n, h, b, c, work, state, exchanged)
             size = closed_size(rr, ri, x, lead)
             if size > row[PEAK_T]:

@@ -66,8 +66,7 @@ def states_at(n, a, b, c, transposed, x, work, state):
     for k in range(n):
         _largest_first(n, k, work, state)
         _cleared(n, k, work, state)
-    response_r, response_i = substituted(n, c, work, state)
-    return response_r, response_i
+    return substituted(n, c, work, state)
 
 
 @kernel

@@ -123,16 +123,14 @@ def _again(n, c, work, state, exchanged):
         carry_i = after_i - (factor_r * carry_i + factor_i * carry_r)
         carry_r = next_r
     state[2 * n - 2], state[2 * n - 1] = carry_r, carry_i
-    total_r, total_i = substituted(n, c, work, state)
-    return total_r, total_i
+    return substituted(n, c, work, state)
 
 
 @kernel
 def response_at(n, h, b, c, x, work, state, exchanged):
     """L alone at the angle x, with the bits of `evaluate`."""
     _eliminated(n, h, b, x, work, state, exchanged)
-    response_r, response_i = substituted(n, c, work, state)
-    return response_r, response_i
+    return substituted(n, c, work, state)
 
 
 @kernel

@@ -171,10 +171,11 @@ def _pair(
     item: Correlation, path: str, known: list[str], seen: set[frozenset[str]], matrix: np.ndarray
 ) -> Iterator[Refusal]:
     """One correlation, which is put into the matrix of all."""
-    unknown = [key for key in ("first", "second") if getattr(item, key) not in known]
-    for key in unknown:
+    named = {"first": item.first, "second": item.second}
+    unknown = {key: one for key, one in named.items() if one is not UNREAD and one not in known}
+    for key, one in unknown.items():
         allowed = f"keys with a tolerance ({', '.join(known) or 'none, no value has a tolerance'})"
-        yield f"{path}.{key}", shown(getattr(item, key)), f"allowed: {allowed}"
+        yield f"{path}.{key}", shown(one), f"allowed: {allowed}"
     pair = frozenset((item.first, item.second))
     if len(pair) == 1 or pair in seen:
         yield path, f'"{item.first}", "{item.second}"', "allowed: each pair once"

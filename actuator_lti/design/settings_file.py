@@ -121,8 +121,7 @@ def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None 
     values = objects_of_xml(text, where)
     if not values:
         raise InputError(
-            "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC",
-            where=where,
+            "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC", where=where
         )
     return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor, where)
 

@@ -78,21 +78,24 @@ class Drive:
         own = self.design.controller.own_law
         return own is not None and own[0] == stage
 
-    def around(self, stage: str) -> tuple[str, str]:
-        """Signals behind and in front of the place where the loop of a stage is broken."""
-        point = self.target[stage]
-        return (point, f"{point}_returned") if self.has_own_law(stage) else (ERRORS[stage], MEASURED[stage])
+    def around(self, place: str) -> tuple[str, str]:
+        """Signals behind and in front of where the loop of a stage, or at a break point, is broken."""
+        if place in self.stages and not self.has_own_law(place):
+            return ERRORS[place], MEASURED[place]
+        point = self.target.get(place, place)
+        return point, f"{point}_returned"
 
-    def cut_of(self, stage: str) -> tuple[str, str, Any]:
-        """Where the loop of a stage is cut, the signal that comes back there, and its factor.
+    def cut_of(self, place: str) -> tuple[str, str, Any]:
+        """Where the loop of a stage, or at a break point, is cut, what comes back there, and its factor.
 
         With a law of one's own it is cut at what the stage drives: one loop, whatever the law takes.
         """
-        if self.has_own_law(stage):
-            return self.target[stage], self.target[stage], -1.0
-        if stage == "position":
-            return ERRORS[stage], "output", self.ratio
-        return ERRORS[stage], MEASURED[stage], 1.0
+        if place not in self.stages or self.has_own_law(place):
+            point = self.target.get(place, place)
+            return point, point, -1.0
+        if place == "position":
+            return ERRORS[place], "output", self.ratio
+        return ERRORS[place], MEASURED[place], 1.0
 
     def period_s(self, stage: str) -> Any:
         """Period T of a stage in s."""

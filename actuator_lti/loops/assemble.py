@@ -112,7 +112,7 @@ def loops_at(
 
         more = (ALL if form == "continuous" else frozenset(),)
     opened = {stage: wired.inside(stage) if inner_loops == "open" else () for stage in wired.stages}
-    stages = {stage: time.stage_loop(wired, stage, *more, opened[stage]) for stage in wired.stages}
+    stages = {stage: time.loop(wired, stage, *more, opened[stage]) for stage in wired.stages}
     whole, sampled_form = at.rotor == "free", form == "sampled"
     return Loops(
         design=design,
@@ -122,7 +122,7 @@ def loops_at(
         current=stages.get("current"),
         velocity=stages.get("velocity"),
         position=stages.get("position"),
-        break_points={point: time.point_loop(wired, point, *more) for point in wired.points},
+        break_points={point: time.loop(wired, point, *more) for point in wired.points},
         limiters=time.limiters(wired, *more) if whole else {},
         plain_response=time.reference_to_output(wired, *more) if whole else None,
         moment_system=partial(time.moment_to_output, wired, *more) if whole else None,

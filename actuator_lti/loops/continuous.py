@@ -93,29 +93,23 @@ def finished(system: PlainDelaySystem, name: str, source: str, signal: str) -> A
     return system.to_state_space()
 
 
-def _loop(wired: Drive, loop: PlainDelaySystem, name: str, point: str) -> Loop:
-    parts = (loop, loop.feedback(), static(np.eye(1)).feedback(loop))
-    return loop_of(wired, name, point, parts, finished)
-
-
-def stage_system(
-    wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()
+def open_loop(
+    wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = ()
 ) -> PlainDelaySystem:
-    """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent."""
-    cut, signal, scale = wired.cut_of(stage)
-    return joined(systems(FlowProgram(wired, stage, cut, opened, delays).flow(), "cut", signal, scale))
+    """The open loop of a stage at its own error, inner loops closed (unless opened), outer ones absent.
+
+    Or that at a break point with all other loops closed.
+    """
+    cut, signal, scale = wired.cut_of(place)
+    outer = place if place in wired.stages else wired.outermost
+    return joined(systems(FlowProgram(wired, outer, cut, opened, delays).flow(), "cut", signal, scale))
 
 
-def stage_loop(wired: Drive, stage: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
-    """The loop of a stage, see `stage_system`."""
-    return _loop(wired, stage_system(wired, stage, delays, opened), stage, wired.target[stage])
-
-
-def point_loop(wired: Drive, point: str, delays: frozenset[str]) -> Loop:
-    """The loop seen at a break point with all other loops closed."""
-    flow = FlowProgram(wired, wired.outermost, point, (), delays).flow()
-    loop = joined(systems(flow, "cut", point, scale=-1.0))
-    return _loop(wired, loop, f"at {point}", point)
+def loop(wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
+    """The same with its closed loop and its sensitivity."""
+    system = open_loop(wired, place, delays, opened)
+    parts = (system, system.feedback(), static(np.eye(1)).feedback(system))
+    return loop_of(wired, place, parts, finished)
 
 
 def _whole(wired: Drive, delays: frozenset[str]) -> Flow:

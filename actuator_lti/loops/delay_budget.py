@@ -23,9 +23,9 @@ from actuator_lti.drive.blocks import centre_rad_s
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.continuous import stage_system
+from actuator_lti.loops.continuous import open_loop
 from actuator_lti.loops.flow import ALL
-from actuator_lti.loops.sampled import stage_loop
+from actuator_lti.loops.sampled import loop
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design, Filter
@@ -157,12 +157,12 @@ def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
 
 
 def _continuous(wired: Drive, stage: str, delays: frozenset[str], omega: np.ndarray) -> np.ndarray:
-    return np.asarray(stage_system(wired, stage, delays)(1j * omega))
+    return np.asarray(open_loop(wired, stage, delays)(1j * omega))
 
 
 def _sampled(wired: Drive, stage: str, omega: np.ndarray) -> np.ndarray:
-    loop = stage_loop(wired, stage).plain_open
-    return np.asarray(loop(np.exp(1j * omega * loop.dt)))
+    system = loop(wired, stage).plain_open
+    return np.asarray(system(np.exp(1j * omega * system.dt)))
 
 
 def _from_low(values: np.ndarray) -> float:

@@ -112,15 +112,16 @@ class Loop:
 
 
 def loop_of(
-    wired: Drive, name: str, point: str, parts: tuple[Any, Any, Any],
+    wired: Drive, place: str, parts: tuple[Any, Any, Any],
     named: Callable[[Any, str, str, str], Any], period_s: float | None = None, *, periodic: bool = False,
 ) -> Loop:  # fmt: skip
-    """A loop of L, T and S; ``named`` gives each system its name, input and output."""
-    error, measured = wired.around(name) if name in wired.stages else (point, f"{point}_returned")
+    """The loop of a stage, or at a break point, of L, T and S; ``named`` names each, its input and output."""
+    error, measured = wired.around(place)
+    name = place if place in wired.stages else f"at {place}"
     label, unit = name.replace(" ", "_"), wired.unit(error)
     return Loop(
         name=name,
-        break_point=point,
+        break_point=wired.target.get(place, place),
         plain_open=named(parts[0], f"{label}_open_loop", error, measured),
         plain_closed=named(parts[1], f"{label}_closed_loop", "reference", measured),
         plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error),

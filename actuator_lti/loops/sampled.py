@@ -21,12 +21,6 @@ def _system(block: Block, name: str, source: str, signal: str, period_s: float) 
     return PlainSystem(block.A, block.B, block.C, block.D, period_s, name, source, signal, block.states)
 
 
-def _loop(wired: Drive, blocks: list[Block], name: str, point: str) -> Loop:
-    block, period = fundamental(blocks).shown(), wired.period_s(wired.producer(point))
-    parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
-    return loop_of(wired, name, point, parts, named, period, periodic=len(blocks) > 1)
-
-
 def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list[Block]:
     """The loop of a stage broken at its own error, inner loops closed (unless opened), outer ones absent.
 
@@ -36,14 +30,13 @@ def stage_blocks(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> list
     return phase_blocks(TickProgram(wired, stage, cut, opened), wired.interval[stage], "cut", signal, scale)
 
 
-def stage_loop(wired: Drive, stage: str, opened: tuple[str, ...] = ()) -> Loop:
-    """The loop of a stage, see `stage_blocks`."""
-    return _loop(wired, stage_blocks(wired, stage, opened), stage, wired.target[stage])
-
-
-def point_loop(wired: Drive, point: str) -> Loop:
-    """The loop seen at a break point with all other loops closed."""
-    return _loop(wired, point_blocks(wired, point), f"at {point}", point)
+def loop(wired: Drive, place: str, opened: tuple[str, ...] = ()) -> Loop:
+    """The loop of a stage, see `stage_blocks`, or at a break point with all other loops closed."""
+    is_stage = place in wired.stages
+    blocks = stage_blocks(wired, place, opened) if is_stage else point_blocks(wired, place)
+    block, period = fundamental(blocks).shown(), wired.period_s(place if is_stage else wired.producer(place))
+    parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
+    return loop_of(wired, place, parts, named, period, periodic=len(blocks) > 1)
 
 
 def reference_to_output(wired: Drive) -> PlainSystem:

@@ -104,6 +104,14 @@ def correlate_record(
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+    driven = needed_command(design, record, command)
+    outermost = driven.stage == design.controller.outermost
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
+    used[driven.signal] = "command" if outermost else f"{driven.stage} command"
+    if design.effective_motor.source_gain_Nm_V is None:
+        used["supply"] = "supply"
+    if "force" in measured and "force" not in record.signals:
+        used["voltage"] = "force, by the source's gain"
     signals = {
         name: compare_signals(name, KNOWN_UNITS[name], record.time_s, values, modelled[name])
         for name, values in measured.items()
@@ -117,23 +125,9 @@ def correlate_record(
         counts=str(record.counts),
         sha256=record.sha256,
         source=record,
-        used=_used(design, record, measured, command),
+        used={name: text for name, text in used.items() if name in record.signals},
         findings=findings,
     )
-
-
-def _used(
-    design: Design, record: Record, measured: Mapping[str, FloatArray], command: str | None
-) -> dict[str, str]:
-    driven = needed_command(design, record, command)
-    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
-    outermost = driven.stage == design.controller.outermost
-    used[driven.signal] = "command" if outermost else f"{driven.stage} command"
-    if design.effective_motor.source_gain_Nm_V is None:
-        used["supply"] = "supply"
-    if "force" in measured and "force" not in record.signals:
-        used["voltage"] = "force, by the source's gain"
-    return {name: text for name, text in used.items() if name in record.signals}
 
 
 def measured_signals(
@@ -182,19 +176,16 @@ def model_signals(
     notes = [] if notes is None else notes
     notes.extend(driven.notes)
     time = record.time_s - record.time_s[0]
-    supplied = supply_of(driven, record, time)
-    if supplied is not None:
-        notes.append(supplied.note)
+    supply = supply_of(driven, record, time, notes)
     model, load = load_of(driven.design, record, time, notes)
     period = model.controller.period_s
     duration = float(time[-1]) + 2.0 * period
-    go = partial(
+    go: Callable[..., Trajectory] = partial(
         simulate,
         model,
         commands.sampled(*at_ticks(driven, time, duration), where=record.name),
         load_Nm=load,
-        supply=None if supplied is None else supplied.voltage,
-        supply_scales=supplied is not None and supplied.scales,
+        **supply,
     )
     initial, moving = first_states(driven, record, measured)
     if moving is not initial:

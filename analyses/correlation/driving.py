@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,7 +19,6 @@ from analyses.records.record import Record
 
 if TYPE_CHECKING:
     from nonlinear import State
-    from nonlinear.commands import Command
     from nonlinear.loads import LoadMoment
 
 
@@ -164,17 +163,8 @@ def steps_of(values: FloatArray) -> BoolArray:
     return np.asarray(moves & ~around[:-2] & ~around[2:])
 
 
-@dataclass(frozen=True, kw_only=True)
-class Supplied:
-    """The bus voltage over time, and whether the controller's output is a share of it."""
-
-    voltage: Command
-    scales: bool
-    note: str
-
-
-def supply_of(driven: Driven, record: Record, time_s: FloatArray) -> Supplied | None:
-    """The recorded supply as the simulator takes it; None without one, or for an ideal source.
+def supply_of(driven: Driven, record: Record, time_s: FloatArray, notes: list[str]) -> dict[str, Any]:
+    """The recorded supply as `simulate` takes it; nothing without one, or for an ideal source.
 
     It limits the voltage. Where a loop sets the voltage itself (no current loop), that voltage is a duty
     ratio of the bus, so the supply scales it too: the loop's gain is the design's at ``limits.voltage``. A
@@ -184,15 +174,12 @@ def supply_of(driven: Driven, record: Record, time_s: FloatArray) -> Supplied | 
 
     design = driven.design
     if "supply" not in record.signals or design.effective_motor.source_gain_Nm_V is not None:
-        return None
-    values = record["supply"]
-    scales = bool(
-        design.controller.stages and design.controller.current is None and isfinite(design.limits.voltage_V)
-    )
+        return {}
+    values, control = record["supply"], design.controller
+    scales = bool(control.stages and control.current is None and isfinite(design.limits.voltage_V))
     part = " and scales the loop's voltage" if scales else ""
-    note = f"supply: {values.min():.4g} to {values.max():.4g} V over time, limits the voltage{part}"
-    series = commands.sampled(time_s, values, where=record.name)
-    return Supplied(voltage=series, scales=scales, note=note)
+    notes.append(f"supply: {values.min():.4g} to {values.max():.4g} V over time, limits the voltage{part}")
+    return {"supply": commands.sampled(time_s, values, where=record.name), "supply_scales": scales}
 
 
 def load_of(

@@ -181,11 +181,9 @@ class _Fits:
         return without_bias(start, self.design, model, records, recipe)
 
     def values(self, model: JointModel) -> Fit:
-        """The values of a model for the keys of a design."""
         return joint_values(self.start, model, inertia_to=self.settings.inertia_to)
 
     def design(self, model: JointModel) -> Design:
-        """The design that comes of a model."""
         return design_with_fit(with_structure(self.start, model), self.values(model), "")
 
 

@@ -36,7 +36,6 @@ class Lag:
 
     @property
     def is_sure(self) -> bool:
-        """Whether it is there."""
         return abs(self.seconds) > SURE * self.standard_error
 
 

@@ -58,7 +58,7 @@ def fit_electrical(
     return replace(again, fixed={**again.fixed, "inductance": kept})
 
 
-def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> ElectricalFit:
+def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...]) -> ElectricalFit:
     """The fit of rows that are made already; ``only`` these parameters."""
     ends = np.cumsum([len(part) for part in tables]).tolist()
     table = np.concatenate(tables)
@@ -79,7 +79,6 @@ def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...] = NAMES) -> Elec
 
 def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
-
     for name in ("voltage", "current"):
         if name not in record.signals:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)

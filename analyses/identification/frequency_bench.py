@@ -223,7 +223,6 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
 
 
 def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Design:
-    """The design with the identified values, their errors and correlations."""
     behind, old = design.ratio_behind_coupling, design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
     coupling = replace(old, stiffness_Nm_rad=fit["stiffness"], damping_Nms_rad=fit["damping"])
     if play is not None:

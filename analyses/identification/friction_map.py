@@ -130,7 +130,7 @@ def _one_more(
     def apart(one: float, others: Sequence[float]) -> bool:
         return all(abs(np.log(one / other)) > 0.1 for other in others)
 
-    free = [v for v in grid if apart(v, result)]
+    free = [v for v in grid.tolist() if apart(v, result)]
     if not free:
         return result
     chosen, step = (

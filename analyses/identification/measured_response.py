@@ -148,8 +148,7 @@ def _model(
         wired = wire(tried, Operating())
         if of == "closed":
             return sampled.reference_to_output(wired)
-        make = sampled.stage_loop if name in wired.stages else sampled.point_loop
-        return make(wired, name).open_loop
+        return sampled.loop(wired, name).open_loop
 
     def response(tried: Design) -> ComplexArray:
         system = seen(tried)

@@ -78,7 +78,6 @@ def without_bias(
 
 
 def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:
-    """The model less what the same fit finds too much in the simulated records."""
     found = {name: again[name] - default_value(made, name) for name in model.names if name in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
@@ -156,7 +155,6 @@ def _driven(design: Design, record: Record) -> Record:
     name = "position_reference" if design.axis == "linear" else "reference"
 
     def place(record: Record) -> FloatArray:
-        """The filtered position at the motor."""
         return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)

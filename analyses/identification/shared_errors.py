@@ -20,8 +20,8 @@ def shared_errors(
     instruments: Instruments,
     load_coefficient: float,
     torque_constant_Nm_A: float,
-) -> dict[str, FloatArray]:
-    """What the bound of each shared error adds to each run's torque, N m.
+) -> tuple[tuple[str, ...], FloatArray]:
+    """Names of the shared errors, and what the bound of each adds to each run's torque, N m, (runs, errors).
 
     An error is uniform within its bounds; those whose bound is zero are left out. The torque sensor's error
     is a straight line over the load between independent errors at zero and at full scale, each within the
@@ -39,12 +39,8 @@ def shared_errors(
         "torque sensor at zero": -bound * used * (1.0 - share),
         "torque sensor at full scale": -bound * used * share,
     }
-    return {name: effect for name, effect in effects.items() if np.any(effect != 0.0)}
-
-
-def effects_of(errors: dict[str, FloatArray], runs: int) -> FloatArray:
-    """The effects of all errors as columns, shape (runs, errors)."""
-    return np.array(list(errors.values())).reshape(len(errors), runs).T
+    acting = {name: effect for name, effect in effects.items() if np.any(effect != 0.0)}
+    return tuple(acting), np.array(list(acting.values())).reshape(len(acting), len(points)).T
 
 
 @lru_cache(maxsize=8)

@@ -13,7 +13,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.estimation.parameters import parameter
-from analyses.identification.shared_errors import effects_of, half_widths, shared_errors, standardised
+from analyses.identification.shared_errors import half_widths, shared_errors, standardised
 from analyses.identification.steady import SteadyPoint
 from analyses.records.campaign_file import Instruments
 
@@ -104,7 +104,7 @@ def fit_surface(
     """
     runs = _Runs(points, fixed or {}, kept or {})
     theta = runs.ordinary()
-    effects = effects_of(shared_errors(runs.points, instruments, theta[2], torque_constant_Nm_A), len(runs.y))
+    _, effects = shared_errors(runs.points, instruments, theta[2], torque_constant_Nm_A)
     size, limit = standardised(runs.free, runs.rest, runs.own_variance(theta), effects)
     aside, far = outliers == "set-aside", np.abs(size) > limit
     named = tuple(
@@ -192,8 +192,7 @@ def _fitted(
     count, theta = len(runs.y), runs.ordinary()
     for _ in range(ITERATIONS):
         own = runs.own_variance(theta)
-        shared = shared_errors(runs.points, instruments, theta[2], torque_constant)
-        effects = effects_of(shared, count)
+        shared, effects = shared_errors(runs.points, instruments, theta[2], torque_constant)
         scatter, birge = runs.scatter(own, effects)
         gain, change = np.zeros((len(NAMES), count)), np.zeros(len(NAMES))
         gain[runs.told], _ = runs.gain(own + scatter, effects)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
-MOST_STATES = 160  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
+MOST_STATES = 120  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
 
 @dataclass(frozen=True)

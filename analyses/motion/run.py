@@ -38,7 +38,15 @@ def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None]
         For a command that does not fit the run, or a load that would not act in it.
     """
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
-    duration = _played_s(asked)
+    duration = asked.duration
+    if asked.cycles is not None and asked.command != "stepped-sine":  # which has a duration of its own
+        needed = asked.start + asked.cycles / asked.frequency
+        if duration is not None and abs(duration - needed) > 1e-9 * needed:
+            raise InputError(
+                f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
+                f" {needed:g} s; allowed: one of the two options"
+            )
+        duration = needed
     command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
     seconds = duration
     if seconds is None:
@@ -70,19 +78,6 @@ def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None]
     if asked.parquet is not None:
         run.to_parquet(asked.parquet)
     return Motion(design, asked, run)
-
-
-def _played_s(asked: Asked) -> float | None:
-    """Duration that plays so many periods, else the one given; that of a stepped sine is its own."""
-    if asked.cycles is None or asked.command == "stepped-sine" or asked.frequency <= 0.0:
-        return asked.duration
-    needed = asked.start + asked.cycles / asked.frequency
-    if asked.duration is not None and abs(asked.duration - needed) > 1e-9 * needed:
-        raise InputError(
-            f"--cycles {asked.cycles}, --duration {asked.duration:g}: {asked.cycles} periods take"
-            f" {needed:g} s; allowed: one of the two options"
-        )
-    return needed
 
 
 def _command(design: Design, asked: Asked, duration: float, unit: str, scale: float) -> Command:

@@ -244,7 +244,6 @@ class _Pair:
         return out
 
     def quality(self, p: FloatArray) -> float:
-        """Correlation coefficient over the overlap."""
         x, y = self.both(p)
         return float(np.corrcoef(x, y)[0, 1]) if len(x) >= 10 and np.std(y) * np.std(x) > 0.0 else 0.0
 

@@ -425,7 +425,6 @@ def _supply(design: Design, record: Record) -> Finding | None:
 
 
 def _limits(design: Design, record: Record) -> Iterator[Finding | None]:
-    """Current, speed, voltage and load against what the design allows."""
     motor, limits, linear = design.effective_motor, design.limits, design.axis == "linear"
     current = limits.peak_current_A if design.controller.current is not None else inf
     if not isfinite(current) and motor.resistance_ohm is not None:

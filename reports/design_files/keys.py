@@ -24,8 +24,7 @@ class Asked:
     """
 
     match: Annotated[
-        str,
-        Option("Only keys whose name or meaning holds this text.", "TEXT", argument=True),
+        str, Option("Only keys whose name or meaning holds this text.", "TEXT", argument=True)
     ] = ""
     explain: Annotated[
         str | None,

@@ -24,8 +24,7 @@ class Asked:
 
     file: Annotated[Path, Option("Design file to write.", "FILE", argument=True)] = Path("my-drive.toml")
     source: Annotated[
-        str | None,
-        Option("Start from this design (shipped name or file) instead.", "NAME", flag="from"),
+        str | None, Option("Start from this design (shipped name or file) instead.", "NAME", flag="from")
     ] = None
     kind: Annotated[str | None, Option(f"Start from a typical drive: {', '.join(KINDS)}.", "KIND")] = None
     motor: Annotated[str | None, Option("Motor of the catalogue; a wrong name lists them all.", "NAME")] = (

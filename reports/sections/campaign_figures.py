@@ -45,7 +45,6 @@ def _ring(panel: style.Panel, at: tuple[float, float], words: str, size: float) 
 
 
 def residual_figure(fit: SurfaceFit) -> doc.Block:
-    """Residuals over speed and load."""
     chart = style.Chart(width=style.WIDE, height=310.0)
     named = {o.run for o in fit.outliers}
     y, std = 1e6 * fit.own_residuals_Nm, 1e6 * fit.residual_stds_Nm

@@ -107,7 +107,6 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
 
 
 def comparison_table(result: CorrelationResult) -> doc.Block:
-    """One row a signal."""
     columns = [
         doc.of(lambda s: NAMES[s.name], "name", "Signal"),
         doc.of("share_of_motion", "share", "Error of the motion", "%", scale=100.0, format="sig:4"),
@@ -128,7 +127,6 @@ def comparison_table(result: CorrelationResult) -> doc.Block:
 
 
 def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
-    """Both signals and their difference."""
     difference = signal.modelled - signal.measured
     rows = style.kept_rows([signal.measured, signal.modelled, difference])
     name = NAMES[signal.name]
@@ -147,7 +145,6 @@ def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
 
 
 def section(result: Correlation) -> list[doc.Section]:
-    """Records against the model: all together, then each."""
     limit = result.limit
     made = [record_section(one, k, error_limit=limit) for k, one in enumerate(result.records, 1)]
     if len(made) > 1:

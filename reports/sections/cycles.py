@@ -29,10 +29,8 @@ def section(result: LimitCycles) -> doc.Section:
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine, small) if result.confirmations else none
     told: doc.Severity = "info" if verdict_of(result.design, result.hunting) is Verdict.MET else "warn"
-    return doc.section(
-        "cycles", "Limit cycles", [predicted, _rests(result, fine, small)], result=summary(result),
-        intro=intro, status=told, told=told,
-    )  # fmt: skip
+    blocks, words = [predicted, _rests(result, fine, small)], summary(result)
+    return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, status=told, told=told)
 
 
 def summary(result: LimitCycles) -> str:

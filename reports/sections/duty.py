@@ -26,10 +26,8 @@ def section(result: Duty) -> doc.Section:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
     told: doc.Severity = "info" if result.verdict is Verdict.MET and not result.limited else "warn"
-    return doc.section(
-        "duty", "Duty cycle", [table, _figure(result)], result=summary(result), intro=intro, status=told,
-        told=told,
-    )  # fmt: skip
+    blocks, words = [table, _figure(result)], summary(result)
+    return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
 
 
 RATED = {

@@ -101,7 +101,6 @@ def _plan(plan: Plan) -> doc.Section:
 
 
 def _two_mass(result: FrequencyResult) -> doc.Section:
-    """Make the section of a frequency response's identification."""
     fit = result.fit
     blocks = [
         parameter_table("Identified two-mass drive", result.found),
@@ -127,7 +126,6 @@ SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "close
 
 
 def _of_loop(result: ResponseResult) -> doc.Section:
-    """Make the section of a design that was fitted to a measured response of one of its loops."""
     fit, measured = result.fit, result.measured
     noise = "no deviations were measured: errors are those of the residual"
     if fit.misfit is not None:

@@ -101,7 +101,6 @@ def shared_table(fit: SurfaceFit) -> doc.Block:
 
 
 def law_table(laws: RicherLaws) -> doc.Block:
-    """Richer laws by cross-validation."""
 
     def verdict(one: LawScore) -> str:
         return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or "no"
@@ -122,7 +121,6 @@ def law_table(laws: RicherLaws) -> doc.Block:
 
 
 def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
-    """What to measure next, and for which margins."""
     columns = [
         doc.column("order", "Run"),
         doc.column("speed", "Speed", "rad/s", format="fix:1"),
@@ -159,7 +157,6 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
 
 
 def account_blocks(result: CampaignResult) -> list[doc.Block]:
-    """Outliers and runs set aside, by name."""
     outlier = [
         doc.of("run", "run", "Outlier, run"),
         doc.of("standardised", "size", "Residual, standard deviations", format="fix:1"),
@@ -177,7 +174,6 @@ def account_blocks(result: CampaignResult) -> list[doc.Block]:
 
 
 def run_table(result: CampaignResult) -> doc.Block:
-    """One row a run: means, window, rows, clock."""
     records = {run.id: run.record for run in result.imported.runs}
     fit = result.fit
     residuals = {

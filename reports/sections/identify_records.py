@@ -106,7 +106,6 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
 
 
 def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
-    """Every number of the design that the records tell, beside what they say."""
     columns = [
         doc.of(lambda one: parameter(one.name, axis).label, "name", "Number"),
         doc.of("design", "design", "Design", format="sig:4"),
@@ -125,7 +124,6 @@ def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
 
 
 def law_table(result: BenchResult, axis: str) -> doc.Block:
-    """The friction laws that were tried, by the Bayesian criterion."""
     unit = "m/s" if axis == "linear" else "rad/s"
     columns = [
         doc.of("name", "name", "Law"),
@@ -147,7 +145,6 @@ def law_table(result: BenchResult, axis: str) -> doc.Block:
 
 
 def scatter_table(model: JointModel, axis: str) -> doc.Block:
-    """Each record alone, and the scatter between them."""
     columns = [doc.column("name", "Parameter")]
     count = min(len(model.alone), 6)
     columns += [doc.column(f"r{k}", f"record {k + 1} alone", format="sig:5") for k in range(count)]

@@ -80,11 +80,10 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     reason = "" if passed else _why(odds, result.case(odds))
     if result.at_least is not None:
         share, reason = odds.low, f"{100 * odds.low:.3f} % with 95 % confidence"
-    return doc.verdict(
-        f"tolerance/{odds.id}", f"{capital(odds.label)}: met within the tolerances", unit="%",
-        value=100.0 * odds.probability, limit=100.0 * wanted, distance=100.0 * (share - wanted),
-        passed=passed, reason=reason, comparison=">=",
-    )  # fmt: skip
+    percent: dict[str, Any] = {"unit": "%", "value": 100.0 * odds.probability, "limit": 100.0 * wanted}
+    percent |= {"distance": 100.0 * (share - wanted), "comparison": ">="}
+    words = f"{capital(odds.label)}: met within the tolerances"
+    return doc.verdict(f"tolerance/{odds.id}", words, passed=passed, reason=reason, **percent)
 
 
 def _why(odds: Odds, case: WorstCase | None) -> str:

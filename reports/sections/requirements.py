@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.specification.requirements import RequirementVerdict, tally
@@ -46,11 +46,10 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
     waiver = verdict.waiver.words if verdict.waiver else ""
-    made = doc.verdict(
-        verdict.id, label(verdict, load_unit), value=verdict.value, limit=limit, comparison=comparison,
-        unit=unit_words(requirement.unit), distance=verdict.distance, passed=None, source=source,
-        reason=verdict.reason or unlimited, waiver=waiver,
-    )  # fmt: skip
+    known: dict[str, Any] = {"value": verdict.value, "limit": limit, "distance": verdict.distance}
+    known |= {"comparison": comparison, "unit": unit_words(requirement.unit), "source": source}
+    known |= {"reason": verdict.reason or unlimited, "waiver": waiver}
+    made = doc.verdict(verdict.id, label(verdict, load_unit), passed=None, **known)
     return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
 
 

@@ -51,7 +51,7 @@ def _table(run: Trajectory) -> doc.Block:
     unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
     rows: list[doc.Row] = []
     for name, value in summary(run).items():
-        if name.startswith(("largest_command", "largest_error")):
+        if name.startswith(("largest_command", "largest_error", "final_response")):
             rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
         elif isinstance(value, float):
             rows += _in_words(name, value)

@@ -53,6 +53,15 @@ def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> 
     assert with_law(nested).controller == with_law(flat).controller
 
 
+def test_what_could_not_be_read_is_not_shown_where_it_is_asked_for_again() -> None:
+    """Names that are none, in a drive without gears and without tolerances, which they could be among."""
+    bare = DRIVE.replace('[[gear]]\nname = "R22"\nratio = 19.2\n', "[load]\nlocking_gear = 3\n")
+    text = told(f'{bare}[[correlation]]\nsecond = "motor.resistance"\ncoefficient = 0.5\n')
+    assert "object at" not in text
+    for words in ("load.locking_gear = 3: allowed: text", "locking_gear: is no gear", "first: missing"):
+        assert words in text
+
+
 STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]"
 
 

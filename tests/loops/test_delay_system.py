@@ -100,10 +100,6 @@ def test_refusals() -> None:
         DelaySystem.from_system(float("nan"))
 
 
-def test_repr_is_short() -> None:
-    assert repr(DelaySystem.delay(0.25)) == "DelaySystem(0 states, delays 250 ms)"
-
-
 FORMS = ("sampled", "continuous", "ideal")
 NAMES = ("current", "velocity", "position")
 INTEGRATOR = control.tf([1], [1, 0])

@@ -15,7 +15,7 @@ from actuator_lti.batch.static import drive_figures
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
-from actuator_lti.drive.operating import Operating, moment_slope
+from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental
@@ -194,15 +194,6 @@ def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope:
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
     closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
     assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
-
-
-def test_gravity_may_differ_from_design_to_design() -> None:
-    """The slope of the load is that of cos at each one's own angle."""
-    joint = load_design("joint")
-    offsets = np.array([0.1, 1.0, 2.5])
-    many = replace(joint, load=replace(joint.load, gravity=replace(joint.load.gravity, offset_rad=offsets)))
-    expected = joint.load.moment_slope_Nm_rad + joint.load.gravity.peak_Nm * np.cos(0.3 + offsets)
-    assert moment_slope(many, Operating(angle_rad=0.3)) == pytest.approx(expected, rel=1e-14)
 
 
 STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")

@@ -70,27 +70,6 @@ def test_k4_dynamic_stiffness() -> None:
         assert np.angle(stiffness, deg=True) == pytest.approx(angle, abs=1e-7)
 
 
-def undamped(design: model.Design) -> model.Design:
-    return replace(
-        design,
-        motor=replace(design.motor, back_emf_constant_Vs_rad=1e-12),
-        friction=model.Friction(),
-        load=replace(design.load, friction=None),
-        coupling=replace(design.coupling, damping_Nms_rad=0.0),
-    )
-
-
-def test_resonance_and_antiresonance() -> None:
-    """sqrt(k/J_l) and sqrt(k (1/J_l + 1/(J_m N_c^2))), the closed forms of model.md section 6."""
-    from actuator_lti.drive.plant import motor_plant
-
-    plant = motor_plant(undamped(drive_d()))
-    poles = np.linalg.eigvals(plant.A)
-    assert np.max(poles.imag) == pytest.approx(np.sqrt(400 * (1 / 2e-3 + 1 / 2e-3)), rel=1e-12)
-    held = [k for k, name in enumerate(plant.states) if name in ("W", "twist")]  # the motor held still
-    assert np.max(np.linalg.eigvals(plant.A[np.ix_(held, held)]).imag) == pytest.approx(447.213595, rel=1e-8)
-
-
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
 def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
     free = replace(drive_d(), load=replace(drive_d().load, friction=None))

@@ -100,8 +100,6 @@ def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
 def test_a_night_that_came_closer_to_a_limit_is_marked_and_counted(nights) -> None:
     night, _ = nights
     strips = {d.name: [state for _, state in d.strip] for d in night.designs}
-    assert strips == {
-        "one": ["pass", "regressed"], "two": ["pass", "regressed"], "better": ["pass"] * 2,
-        "same": ["pass"] * 2,
-    }  # fmt: skip
+    closer, steady = ["pass", "regressed"], ["pass", "pass"]
+    assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
     assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4

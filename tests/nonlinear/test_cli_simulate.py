@@ -256,6 +256,7 @@ def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_
     assert np.all(made.rows["output_speed_reference_rad_s"] == pi / 2.0)
     assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(wanted, rel=1e-3)
     assert made.facts["largest_error_rad_s"] == pytest.approx(pi / 2.0, rel=0.2)
+    assert made.facts["final_response_rad_s"] == pytest.approx(pi / 2.0, rel=1e-3)
     cut = run(f"{drive} --amplitude 90 --duration 0.001")
     assert 0.0 < cut.rows["motor_speed_rad_s"][-1] < (1.0 - exp(-1.0)) * wanted
     assert cut.facts["status"] == "becomes steady"
