@@ -61,13 +61,24 @@ def section(validation: Validation) -> list[doc.Section]:
 def brief(validation: Validation) -> Brief:
     """The verdict, why it is none where it is none, and every check by loop."""
     made = section(validation)
-    shown = ("quantity", "predicted", "found", "unit", "error", "allowed", "verdict")
     items = [item for part in made for item in doc.judged(part["blocks"]) if item["verdict"] != "met"]
+    items = [item for item in items if not item["reason"] or item["reason"] not in validation.words]
     said = [f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items]
     large = [part["result"] for part in made if part["id"] == "conditional"]
     grouped = by_loop(validation.rows).items()
-    tables = [doc.with_columns(table(rows, loop_name(name)), shown) for name, rows in grouped]
+    tables = [_short_table(name, rows) for name, rows in grouped]
     return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
+
+
+def _short_table(name: str, rows: Sequence[Check]) -> doc.Block:
+    """The rows of one place, with the motion that they are judged on: in the title where it is one."""
+    shown = ["quantity", "predicted", "found", "unit", "error", "allowed", "verdict"]
+    title, (condition, *others) = loop_name(name), sorted({row.condition for row in rows})
+    if others:
+        shown.append("condition")
+    elif condition not in title:
+        title = f"{title.removesuffix(', rotor locked')}, {condition}"
+    return doc.with_columns(table(rows, title), shown)
 
 
 def summary(validation: Validation) -> doc.Section:
