@@ -111,8 +111,13 @@ def table(
     """Make a table; a row is a mapping by column key, with ``_status`` where it has one, or its cells."""
     keys = [one["key"] for one in columns]
     named = [row if isinstance(row, Mapping) else dict(zip(keys, row, strict=True)) for row in rows]
-    made = {"columns": list(columns), "rows": list(map(plain, named)), "note": prose(note)}
-    return {"kind": "table", "caption": caption, **made}
+    return {
+        "kind": "table",
+        "caption": caption,
+        "columns": list(columns),
+        "rows": list(map(plain, named)),
+        "note": prose(note),
+    }
 
 
 def of(
@@ -161,7 +166,7 @@ def listing(
     for item in items:
         own = {"_status": status(item)} if status else {}
         said = more(item) if more else {}
-        rows.append({one["key"]: read(item) for one, read in columns} | own | said)
+        rows.append({**{one["key"]: read(item) for one, read in columns}, **own, **said})
     return table(caption, [one for one, _ in columns], rows, note)
 
 
@@ -171,8 +176,14 @@ def figure(name: str, chart: Chart, caption: str, *, alt: str = "", layout: Layo
     The caption says what is seen: a figure must be understood alone. ``alt`` stands for it where it cannot be
     seen; ``layout``: wide, half of the page's width, or tall (half as wide, two rows high).
     """
-    said = {"caption": prose(caption), "alt": prose(alt or caption)}
-    return {"kind": "figure", "figure": name, "chart": chart_data(chart), **said, "layout": layout}
+    return {
+        "kind": "figure",
+        "figure": name,
+        "chart": chart_data(chart),
+        "caption": prose(caption),
+        "alt": prose(alt or caption),
+        "layout": layout,
+    }
 
 
 def with_columns(block: Block, keys: Collection[str]) -> Block:

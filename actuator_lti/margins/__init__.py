@@ -1,8 +1,8 @@
 """Margins of a single loop: every crossover, both ways to stability, modulus and disk margin.
 
-`engine` asks, `results` answers. In double precision: `loop`, its factors (`factored`), the compiled search
-of the axis (`axis_search`, `axis_parts`), all together in `checked`. What that cannot check: `exact` for
-rational loops, `delays` for exact delays; data of a measurement: `measured`.
+`engine` asks, `results` answers. In double precision: `loop`, its factors (`factored`) and their compiled
+search (`axis_search`, `axis_parts`), what it does `along` the axis, all together in `checked`. What that
+cannot check: `exact` for rational loops, `delays` for exact delays; data of a measurement: `measured`.
 """
 
 from actuator_lti.margins.engine import stability_margins

@@ -78,8 +78,9 @@ def junit(night: Overview) -> str:
     """JUnit XML: a suite a design, a case a requirement, one for its build and one for regressions."""
     top = Xml.Element("testsuites", name=_line(night.study.name))
     for design in night.designs:
-        about = {"time": f"{design.result.seconds:.3f}", "timestamp": night.run.started.rstrip("Z")}
-        _cases(Xml.SubElement(top, "testsuite", name=_line(design.name), **about), design)
+        took, began = f"{design.result.seconds:.3f}", night.run.started.rstrip("Z")
+        about = {"name": _line(design.name), "time": took, "timestamp": began}
+        _cases(Xml.SubElement(top, "testsuite", about), design)
     tags = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
     for element in (*top, top):
         for name, tag in tags.items():

@@ -218,8 +218,8 @@ def line_chart(
     shown = [*alone.tolist(), int(np.flatnonzero(finite)[-1])]
     panel.points(days[shown], values[shown], colour=style.BLUE, size=4.0, read=False)
     there, after = values[finite], f" {unit}" if unit else ""
-    last, low, high = (significant(float(x), 4) for x in (there[-1], there.min(), there.max()))
-    words = f"{one_line(title, 120)}: {last}{after} in the last night"
+    now, low, high = (significant(float(x), 4) for x in (there[-1], there.min(), there.max()))
+    words = f"{one_line(title, 120)}: {now}{after} in the last night"
     if len(there) > 1:
         words += f", between {low} and {high} over {len(there)} nights, {len(points)} change(s) of level"
     words += "" if limit is None else f"; limit {significant(limit, 4)}{after}"

@@ -18,13 +18,13 @@ def section(result: Corners) -> doc.Section:
         "The worst ends are those that one by one lower the margin of the loop where it is smallest, all "
         "taken together; the worst-case search of montecarlo looks inside the box as well."
     )
-    words = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
+    named = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
     caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
     alt = f"{caption} The figures stand in the table of every loop at every corner."
     blocks = [
         _summary_table(result),
         doc.figure("corners", chart(result), caption=caption, alt=alt),
-        doc.details("Every loop at every corner", [_loop_table(result), *words]),
+        doc.details("Every loop at every corner", [_loop_table(result), *named]),
     ]
     told: doc.Severity = "info" if result.passed else "warn"
     words = summary(result)

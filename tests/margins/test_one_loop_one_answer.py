@@ -39,7 +39,7 @@ def modes(zeta: float) -> control.StateSpace:
 
 
 def modes_margin(zeta: float) -> tuple[float, ...]:
-    """-1/L where the two modes of `modes` have opposite imaginary parts, by bisection on closed forms.
+    """-1/L where the two modes of `modes` have opposite imaginary parts, by brentq on closed forms.
 
     The circle of the second mode has the same size at any damping: 0.963 dB at 2e-5 and at 2e-4 alike.
     """
@@ -49,16 +49,10 @@ def modes_margin(zeta: float) -> tuple[float, ...]:
         s = 1j * w
         return K * s / (s * s + w1 * w1) - 1.8 * zeta * w2 * s / (s * s + 2 * zeta * w2 * s + w2 * w2)
 
-    out = []
     w = w2 * (1.0 + zeta * np.linspace(-40.0, 40.0, 40_001))
-    values = np.array([L(float(x)) for x in w])
-    for k in np.flatnonzero(np.diff(np.sign(values.imag)) != 0):
-        low, high = float(w[k]), float(w[k + 1])
-        for _ in range(80):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if L(middle).imag * L(low).imag > 0.0 else (low, middle)
-        out.append(float(-1.0 / L(low).real))
-    return tuple(out)
+    values = np.array([L(float(x)).imag for x in w])
+    places = np.flatnonzero(np.diff(np.sign(values)) != 0)
+    return tuple(-1.0 / L(brentq(lambda w: L(w).imag, w[k], w[k + 1], xtol=1e-13)).real for k in places)
 
 
 def pi_on_zero() -> control.LTI:
