@@ -82,7 +82,7 @@ def test_the_extra_all_has_what_the_commands_ask_for() -> None:
     named = [
         one
         for path in sources
-        for one in re.findall(r'\bneed\("[\w.]+", "(\w+)"', path.read_text(encoding="utf-8"))
+        for one in re.findall(r'\bneed\("?[\w.]+"?, "(\w+)"', path.read_text(encoding="utf-8"))
     ]
     assert set(named) <= extras
     assert {"cluster", "nightly", "pdf", "plot", "tables"} <= set(named)
