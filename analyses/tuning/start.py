@@ -96,11 +96,12 @@ def _by_rule(design: Design) -> Iterator[tuple[str, float, float | None, str]]:
         if control.position is not None:
             words = f"velocity crossover {crossover:.4g} rad/s over {SEPARATION:g}"
             yield "position", crossover / SEPARATION, None, words
-    elif control.position is not None:  # |drive| = 1 at a tenth of 1/T_sigma or at its corner
-        corner = own_drag_Nms_rad(design) / J
-        omega = min(0.1 / small, corner) if corner > 0.0 else 0.1 / small
-        response = torque / (J * abs(complex(corner, omega)) * omega)
-        words = "no velocity loop; crossover of the drive at a tenth of 1/T_sigma or below"
+    elif control.position is not None:  # |controller * drive| = 1 at a tenth of 1/T_sigma or below
+        corner, lead_s = own_drag_Nms_rad(design) / J, control.position.derivative_time_s or 0.0
+        below = 2.0 / lead_s if lead_s else corner or inf  # 63 deg of lead, or the own corner
+        omega = min(0.1 / small, below)
+        response = torque * abs(complex(1.0, omega * lead_s)) / (J * abs(complex(corner, omega)) * omega)
+        words = f"no velocity loop; crossover of the drive at {omega:.4g} rad/s"
         yield "position", 1.0 / response, None, words
 
 

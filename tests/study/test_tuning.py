@@ -111,6 +111,17 @@ def test_the_rules_of_the_baseline():
     assert rules["control.current.integral_time"] == pytest.approx(6e-6 / 0.055)
 
 
+def test_the_rule_of_a_position_controller_that_drives_the_current():
+    """|K (1 + j w Td) kM/(j w (Cv + j w J))| = 1, at w = 2/Td, or without Td at the corner Cv/J."""
+    base = load_design("ilr33-amber")
+    kM, Cv, J = base.motor.torque_constant_Nm_A, base.friction.viscous_Nms_rad, base.inertia_kgm2
+    for Td, w in ((0.02, 100.0), (None, Cv / J)):
+        position = replace(base.controller.position, derivative_time_s=Td)
+        control = replace(base.controller, velocity=None, position=position)
+        gain = rule_gains(replace(base, controller=control)).values["control.position.gain"]
+        assert abs(gain * (1 + 1j * w * (Td or 0.0)) * kM / (1j * w * (Cv + 1j * w * J))) == pytest.approx(1.0)
+
+
 @pytest.fixture(scope="module")
 def tuned():
     asked = need("bandwidth", 60.0, loop="position", unit="Hz"), need("phase_margin", 60.0, loop="every")
