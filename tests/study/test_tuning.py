@@ -119,7 +119,8 @@ def test_the_rule_of_a_position_controller_that_drives_the_current():
         position = replace(base.controller.position, derivative_time_s=Td)
         control = replace(base.controller, velocity=None, position=position)
         gain = rule_gains(replace(base, controller=control)).values["control.position.gain"]
-        assert abs(gain * (1 + 1j * w * (Td or 0.0)) * kM / (1j * w * (Cv + 1j * w * J))) == pytest.approx(1.0)
+        loop = gain * (1 + 1j * w * (Td or 0.0)) * kM / (1j * w * (Cv + 1j * w * J))
+        assert abs(loop) == pytest.approx(1.0)
 
 
 @pytest.fixture(scope="module")
