@@ -312,10 +312,10 @@ class Reader:
         given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
         if self.constants == "dc":
             phase = ", where R and L are per phase" if given == "peak-phase" else ""
-            raise InputError(
-                f'allowed: with motor.constants = "{given}"{phase}; '
-                "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
-            )
+            plain = "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
+            if not _AMPERE.search(unit):
+                plain = "beside the constants of a DC motor: V, the peak line-line, sqrt(2) times the rms"
+            raise InputError(f'allowed: with motor.constants = "{given}"{phase}; {plain}')
         own = field.section == "motor"
         above, _, below = unit.partition("/")
         sized = _SIZED if own else _AMPERE
