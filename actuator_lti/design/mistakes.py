@@ -34,7 +34,8 @@ Check = Callable[["Design"], Iterator[Refusal]]
 def refusal_text(refusal: Refusal) -> str:
     """``key = value: what is allowed``."""
     path, given, reason = refusal
-    value = f"{given}"
+    unread = given is UNREAD or (isinstance(given, tuple) and any(each is UNREAD for each in given))
+    value = "" if unread else f"{given}"
     return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
 
 

@@ -134,7 +134,9 @@ def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, .
     """What a reader of the import has to know."""
     first, second = given.get((0x6083, 0)), given.get((0x6084, 0))
     rated_A, peak_A = given.get((0x2329, 1), 0) * 1e-3, design.limits.peak_current_A
-    limits = {key: given[key] * 1e-3 * rated_A for key in _TORQUE_LIMITS if key in given and rated_A}
+    limits = {
+        key: given[key] * 1e-3 * rated_A for key in _TORQUE_LIMITS if key in given and (0x2329, 1) in given
+    }
     per = "per rad/s" if factor == 1.0 else "per rpm"
     notes = [
         (f"velocity gain 0x2344.01 read as A s {per} (calibration factor {factor:.4g})",

@@ -307,7 +307,7 @@ class Reader:
 
         Constants of the motor become those of its convention, rms or peak; kE against kM tells a wrong one.
         """
-        if convention == "phase":
+        if convention == "phase" and self.constants != "dc":
             return _per_phase(unit)
         given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
         if self.constants == "dc":

@@ -153,9 +153,10 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     """A rigid self-locking drive that cannot lock its load, and a spring that nothing damps."""
     behind, load = design.load.friction, design.load
     free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
+    damped = load.moment_damping_Nms_rad > 0.0
     if free and design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
         yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
-    elif free and design.coupling is not None and design.coupling.play_rad > 0.0:
+    elif free and design.coupling is not None and design.coupling.play_rad > 0.0 and not damped:
         yield "coupling.play: in the gap nothing stops a load without load.friction, it may never rest"
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"

@@ -57,7 +57,7 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
     if kind not in _KINDS:
         raise InputError("allowed: " + " or ".join(f'"{one}"' for one in _KINDS), where="kind")
     wanted, unwanted = ("half_width", "std") if kind == "uniform" else ("std", "half_width")
-    bounds = {key: parse(table[key]) for key in ("lower", "upper") if key in table}
+    bounds = {key: table[key] for key in ("lower", "upper") if key in table}
     if wanted not in table:
         raise InputError(f'missing {wanted}; a "{kind}" tolerance needs it')
     if unwanted in table:
@@ -66,7 +66,8 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
         raise InputError('allowed: lower or upper with kind "truncated-normal", and only there')
     given = table[wanted]
     text = given if isinstance(given, str) else repr(given)
-    return Tolerance(kind=kind, text=text, **{wanted: _width(given, nominal, parse)}, **bounds)
+    read = {key: parse(bound) for key, bound in bounds.items()}
+    return Tolerance(kind=kind, text=text, **{wanted: _width(given, nominal, parse)}, **read)
 
 
 def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: Field) -> None:

@@ -89,8 +89,9 @@ _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
 _AMPERE = re.compile(r"\bA\b")
+MOST_FACTORS = 40
 _INNER = re.compile(r"\(([^()]*)\)")
-_FACTOR = re.compile(r"\s*([*/]?)\s*([A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
+_FACTOR = re.compile(r"\s*([*/]?)\s*(_[0-9]+|[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
@@ -124,12 +125,15 @@ class UnitValue:
 
 def _product(text: str, units: Units) -> Exact:
     """Names with powers from left to right, what stands in parentheses first; IndexError where it is none."""
-    while inner := _INNER.search(text):
-        name = "_" * len(text)
+    for k in range(MOST_FACTORS):
+        inner = _INNER.search(text)
+        if inner is None:
+            break
+        name = f"_{k}"
         units = {**units, name: _product(inner[1], units)}
         text = f"{text[: inner.start()]} {name} {text[inner.end() :]}"
     factors = _FACTOR.findall(text)
-    if _FACTOR.sub("", text) or factors[0][0]:
+    if _FACTOR.sub("", text) or factors[0][0] or len(factors) > MOST_FACTORS:
         raise IndexError
     size, powers = Fraction(1), Counter[str]()
     for sign, name, power in factors:

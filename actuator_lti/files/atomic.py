@@ -163,7 +163,7 @@ def _write_through(held: BinaryIO, path: Path) -> None:
 def _stage(path: Path, write: Callable[[BinaryIO], object]) -> Path:
     """Fill a file beside its place, and give the temporary path."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = path.with_name(f".{secrets.token_hex(8)}{_PART}")
+    temporary = path.parent / f".{secrets.token_hex(8)}{_PART}"
     try:
         with open(temporary, "xb") as file:
             write(file)

@@ -45,8 +45,8 @@ def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
-    by_record = {result.record: result[name] for result in results if name in result.signals}
-    signals = list(by_record.values())
+    there = [result for result in results if name in result.signals]
+    signals = [result[name] for result in there]
     whole = np.concatenate([one.measured for one in signals])
     off = np.concatenate([one.modelled for one in signals]) - whole
     motion = np.concatenate([one.measured - one.measured.mean() for one in signals])
@@ -61,7 +61,7 @@ def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary
         max_error=float(np.max(np.abs(off))),
         relative_error=float(size / norm),
         share_of_motion=float(size / (np.linalg.norm(motion) or norm)),
-        worst=max(by_record, key=lambda record: by_record[record].share_of_motion),
+        worst=max(there, key=lambda result: result[name].share_of_motion).record,
     )
 
 

@@ -106,11 +106,15 @@ class Fit:
         table = table.reshape(len(slopes), len(self.names))
         found = dict(zip(slopes, table @ self.values, strict=True)) | dict(values or {})
         covariance = table @ self.covariance @ table.T
-        return Fit(names=tuple(slopes), values=np.array([*found.values()], float), covariance=covariance)
+        return Fit(
+            names=tuple(slopes), values=np.array([found[name] for name in slopes]), covariance=covariance
+        )
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""
-        return self.mapped({names[name]: {name: 1.0} for name in self.names if name in names})
+        rows = [k for k, name in enumerate(self.names) if name in names]
+        new = tuple(names[self.names[k]] for k in rows)
+        return Fit(names=new, values=self.values[rows], covariance=self.covariance[np.ix_(rows, rows)])
 
     def beside(self, name: str, value: float, std: float) -> Fit:
         """The fit and one more value, found on its own."""

@@ -67,7 +67,7 @@ def told_apart(
         unit = w[:, k] / (size or 1.0)
         rest = unit - sum((b * float(b @ unit) for b in basis), np.zeros(len(unit)))
         own = float(np.linalg.norm(rest))
-        if own >= least:
+        if not own < least:  # what is no number stays
             kept.append(k)
             basis.append(rest / own)
             continue

@@ -2,5 +2,5 @@
 
 from actuator_lti.start.on_first_use import on_first_use
 
-_ROOMS = dict.fromkeys(("FrictionEffects", "friction_effects"), f"{__name__}.result")
-__getattr__, __dir__ = on_first_use(__name__, _ROOMS)
+__all__ = ["FrictionEffects", "friction_effects"]
+__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys(__all__, f"{__name__}.result"))

@@ -92,6 +92,8 @@ def fit_output(
         nonlocal count
         values = dict(zip(paths, values_at(moved).tolist(), strict=True))
         output = output_of(with_values(design, values, check=False))
+        if output.shape != measured.shape:
+            raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
         count += 1
         if progress is not None:
             progress(min(count, most), most)

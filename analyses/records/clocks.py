@@ -87,6 +87,8 @@ def join_records(
         if offset_s is None:
             raise InputError('join method "given": needs an offset', where=second.name)
         join = ClockJoin(offset_s=offset_s)
+    elif method not in ("event", "correlation"):
+        raise InputError(f'join method "{method}": "event", "correlation" or "given"')
     else:
         a = Series(first.time_s, np.abs(first[first_signal]))
         b = Series(second.time_s, np.abs(second[second_signal]))

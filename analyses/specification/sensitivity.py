@@ -78,9 +78,9 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
         if value != 0.0 and np.isfinite(value) and not path.startswith("friction.breakaway")
     }
     ends = {path: (value * (1 - SWING), value * (1 + SWING)) for path, value in nominal.items()}
-    for path, value, tolerance in tolerances(design):
+    for path, _, tolerance in tolerances(design):
         if path in nominal:
-            ends[path] = Factor(path, value, tolerance).box
+            ends[path] = Factor(path, nominal[path], tolerance).box
     moves = [
         {path: to}
         for path, value in nominal.items()

@@ -2,12 +2,16 @@
 
 from actuator_lti.start.on_first_use import on_first_use
 
-_NAMES = (
+__all__ = [
+    "AtRest",
+    "Check",
+    "LostMotion",
     "Stiffness",
+    "StiffnessCurve",
     "check_stiffness",
     "lost_motion_seen",
     "stiffness",
     "stiffness_at_rest",
     "stiffness_curves",
-)
-__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys(_NAMES, f"{__name__}.run"))
+]
+__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys(__all__, f"{__name__}.run"))

@@ -145,12 +145,12 @@ def measured_speed(p, s, io, w, th):
         x = p[layout.RATIO] * io[layout.IN_OUTPUT_SPEED]
         angle = p[layout.RATIO] * io[layout.IN_OUTPUT]
     if source == DIFFERENCE:
-        angle = counted(angle, p[layout.COUNTS_PER_RAD])
+        seen = counted(angle, p[layout.COUNTS_PER_RAD])
         m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])  # the last angles, oldest first
-        x = (angle - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
+        x = (seen - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
         for j in range(m - 1):
             s[at + j] = s[at + j + 1]
-        s[at + m - 1] = angle
+        s[at + m - 1] = seen
     elif source == TRACKING:  # p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r
         x = s[layout.S_TRACKED_SPEED]
         foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * x

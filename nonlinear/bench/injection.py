@@ -18,6 +18,7 @@ RETURNED = {
     "u": at.S_VOLTAGE_BEFORE, "i_ref": at.S_CURRENT_BEFORE, "w_ref": at.S_SPEED_COMMAND,
     "output": at.S_OUTPUT_BEFORE,
 }  # fmt: skip
+COUNTS = [at.COUNTS_PER_RAD, at.POSITION_COUNTS, at.OWN_COUNTS, at.OWN_OUTPUT_COUNTS]
 HELD = {"velocity_integral": at.S_VELOCITY_INTEGRATOR, "current_integral": at.S_CURRENT_INTEGRATOR}
 
 
@@ -63,7 +64,8 @@ class Injection:
         self.steady = float(self.rows.values[0, self.at])
 
     def prepare(self, p: Floats) -> None:
-        """Let the load be looked at in every tick where it is what is moved."""
+        """Without counts; the load is looked at in every tick where it is what is moved."""
+        p[COUNTS] = 0.0
         if self.place == "load":
             p[at.RARE_LOAD] = 1.0
 

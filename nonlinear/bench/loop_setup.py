@@ -112,7 +112,8 @@ class LoopSetup:
     def rows(self, gain: float = 1.0, delay_samples: float = 0.0) -> Rows:
         """Parameters of a run that starts in the steady state of the operating motion.
 
-        ``gain`` is a factor on the whole controller in front of the point; a delay is in the point's samples.
+        ``gain`` is a factor on the whole controller in front of the point, whose state is that of a factor of
+        1; a delay is in the point's samples.
         """
         row = self._base.copy()
         row.probe(Probe(point=self.point, delay_samples=delay_samples))  # type: ignore[arg-type]

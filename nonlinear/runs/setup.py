@@ -88,8 +88,9 @@ class Reducers:
             raise InputError(f"{message} ({self.cycles} periods asked for)")
         row[..., at.WINDOW], row[..., at.CYCLES] = self.window_ticks, self.cycles
         row[..., at.HARMONICS], row[..., at.WITH_EXTREMES] = self.harmonics, self.extremes
+        row[..., at.STEP_TARGET] = self.step_target_rad
         if self.step_target_rad:
-            row[..., at.STEP_TARGET], row[..., at.STEP_BAND] = self.step_target_rad, self.step_band
+            row[..., at.STEP_BAND] = self.step_band
 
 
 @dataclass(frozen=True, kw_only=True)

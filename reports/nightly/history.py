@@ -91,7 +91,7 @@ class History:
 
     def approve(self, run: int, names: Sequence[str] | None, **about: str) -> None:
         """Make a night the baseline (see `Baseline`) of some designs, or of all (``None``)."""
-        every: Sequence[str | None] = names or [None]
+        every: Sequence[str | None] = [None] if names is None else names
         more = [Baseline(run=run, name=name, **about) for name in every]
         self._put(replace(self.index, baselines=[*self.index.baselines, *more]))
 

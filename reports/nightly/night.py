@@ -99,7 +99,7 @@ def run_night(
         )
         outcomes = _outcomes(run, jobs, cache, use, progress, say)
         history.finish_run(run, clock(), outcomes)
-        return _published(study, site, history, cache, use)
+        return _published(study, site, history, cache, use, built=True)
 
 
 def approve(
@@ -132,9 +132,11 @@ def approve(
         return _published(study, site, history, cache, use)
 
 
-def _published(study: Study, site: Path, history: History, cache: Cache, use: Settings) -> Overview:
-    """The last finished night, its site made anew from history and cache."""
-    view = overview(history, cache, study, site)
+def _published(
+    study: Study, site: Path, history: History, cache: Cache, use: Settings, *, built: bool = False
+) -> Overview:
+    """The last finished night, its site made anew from history and cache; ``built``: just now."""
+    view = overview(history, cache, study, site, built=built)
     site_files.publish(site, view, history, cache, keep_reports=use.keep)
     return view
 

@@ -97,7 +97,7 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
         path = folder / name
         if os.path.lexists(path) and (path.is_symlink() or not path.is_file()):
             raise InputError("is no regular file: a site holds its reports itself", where=str(path))
-        if not path.exists() or sha256(path.read_bytes()) != digest:
+        if not _is_there(path, digest):
             missing.append(name)
     entry = cache.whole(design.result.key) if missing else None
     for name in missing:
@@ -106,3 +106,10 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
                 f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
             )
         yield folder / name, entry.file(name)
+
+
+def _is_there(path: Path, digest: str) -> bool:
+    try:
+        return sha256(path.read_bytes()) == digest
+    except OSError:  # one that cannot be read is written anew
+        return False

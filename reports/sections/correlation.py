@@ -25,6 +25,10 @@ NAMES = {name: meaning.capitalize() for name, meaning in MEANINGS.items()}
 NAMES |= {"voltage": "Voltage", "force": "Force"}
 
 
+def _named(signal: str) -> str:
+    return NAMES.get(signal, signal)
+
+
 def record_section(
     result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
 ) -> doc.Section:
@@ -54,10 +58,10 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     where = f" ({result.record})" if len(results) > 1 else ""
     beside = [result[name] for name in BESIDE if name in result.signals and name != motion.name]
     parts.append(
-        f"{NAMES[motion.name]} of the model within {_share(motion)} of the measured motion "
+        f"{_named(motion.name)} of the model within {_share(motion)} of the measured motion "
         f"about its mean{where}, rms {show(motion.rms_error, 'sig:3')} {motion.unit}, largest "
         f"{show(motion.max_error, 'sig:3')} {motion.unit}"
-        + "".join(f"; {NAMES[one.name].lower()} within {_share(one)}" for one in beside)
+        + "".join(f"; {_named(one.name).lower()} within {_share(one)}" for one in beside)
         + "."
     )
     apart = [one.record for one in results if not moves_alike(one)]
@@ -84,7 +88,7 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
         rows += [(result.record, result[name]) for result in results if name in result.signals]
         rows.append((f"all {one.records}; worst: {one.worst}", one))
     columns = [
-        doc.of(lambda row: NAMES[row[1].name], "name", "Signal"),
+        doc.of(lambda row: _named(row[1].name), "name", "Signal"),
         doc.of(lambda row: row[0], "record", "Record"),
         doc.of(lambda row: row[1].mean_error, "mean", "Mean |e|", format="sig:4"),
         doc.of(lambda row: row[1].rms_error, "rms", "rms", format="sig:4"),
@@ -108,7 +112,7 @@ def summary_section(results: Sequence[CorrelationResult], *, error_limit: float 
 
 def comparison_table(result: CorrelationResult) -> doc.Block:
     columns = [
-        doc.of(lambda s: NAMES[s.name], "name", "Signal"),
+        doc.of(lambda s: _named(s.name), "name", "Signal"),
         doc.of("share_of_motion", "share", "Error of the motion", "%", scale=100.0, format="sig:4"),
         doc.of("relative_error", "relative", "Relative error", "%", scale=100.0, format="sig:4"),
         doc.of("fit_percent", "fit", "Fit", "%", format="fix:3"),
@@ -129,7 +133,7 @@ def comparison_table(result: CorrelationResult) -> doc.Block:
 def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
     difference = signal.modelled - signal.measured
     rows = style.kept_rows([signal.measured, signal.modelled, difference])
-    name = NAMES[signal.name]
+    name = _named(signal.name)
     time = signal.time_s[rows]
     chart = style.Chart(width=style.WIDE, height=380.0)
     upper, lower = chart.column(2.2, 1.0)

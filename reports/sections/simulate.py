@@ -143,12 +143,13 @@ def chart_of(run: Trajectory) -> style.Chart:
         for k, (name, values) in reversed(list(enumerate(signals))):
             panel.curve(time, values[rows], name, width=2.0 if k == 0 else 1.5, **style.series(k))
         limit = run.limits[limiters[0].name].limit if limiters else np.inf
-        if limit <= 4.0 * max(np.abs(v[rows]).max() for _, v in signals):  # within reach of the signals
+        if limit > 4.0 * max(np.abs(v[rows]).max() for _, v in signals):  # out of reach of the signals
+            if np.isfinite(limit):
+                panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
+        elif np.isfinite(limit):
             panel.y.see([-limit, limit])
             for sign in (1.0, -1.0):
                 panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
-        elif np.isfinite(limit):
-            panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
     panels[-1].x.limits(time[0], time[-1])
     return chart
 

@@ -190,6 +190,8 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("3 V^2^2", "V", "not a unit"),
         ("3 __import__('os')", "V", "unknown unit"),
         ("3 " + "V*" * 100 + "V", "V", "a number"),
+        ("3 V" + "*V" * 40, "V", "not a unit"),
+        ("3 " + "(V)" * 30, "V", "wrong dimension"),  # at once, not in 2^30 steps
         *[(text, "V*s/rad", "unit") for text in ("1 mkg", "1 kkg", "3 ^2", "3 )V", "3 (V", "3 *V", "3 ()")],
         *[(f"1 {'*'.join([unit] * 5)}", "m", "range of floats") for unit in ("Tm^6", "pm^6")],
     ],

@@ -89,6 +89,13 @@ def test_a_read_only_site_keeps_the_old_night_and_catches_up(tmp_path) -> None:
     check_whole(site)
 
 
+def test_a_result_that_cannot_be_read_back_makes_no_night_without_verdicts(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr("reports.nightly.cache.MAX_ENTRY_BYTES", 100)
+    with pytest.raises(InputError, match="vanished from the cache"):
+        nightly(tmp_path / "site", 10.0)
+    assert not (tmp_path / "site" / "index.html").exists()
+
+
 def test_a_site_that_cannot_be_written_at_the_end_is_published_next_time(tmp_path, monkeypatch) -> None:
     site = tmp_path / "site"
     nightly(site, 10.0)

@@ -208,6 +208,13 @@ def test_slopes_are_those_of_closed_forms():
     assert entry.low - entry.high == pytest.approx(20 * math.log10(1.1 / 0.9), rel=1e-9)
 
 
+def test_the_box_of_a_sensitivity_lies_about_the_value_that_the_design_has():
+    design = load_design("ilr33-amber")
+    changed = replace(design, motor=replace(design.motor, resistance_ohm=0.11))
+    result = sensitivities(changed, ["motor.resistance"])
+    assert all(e.low_value < 0.11 < e.high_value for e in result.entries)
+
+
 @pytest.mark.parametrize(("changes", "unit", "per_si"), [
     ({}, "deg/s", 180.0 / math.pi), ({"axis": "linear"}, "mm/s", 1e3),
     ({"position": True}, "deg", 180.0 / math.pi),

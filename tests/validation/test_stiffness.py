@@ -104,7 +104,15 @@ def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: 
     )
     expected = 2 * 0.36 / 800.0 + (play if dry < 0.36 else 0.0)
     assert lost_motion_rad(changed) == pytest.approx(expected, rel=1e-12)
-    assert lost_motion_seen(changed) == pytest.approx(expected, rel=2e-5)
+    assert lost_motion_seen(changed) == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize("dry", [2.0, 8.0, 20.0])
+def test_lost_motion_behind_heavy_friction_is_that_of_the_spring(dry: float) -> None:
+    """2 m/k with m = 3 % of the rated moment: the play lies within the width of friction."""
+    design = with_overrides(load_design("ilr33-amber-compliant"), {"load.friction.dry_torque": f"{dry} N*m"})
+    expected = 2 * 0.03 * design.load.moment_max_Nm / design.coupling.stiffness_Nm_rad
+    assert lost_motion_seen(design) == pytest.approx(expected, rel=1e-9)
 
 
 @pytest.mark.parametrize("moment", [0.5, 2.0, 8.0])

@@ -19,10 +19,17 @@ from analyses.validation.small_signal import nearest_pole, small_signal
 from nonlinear import tangent
 from nonlinear.bench.derivative import Tangent
 from nonlinear.bench.lifted import GRID, relative
-from nonlinear.bench.operating_motion import on_its_stand, on_the_bench, operating_motion, operating_motion_at
+from nonlinear.bench.operating_motion import (
+    on_its_stand,
+    on_the_bench,
+    operating_motion,
+    operating_motion_at,
+    without_counts,
+)
 from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)
+JOINT = load_design("joint")
 
 
 def stood(design: Design) -> tuple[Design, Loops]:
@@ -267,6 +274,16 @@ def test_a_resonance_that_is_not_resolved_is_not_proven() -> None:
     for row in unproven:
         assert row.verdict is Verdict.NOT_PROVEN
         assert "stated error of the tangent there" in row.because
+
+
+@pytest.mark.parametrize(
+    "place", ["current", "velocity", "position", "u", "i_ref", "w_ref", "command", "load"]
+)
+def test_counts_are_no_part_of_a_tangent(place: str) -> None:
+    """A drive with counts has the tangent of the same drive without them."""
+    counted, ideal = (tangent(one, place) for one in (JOINT, without_counts(JOINT)))
+    assert counted.stated_error < 1e-8
+    assert relative(counted.closed(Z), ideal.closed(Z)).max() < 1e-9
 
 
 def test_a_place_that_there_is_not() -> None:
