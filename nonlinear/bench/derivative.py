@@ -13,7 +13,7 @@ that bends with the angle.  Its derivative
 says everything that a linear loop says: response, poles, margins, at any rate, of any slow mode, stable or
 not.  It shares no code with the linear loops, so the two may be held against each other.
 
-`nonlinear.bench.differences` takes it; what three sizes of its steps differ in is the stated error.
+`nonlinear.bench.differences` takes it; what two sizes of its steps differ in is the stated error.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class Tangent:
     states : tuple of str
         Names of the numbers of the state that the injection moves, as the layout has them.
     stated_error : float
-        Largest error of the response, relative, by what three step sizes differ in.
+        Largest error of the response, relative, by what two step sizes differ in.
     entry_errors : ndarray, shape (n + M, n + M)
         The same of the entries of A over C beside B over D; see `error_at`.
     places : ndarray of int, shape (n,)

@@ -2,10 +2,11 @@
 
 Which numbers take part, a kick at the place shows: those that it moves.  The tick is affine but for events,
 which are seen, and for what bends, of which the design says over how far: a moment over its angle, the tanh
-law beside its flat part.  So the steps begin far above the kick's own motion, or where what bends is moved by
-`BENT` of that and the tanh law is flat in every tick; and they fall: larger ones bend or meet an event,
-smaller ones are lost in rounding.  Each column is taken where three successive steps agree best, by what
-their differences do to the response.  The sum of these is the stated error.
+law beside its flat part.  So the steps begin far above the kick's own motion, or with the largest without an
+event, or where what bends is moved by `BENT` of that and the tanh law is flat in every tick; and they fall by
+tens while a smaller one agrees better: larger ones bend, smaller ones are lost in rounding.  Where even the
+largest is lost in it, they grow.  Each column is taken where two successive steps agree best, by what their
+difference does to the response.  The sum of these differences is the stated error.
 """
 
 from __future__ import annotations
@@ -27,9 +28,12 @@ from nonlinear.bench.loop_setup import LoopSetup
 Parts = tuple[Floats, Floats, Floats, Floats]
 Pair = tuple[Floats, Floats]
 Places = npt.NDArray[np.intp]
-FAR, SMALLER = 1e16, 0.6  # the largest step, times a kick's first motion; the next over one
-MOST, ENOUGH = 200, 10  # steps in all, where events forbid the larger ones; of a column without an event
+MOST_DECADES = 40  # of steps, where events forbid the larger ones
+TENFOLD = 100.0  # what the truncation of central differences grows by with a step ten times as large
+FAR = 1e8  # times a kick's first motion: the largest step
 BENT = 1e-3  # of the way over which a torque bends, that the largest step may move it
+GROWN, KNOWN = 8, 1e-9  # decades that a column's steps may grow by, while its error is more than that
+LEAST = 3  # steps of a column: two differences, of which the second says whether it bends
 SLOWEST = 1e-13  # rad a sample: what is slower is at rest
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
 
@@ -79,20 +83,14 @@ class Differences:
         One after the other for each thing that is read.
         """
         n, readings = self.moved.size, self.injected.readings
-        values, rounding = self._tried()
-        for k in range(readings):
-            rows = np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
-            each = values[:, :, rows]
-            off = np.abs(np.diff(each, axis=0))  # of three successive ones
-            off = np.maximum(np.maximum(off[:-1], off[1:]), rounding[:-2, :, rows])
-            sizes = np.nanmax(np.abs(each) * self.scale[:, None], axis=(0, 1))
-            share = np.divide(1.0, sizes, out=np.zeros(sizes.size), where=sizes > 0.0)
-            whole, _ = _best(each, off, share[None], self.scale[None])  # of the largest in each row
-            left, right = self._felt(whole)
-            whole, error = _best(each, off, left, right)
+        rows = [
+            np.concatenate([np.arange(n), n + np.arange(k, self.updates * readings, readings)])
+            for k in range(readings)
+        ]
+        for columns, (left, right) in self._tried(rows):
+            whole, off = columns.best(left, right)
             g = GRID.size
-            stated = float(np.max(np.einsum("zi,ik,zk->z", left[:g], error, right[:g])))
-            yield self._split(whole), error, stated
+            yield self._split(whole), off, float(np.max(np.einsum("zi,ik,zk->z", left[:g], off, right[:g])))
 
     def _split(self, whole: Floats) -> Parts:
         n = self.moved.size
@@ -190,29 +188,53 @@ class Differences:
                 self.drive.each(states, 1, self.injected.at, injected[:, tick // self.hold])
         return np.fmin(steps, bias.room_rad_s * steps / np.maximum(moved, 1e-250))
 
-    def _tried(self) -> Pair:
-        """Differences by steps that fall, and what rounding may make of them: (steps, columns, rows).
+    def _tried(self, rows: list[Places]) -> list[tuple[_Columns, Pair]]:
+        """Columns by steps that fall by tens, of the rows of each thing that is read, and what is felt there.
 
-        Of each column until it had `ENOUGH` without an event: far smaller ones may be lost within the tick,
-        where no end shows it.  They fall by no power of two, by which rounding would fall alike.
+        Of each column until it had three without an event, and the last did not bend.  Where events forbid
+        the larger ones, they begin with the largest without one, found by halves.
         """
-        steps, seen, tried = self._largest(), np.zeros(self.scale.size), list[Pair]()
-        while len(tried) < MOST and (seen < ENOUGH).any():
-            values, rounding = self._differences(np.where(seen < ENOUGH, steps, 0.0))
+        steps, going, seen = self._largest(), np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
+        felt, tried = list[Pair](), list[Pair]()
+        for tries in range(1, MOST_DECADES + 1):
+            values, rounding = self._differences(np.where(going, steps, 0.0))
+            free = np.isfinite(values).all(axis=1)
+            small = free & ~seen & (tries > 1)
+            values[small] = np.nan
+            smaller = np.where(small, 5.0, np.where(seen & ~free, 0.5, 0.1))
+            steps, seen = np.where(going, smaller, 1.0) * steps, seen | free
             tried.append((values, rounding))
-            seen += np.isfinite(values).all(axis=1)
-            steps = SMALLER * steps
             for row, far in self._bends:
                 moved = np.abs(values[:, row])
                 moved[row] = np.fmax(moved[row], 1.0)  # by the step itself
                 steps = np.fmin(steps, far / np.maximum(moved, 1e-250))
-        values, rounding = (np.stack(each) for each in zip(*tried, strict=True))
-        free = np.asarray(np.isfinite(values).all(axis=2))
-        stuck = ~np.any(free[:-2] & free[1:-1] & free[2:], axis=0)
-        if stuck.any():
-            name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(stuck))]
-            raise NumericalError(f"{self.where}: every step of {name} ends in an event")
-        return values, rounding
+            if tries < LEAST:
+                continue
+            columns = [_Columns(tried, each) for each in rows]
+            going = ~columns[0].free
+            if not going.any():
+                felt = felt or [self._felt(each.last) for each in columns]
+                for one, (left, right) in zip(columns, felt, strict=True):
+                    going = going | one.bend(left, right)
+                if not going.any():
+                    return self._grown(rows, tried, felt)
+        name = (*self.names, *["the injection"] * self.updates)[int(np.argmax(going))]
+        raise NumericalError(f"{self.where}: every step of {name} ends in an event")
+
+    def _grown(self, rows: list[Places], tried: list[Pair], felt: list[Pair]) -> list[tuple[_Columns, Pair]]:
+        """The same with larger steps of columns that the largest knows best, while they agree better.
+
+        A number that hardly moves beside large ones is lost in their rounding at steps by its own motion.
+        """
+        steps = self._largest()
+        for _ in range(GROWN):
+            columns = [_Columns(tried, each) for each in rows]
+            going = np.any([one.grow(*each) for one, each in zip(columns, felt, strict=True)], axis=0)
+            if not going.any():
+                break
+            steps = np.where(going, 10.0 * steps, 0.0)
+            tried.insert(0, self._differences(steps))
+        return [(_Columns(tried, each), seen) for each, seen in zip(rows, felt, strict=True)]
 
     def _differences(self, steps: Floats) -> Pair:
         """Central differences over all numbers, one a row, and what rounding may make of them.
@@ -242,9 +264,47 @@ class Differences:
         return rows, rows[both, places]
 
 
-def _best(values: Floats, off: Floats, left: Floats, right: Floats) -> Pair:
-    """Each column by the step whose error, against the next smaller ones, does least; and that error."""
-    felt = np.max((off @ left.T) * right.T, axis=-1)
-    chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
-    columns = np.arange(chosen.size)
-    return values[chosen, columns].T, off[chosen, columns].T
+class _Columns:
+    """All columns of one thing that is read, by steps that fall; ``off``: what differs in the next one."""
+
+    def __init__(self, tried: list[Pair], rows: Places) -> None:
+        values, rounding = (np.stack(each)[:, :, rows] for each in zip(*tried, strict=True))
+        self.values = values[:-1]
+        self.off = np.maximum(np.abs(np.diff(values, axis=0)), rounding[:-1])
+        self.there = np.isfinite(self.off).all(axis=2)
+        self.smallest = len(self.there) - 1 - np.argmax(self.there[::-1], axis=0)
+
+    @property
+    def free(self) -> npt.NDArray[np.bool_]:
+        """Which have three successive steps without an event."""
+        return np.asarray((self.there[:-1] & self.there[1:]).any(axis=0))
+
+    @property
+    def last(self) -> Floats:
+        """Each column by its smallest step but one."""
+        return self._taken(self.smallest, self.values)
+
+    def bend(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+        """Of which truncation still falls with the smallest step."""
+        felt, last, columns = self._felt(left, right), self.smallest, np.arange(right.shape[1])
+        return np.asarray(felt[last, columns] * np.sqrt(TENFOLD) < felt[last - 1, columns])
+
+    def grow(self, left: Floats, right: Floats) -> npt.NDArray[np.bool_]:
+        """Which the largest step of all knows best, but not well."""
+        felt = self._felt(left, right)
+        best = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        return np.asarray((best == 0) & np.isfinite(felt[0]) & (felt[0] > KNOWN))
+
+    def best(self, left: Floats, right: Floats) -> Pair:
+        """Each column by the step whose error does least to the response; and that error."""
+        felt = self._felt(left, right)
+        chosen = np.argmin(np.where(np.isfinite(felt), felt, np.inf), axis=0)
+        return self._taken(chosen, self.values), self._taken(chosen, self.off)
+
+    def _felt(self, left: Floats, right: Floats) -> Floats:
+        """What the error of each column by each step does to the response."""
+        return np.asarray(np.max((self.off @ left.T) * right.T, axis=-1))
+
+    @staticmethod
+    def _taken(chosen: Places, values: Floats) -> Floats:
+        return values[chosen, np.arange(chosen.size)].T
