@@ -43,7 +43,7 @@ from reports.document_schema import (
     validate,
 )  # fmt: skip
 from reports.numbers import prose
-from reports.verdict_summary import verdict_of, walk
+from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible
 
 if TYPE_CHECKING:
@@ -269,10 +269,6 @@ def waived(sections: Iterable[Section], design: Design) -> None:
 def verdicts(items: Iterable[VerdictItem], what: str = "requirements") -> Block:
     """Make a list of verdicts; ``what`` is a key of `reports.verdict_summary.WORDS`."""
     return {"kind": "verdicts", "items": [plain(item) for item in items], "what": what}
-
-
-def judged(blocks: Iterable[Block]) -> list[VerdictItem]:
-    return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
 
 
 def details(title: str, blocks: Sequence[Block]) -> Block:

@@ -42,6 +42,10 @@ def why(item: Mapping[str, Any]) -> str:
     return "; ".join(filter(None, (item["reason"], item["waiver"])))
 
 
+def judged(blocks: Iterable[Mapping[str, Any]]) -> list[Any]:
+    return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
+
+
 def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
     """Count the verdicts of some blocks, each kind by itself."""
     kinds: dict[str, Tally] = {}
@@ -89,9 +93,10 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
 
 def open_items(sections: Iterable[Mapping[str, Any]]) -> list[str]:
     """Name what is not met, or not proven and not waived, with the reason or with value and limit."""
-    blocks = [block for part in sections for block in walk(part) if block["kind"] == "verdicts"]
-    items = [item for block in blocks for item in block["items"] if role(item) in ("fail", "warn")]
-    items.sort(key=lambda item: role(item) != "fail")
+    every = judged(block for part in sections for block in walk(part))
+    items = sorted(
+        (one for one in every if role(one) in ("fail", "warn")), key=lambda one: role(one) != "fail"
+    )
     return list(dict.fromkeys(f"{item['verdict']}: {item['label']}{_found(item)}" for item in items))
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -153,7 +152,7 @@ def check_run(
         for other in runs
         if other is not run and run.sensor_file and run.sensor_file == other.sensor_file
     )
-    for other in islice(same, 1):
+    if (other := next(same, None)) is not None:
         text = f"the sensor's file is that of run {other.id} as well"
         yield Finding(subject="sensor file", passed=False, text=text)
 

@@ -274,6 +274,10 @@ def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
     angle = "m" if run.axis == "linear" else "rad"
     si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
     ended = conduct(run, full_deflection_rad)
+    followed = run.stage in (
+        "velocity",
+        "current",
+    )  # an angle is the output; a voltage has none
     out = {
         "design": run.design_name,
         "status": ended.status,
@@ -284,7 +288,7 @@ def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
         "commanded": run.stage,
         f"largest_command_{si}": np.abs(run.reference_rad).max(),
         f"largest_error_{si}": np.abs(run.reference_rad - run.followed).max(),
-        f"final_response_{si}": run.followed[-1],
+        **({f"final_response_{si}": run.followed[-1]} if followed else {}),
         f"final_output_{angle}": run.output_angle_rad[-1],
         f"largest_motor_speed_{angle}_s": np.abs(run.motor_speed_rad_s).max(),
         "largest_current_A": np.abs(run.current_A).max(),
@@ -296,8 +300,6 @@ def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
         "stick_fraction": run.stick_fraction,
         "parameters_hash": run.parameters_hash,
     }
-    if run.stage in ("position", "voltage"):  # the output says it; nothing follows a voltage
-        del out[f"final_response_{si}"]
     if run.energy is not None:
         out["energy"] = {**vars(run.energy), "relative_error": run.energy.relative_error}
     return out

@@ -21,7 +21,7 @@ from reports.nightly import machines, pages
 from reports.nightly.cache import Cache
 from reports.nightly.history import History
 from reports.nightly.text import sha256
-from reports.nightly.view import DesignView, Overview, report_folder
+from reports.nightly.view import DesignView, Overview, report_folder, vanished
 
 MARKER = ".nightly-site"
 KEPT_NIGHTS = 3
@@ -102,9 +102,7 @@ def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Pat
     entry = cache.whole(design.result.key) if missing else None
     for name in missing:
         if entry is None:
-            raise InputError(
-                f"the result of {design.name[:60]!r} has vanished from the cache: run again", where=str(site)
-            )
+            raise vanished(design.name, site)
         yield folder / name, entry.file(name)
 
 

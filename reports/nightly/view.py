@@ -138,15 +138,20 @@ def report_folder(result: Result) -> str:
     return f"reports/{hashed(result.name)}/{result.key[:16]}"
 
 
+def vanished(name: str, site: Path) -> InputError:
+    """That a result cannot be read back."""
+    return InputError(f"the result of {name[:60]!r} has vanished from the cache: run again", where=str(site))
+
+
 def overview(history: History, cache: Cache, study: Study, site: Path, *, built: bool = False) -> Overview:
     """Put together what the site says about the last finished night; what was ``built`` just now is there."""
     runs = history.runs
     between = Between(history, study.tolerances, study.origin)
     tonight = history.night(runs[-1].id).by_name
     designs = [_design(result, between, cache) for result in tonight.values()]
-    lost = [one.name for one in designs if built and one.result.key and not one.meta]
-    if lost:
-        raise InputError(f"the result of {lost[0][:60]!r} has vanished from the cache: run again", str(site))
+    for one in designs:
+        if built and one.result.key and not one.meta:
+            raise vanished(one.name, site)
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
         study=study,
