@@ -122,10 +122,16 @@ def _allowed(design: Design, path: str, value: float) -> float | int:
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{path} = {shown(value)}: allowed: a number")
     number, whole = float(value), field.kind == "integer"
-    if not field.accepts(number) or (whole and number != int(number)):
+    if not field.fits(number):
         allowed = "a whole number, " * whole + field.allowed(field.unit(Structure.of(design)))
         raise InputError(f"{path} = {number!r}: allowed: {allowed}")
     return int(number) if whole else number
+
+
+def unit_in_file(design: Design, path: str, field: Field | None) -> str:
+    """The SI unit of a key as a file has to say it; ``"1"`` for what is no key with one."""
+    unit = "1" if field is None else field.unit(Structure.of(design))
+    return ampere_unit(path, unit, design.motor.constants)
 
 
 def _changed(design: Design, path: str, value: float) -> Parameter:
@@ -133,8 +139,7 @@ def _changed(design: Design, path: str, value: float) -> Parameter:
     old, (field, _) = design.parameters.get(path), located(design, path)
     if old is not None and old.value == value:
         return old
-    unit = field.unit(Structure.of(design))
-    text = si_text(value, ampere_unit(path, unit, design.motor.constants))
+    text, unit = si_text(value, unit_in_file(design, path, field)), field.unit(Structure.of(design))
     new = Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
     if old is None:
         return new

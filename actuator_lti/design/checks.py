@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields, replace
-from math import isfinite
-from numbers import Real
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,31 +47,17 @@ def _refuse(refusals: Iterable[Refusal], where: str) -> None:
 def out_of_range(design: Design) -> Iterator[Refusal]:
     """Of a design made in Python: numbers outside their range, or that are none, and unknown words."""
     axis = FIELDS["design.axis"]
-    if not _fits(axis, design.axis):  # all units follow from it
+    if not axis.fits(design.axis):  # all units follow from it
         yield "design.axis", shown(design.axis), f"allowed: {axis.allowed('1')}"
         return
     structure = Structure.of(design)
     for section, path, part in parts_of(design):
-        usual = {item.name: item.default for item in fields(part)}
         for field in fields_in(section.template):
-            value, default = getattr(part, field.attribute), usual[field.attribute]
+            value = getattr(part, field.attribute)
             needed = field.required and getattr(part, "law", None) is None
-            left_out = not needed and type(value) is type(default) and value == default
-            if not (left_out or _fits(field, value)):
+            left_out = not needed and type(value) is type(field.default) and value == field.default
+            if not (left_out or field.fits(value)):
                 yield f"{path}.{field.key}", shown(value), f"allowed: {field.allowed(field.unit(structure))}"
-
-
-def _fits(field: Field, value: Any) -> bool:
-    """Whether a key takes a value."""
-    if isinstance(value, tuple | list):
-        listed = field.kind in ("quantities", "matrix", "names")
-        return listed and all(_fits(field, one) for one in value)
-    if field.kind in ("choice", "names"):
-        return value in field.choices
-    if field.kind in ("quantity", "integer", "quantities", "matrix"):
-        number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
-        return number and field.accepts(float(value)) and (field.kind != "integer" or value == int(value))
-    return True
 
 
 def contradictions(design: Design) -> Iterator[Refusal]:

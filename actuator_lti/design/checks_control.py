@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields as part_fields
 from math import inf, pi
 from typing import Any
 
@@ -214,10 +213,9 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
 def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
     """Keys of the stage that its law takes the place of."""
     part = getattr(design.controller, stage)
-    usual = {item.name: item.default for item in part_fields(part)}
     for field in fields_in(f"control.{stage}"):
         value = getattr(part, field.attribute)
-        if field.key not in BESIDE_A_LAW and value is not UNREAD and value != usual[field.attribute]:
+        if field.key not in BESIDE_A_LAW and value is not UNREAD and value != field.default:
             yield f"control.{stage}.{field.key}", f"{value}", f"not allowed beside control.{stage}.law"
     if getattr(part, "filters", ()):
         allowed = f"not allowed beside control.{stage}.law, which may have it"

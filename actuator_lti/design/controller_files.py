@@ -27,8 +27,8 @@ from actuator_lti.design.sections import parts_of
 from actuator_lti.design.settings_file import objects_of_xml, parsed_xml
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
-from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
+from actuator_lti.errors import InputError, in_file
+from actuator_lti.files.reading import parse_json, read_text, shown_path
 from actuator_lti.files.tree import Tree
 
 Stage = Literal["velocity", "-velocity", "current", "-current"]
@@ -133,8 +133,7 @@ FORMATS = (
     ),
     Format(
         "VESC motor configuration", re.compile(r"<MCConfiguration"),
-        lambda text, where: {str(item.tag): item.text for item in parsed_xml(text, where).iter()
-                             if not len(item)},
+        lambda text, where: {str(item.tag): item.text for item in parsed_xml(text).iter() if not len(item)},
         (
             Setting("control.current.gain", "V/A", 2.0, "foc_current_kp"),
             Setting("control.current.integral_time", "s", _ratio, "foc_current_kp", "foc_current_ki"),
@@ -198,14 +197,14 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     InputError
         If the file cannot be read, or the design cannot hold what stands in it.
     """
-    where = shown_path(path)
-    text = decode(read_bytes(path, "settings file"), where)
+    where, text = shown_path(path), read_text(path, "settings file")
     found = next((one for one in FORMATS if one.known.search(text)), None)
     if found is None:
         return None
-    if unfit := found.unfit(text, base):
-        raise InputError(unfit, where=where)
-    given = found.read(text, where)
+    with in_file(where):
+        if unfit := found.unfit(text, base):
+            raise InputError(unfit)
+        given = found.read(text, where)
     overrides, used, notes = _overrides(found, given, base, path.name)
     tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
     fixed = {

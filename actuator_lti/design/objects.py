@@ -10,7 +10,7 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import check_relations
 from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
 from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import shown
 
 __all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "import_objects"]
@@ -65,7 +65,8 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     InputError names the file ``where``.
     """
     _check_cascade(base)
-    given = _checked(objects.values, where)
+    with in_file(where):
+        given = _checked(objects.values)
     changes: dict[str, float] = {}
     kept: list[ControllerObject] = []
     for item in objects.values:
@@ -101,7 +102,7 @@ def _check_cascade(design: Design) -> None:
         )
 
 
-def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
+def _checked(values: tuple[ControllerObject, ...]) -> _Values:
     """Values by index and subindex; duplicates and values out of their object's range are refused."""
     seen: _Values = {}
     for item in values:
@@ -113,20 +114,18 @@ def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
         elif not (-(2**63) <= item.value < 2**64 and item.index <= 0xFFFF and item.subindex <= 0xFF):
             allowed = "an integer of at most 64 bits"
         if allowed:
-            raise InputError(f"{item.label} = {item.value}: allowed: {allowed}", where=where)
+            raise InputError(f"{item.label} = {item.value}: allowed: {allowed}")
         seen[item.index, item.subindex] = item.value
     return seen
 
 
-def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
+def checked_objects(values: tuple[ControllerObject, ...], factor: Any) -> ControllerObjects:
     """Settings from their parts as every file of them is held to: each in its range, the factor positive."""
     if len(values) > MAX_OBJECTS:
-        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}", where=where)
-    _checked(values, where)
+        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}")
+    _checked(values)
     if isinstance(factor, bool) or not isinstance(factor, int | float) or not 1e-6 <= factor <= 1e6:
-        raise InputError(
-            f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)", where=where
-        )
+        raise InputError(f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)")
     return ControllerObjects(velocity_gain_factor=float(factor), values=values)
 
 

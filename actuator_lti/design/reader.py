@@ -420,7 +420,7 @@ class Reader:
     def objects(self, raw: Any) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         try:
-            return objects_from({} if raw is None else raw, self.findings.where)
+            return objects_from({} if raw is None else raw)
         except InputError as error:
             self.unread("objects", error.message)
         return model.ControllerObjects()
