@@ -26,23 +26,15 @@ def paths_of(design: Design) -> tuple[str, ...]:
         for section, path, part in parts_of(design)
         if not (section.rare and part == section.kind())
         for field in fields_in(section.template)
-        if field.is_number and _has_value(field, getattr(part, field.attribute))
+        if field.is_number
+        and (value := getattr(part, field.attribute)) is not None
+        and value != inf
+        and (value != 0.0 or field.accepts(value))  # 0: the gain of a stage with a law of one's own
     )
 
 
-def _has_value(field: Field, value: float | None) -> bool:
-    """Whether a key is there; the gain of a stage with a law of one's own is 0, which no gain may be."""
-    return value is not None and value != inf and (value != 0.0 or field.accepts(value))
-
-
 def located(design: Design, path: str) -> tuple[Field, Any]:
-    """The field of a numeric path and the part of the design that holds it.
-
-    Raises
-    ------
-    InputError
-        If there is no such key, or the design has no such stage.
-    """
+    """The field of a numeric path and the part of the design that holds it; an InputError for any other."""
     if not isinstance(design, Design) or not isinstance(path, str):
         given = f"design = {shown(design)}, key = {shown(path)}"
         raise InputError(f"{given}: allowed: a Design (load_design) and a dotted key")

@@ -20,14 +20,9 @@ CHECKS = "validation"  # what the ids of checks by simulation begin with
 
 
 def check_design(design: Design, where: str) -> None:
-    """Refuse a design that no file may hold: values out of range, or that contradict each other.
+    """Refuse a design of the file ``where`` that none may hold: values out of range, or that contradict.
 
-    ``where`` names its file.
-
-    Raises
-    ------
-    InputError
-        All at once: key, value and what is allowed.
+    The InputError names all at once: key, value and what is allowed.
     """
     _refuse(out_of_range(design), where)  # the relations ask for numbers that are some
     check_relations(design, where)
@@ -65,8 +60,7 @@ def contradictions(design: Design) -> Iterator[Refusal]:
     for check in FIRST_RELATIONS:
         refused = tuple(readable(check(design)))
         yield from refused
-        unsure = {path.partition(".")[0] for path, *_ in refused}
-        design = replace(design, **dict.fromkeys(unsure, UNREAD))
+        design = replace(design, **dict.fromkeys({path.partition(".")[0] for path, *_ in refused}, UNREAD))
     for check in (*RELATIONS, _requirements, _waivers, _correlations):
         yield from readable(check(design))
 
@@ -92,16 +86,17 @@ RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 
 def _requirements(design: Design) -> Iterator[Refusal]:
     for number, item in enumerate(design.requirements):
-        for check in (_named_once, _limit, _asked_of):
-            yield from readable(check(item, design, number))
+        yield from readable(_named_once(item, design.requirements[:number]))
+        yield from readable(_limit(item))
+        yield from readable(_asked_of(item, design))
 
 
-def _named_once(item: Requirement, design: Design, number: int) -> Iterator[Refusal]:
-    if any(item.id == other.id for other in design.requirements[:number]):
+def _named_once(item: Requirement, before: tuple[Requirement, ...]) -> Iterator[Refusal]:
+    if any(item.id == other.id for other in before):
         yield f"requirement.{item.id}.id", shown(item.id), "allowed: each id once"
 
 
-def _limit(item: Requirement, *_: object) -> Iterator[Refusal]:
+def _limit(item: Requirement) -> Iterator[Refusal]:
     path = f"requirement.{item.id}"
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
@@ -109,7 +104,7 @@ def _limit(item: Requirement, *_: object) -> Iterator[Refusal]:
         yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
 
 
-def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal]:
+def _asked_of(item: Requirement, design: Design) -> Iterator[Refusal]:
     """The loop, the rotor and the response that it is of."""
     path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
     present = {"every", *design.controller.stages}
@@ -122,8 +117,11 @@ def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal
         yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
     answers = item.loop in ("position", "every") and quantity.of_response
     if item.to is not None and not (answers and "position" in present):
-        allowed = "allowed: of bandwidth, resonance and step of the position loop only"
-        yield f"{path}.to", shown(item.to), allowed
+        yield (
+            f"{path}.to",
+            shown(item.to),
+            "allowed: of bandwidth, resonance and step of the position loop only",
+        )
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:
@@ -131,12 +129,12 @@ def _waivers(design: Design) -> Iterator[Refusal]:
     known = {item.id for item in design.requirements}
     seen: set[str] = set()
     for item in design.waivers:
-        named = item.requirement in known or item.requirement.rpartition("/")[0] in known
-        if item.requirement in seen or not (named or item.requirement.startswith(CHECKS)):
+        id = item.requirement
+        named = id in known or id.rpartition("/")[0] in known
+        if id in seen or not (named or id.startswith(CHECKS)):
             allowed = f"each once: a requirement's id, id/loop, or the id of a check ({CHECKS}...)"
-            path = f"waiver.{item.requirement}.requirement"
-            yield path, shown(item.requirement), f"allowed: {allowed}"
-        seen.add(item.requirement)
+            yield f"waiver.{id}.requirement", shown(id), f"allowed: {allowed}"
+        seen.add(id)
 
 
 def _correlations(design: Design) -> Iterator[Refusal]:
