@@ -59,7 +59,9 @@ def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterato
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
     velocity = design.controller.velocity
-    for place in () if velocity is None else get_args(FilterPlace):
+    if velocity is None:
+        return
+    for place in get_args(FilterPlace):
         count = len(velocity.filters_on(place))
         if count > MAX_FILTERS:
             yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"

@@ -13,10 +13,12 @@ p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from math import isfinite, pi, sqrt
+from operator import mul
 from pathlib import Path
 from typing import Any, Literal
 
@@ -43,11 +45,8 @@ class Setting:
     """One key of a design: a factor on one number of the file, or ``value`` of several, in the unit."""
 
     def __init__(self, key: str, unit: str, value: Value, *names: str, when: Stage | None = None) -> None:
-        self.key, self.unit, self.value, self.names, self.when = key, unit, value, names, when
-
-    def of(self, numbers: Sequence[float]) -> float:
-        """Its value."""
-        return float(self.value(*numbers) if callable(self.value) else self.value * numbers[0])
+        self.key, self.unit, self.names, self.when = key, unit, names, when
+        self.of = value if callable(value) else partial(mul, value)
 
     def holds(self, design: Design) -> bool:
         """Whether a design of these stages takes it: ``"-velocity"`` is one without a velocity loop."""
@@ -192,10 +191,7 @@ FORMATS = (
 def import_controller_file(path: Path, base: Design) -> Imported | None:
     """A design with the settings of such a file; None where it is of none of these formats.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or the design cannot hold what stands in it.
+    An InputError where the file cannot be read, or the design cannot hold what stands in it.
     """
     where, text = shown_path(path), read_text(path, "settings file")
     found = next((one for one in FORMATS if one.known.search(text)), None)
@@ -214,8 +210,7 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     }
     left = ", ".join(name for name in given if name not in (*used, *found.also)) or "none"
     notes = [f"read as {found.words}", *notes, f"not understood, of {len(given)} settings: {left}"]
-    changes = {**fixed, **overrides}
-    design = with_overrides(base, changes)
+    design = with_overrides(base, changes := {**fixed, **overrides})
     changed = tuple(key for key in changes if key in design.parameters)
     return Imported(design=design, changed=changed, kept=(), notes=tuple(notes))
 
@@ -235,7 +230,7 @@ def _overrides(
             notes += [said] if item.names[0] in numbers else []
             continue
         used |= {*item.names}
-        value = item.of([*numbers.values()])
+        value = float(item.of(*numbers.values()))
         stated = ", ".join(f"{name} = {given[name]}" for name in item.names)
         if item.key == "limits.speed" and value > no_load_speed(base):
             notes.append(f"{stated}: faster than the supply allows, left out")

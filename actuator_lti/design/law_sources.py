@@ -42,7 +42,8 @@ def read_law(path: Path) -> Tree:
     if period is None:
         raise refused("has no Ts, the period that the law was made for; ")
     try:
-        return law_tree(*(held.get(part, ()) for part in (*PARTS, "L")), np.asarray(period).item())
+        A, B, C, D, L = (held.get(part, ()) for part in (*PARTS, "L"))
+        return law_tree(A, B, C, D, L, np.asarray(period).item())
     except (ValueError, TypeError) as error:
         raise refused(f"{error}; ") from None
 

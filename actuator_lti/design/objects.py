@@ -94,7 +94,7 @@ def _follows(known: KnownObject, value: int, given: _Values) -> bool:
 
 def _check_cascade(design: Design) -> None:
     control = design.controller
-    cascade = control.velocity is not None and control.current is not None and control.own_law is None
+    cascade = {"velocity", "current"} <= {*control.stages} and control.own_law is None
     if design.axis != "rotary" or not cascade:
         raise InputError(
             f"the design {design.name} cannot hold a motion controller's settings; "
@@ -164,13 +164,13 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     before = design.objects
     complete = not before.values if complete is None else complete
     original = {item.place: item.value for item in before.values}
-    written: list[ControllerObject] = []
     rounded: list[Rounding] = []
-    for item in before.values:
+    written = list(before.values)
+    for k, item in enumerate(before.values):
         known = OBJECTS.get(item.place)
-        follows = known is not None and (known.paths or _follows(known, item.value, original))
-        value = _encode(design, known, rounded) if known is not None and follows else None
-        written.append(item if value is None else replace(item, value=value))
+        if known is not None and (known.paths or _follows(known, item.value, original)):
+            value = _encode(design, known, rounded)
+            written[k] = item if value is None else replace(item, value=value)
     missing = [known for key, known in OBJECTS.items() if key not in original]
     for known in missing if complete else []:
         value = _encode(design, known, rounded)
