@@ -114,7 +114,8 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
         linkage = "" if public else _INLINED if inner else f"static {prefix}clones " if root else "static "
         texts.append(collector.definition(function, linkage + head, lines))
     texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
-    return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix, bool(second))
+    parts = "\n".join(types), "\n".join(texts)
+    return Program(collector.constants, *parts, declarations, prefix, cloned=bool(second))
 
 
 class Collector:
