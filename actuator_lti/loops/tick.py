@@ -259,8 +259,8 @@ def mean_response(steps: Sequence[tuple[Any, ...]], z: np.ndarray) -> np.ndarray
     """Fundamental of a periodic system at z (..., 1, 1): A, B, C, D of each of the M steps of its period.
 
     An input z^k leaves the states z^k p_k with p_k of period M, ``z p_(k+1) = A_k p_k + B_k``; the mean of
-    ``C_k p_k + D_k`` over a period is asked. It begins where ``z^M p_0`` is ``A_(M-1) ... A_0 p_0`` and the sum
-    of ``A_(M-1) ... A_(k+1) B_k z^k``.
+    ``C_k p_k + D_k`` over a period is asked. It begins where ``z^M p_0`` is ``A_(M-1) ... A_0 p_0`` and the
+    sum of ``A_(M-1) ... A_(k+1) B_k z^k``.
     """
     n = steps[0][0].shape[-1]
     over, driven, power, total = np.eye(n), np.zeros((n, 1)), np.ones_like(z), 0.0
