@@ -32,7 +32,7 @@ from actuator_lti.files.tree import Tree
 
 MAX_GEARS = 20
 MAX_LIST = 200
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
+_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9_/ -]{0,62}[A-Za-z0-9_-])?\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
 _CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
@@ -408,8 +408,8 @@ class Reader:
         if name is None:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
-            plain = re.sub(r"[^A-Za-z0-9_-]+", "-", f"{name}").strip("-_")[:64] or "first"
-            allowed = f'allowed: 1 to 64 letters, digits, - and _, no dot or space, as "{plain}"'
+            plain = re.sub(r"[^A-Za-z0-9_/ -]+", "-", f"{name}").strip("-_/ ")[:64].rstrip("/ ") or "first"
+            allowed = f'allowed: 1 to 64 letters, digits, spaces, -, _ and /, no dot, as "{plain}"'
             self.refuse(f"{numbered}.name", name, allowed)
         elif path in before:
             self.refuse(f"{numbered}.name", name, "allowed: each name once")
