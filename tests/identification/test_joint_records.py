@@ -1,6 +1,7 @@
 """Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -55,6 +56,17 @@ def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_pat
     checks = {check["id"]: check for check in told["items"]}
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
+
+
+def test_a_held_out_record_is_filtered_as_those_of_the_fit(files: dict[str, str], tmp_path, cli) -> None:
+    """The same record again has the residual of the fit, less what its own bias is."""
+    again = shutil.copy(files["a"], tmp_path / "again.csv")
+    words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
+    told = cli.data(*words)
+    checks = {check["id"]: check for check in told["items"]}
+    assert checks["held-out-again.csv"]["value"] == pytest.approx(
+        told["model"]["relative_residual"], rel=0.05
+    )
 
 
 def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
