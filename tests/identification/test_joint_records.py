@@ -84,11 +84,10 @@ def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
         assert reason in cli.refused(*common, "--fix", wrong)
 
 
-def test_a_torque_command_is_the_drive(tmp_path, cli) -> None:
+def test_a_torque_command_is_the_drive(identify) -> None:
     columns = columns_of(motion(2))
     columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
-    path = write(tmp_path / "r.csv", columns)
-    result = cli("identify", path, "--design", "ilr33-amber", "--json").data
+    result = identify(columns).data
     uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
     assert uses["commanded motor torque"] == "drive: torque as commanded"
     assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
