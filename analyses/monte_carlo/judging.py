@@ -85,7 +85,6 @@ def in_populations(requirement: Requirement, design: Design) -> bool:
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
-    """Columns that a requirement reads."""
     if requirement.quantity in DRIVE_QUANTITIES:
         return (drive_column(requirement.quantity, requirement.load_Nm),)
     loops = judged_loops(requirement.loop, loops_of(design))
@@ -138,13 +137,11 @@ class Tally:
 
     @classmethod
     def of(cls, distance: np.ndarray, number: np.ndarray, value: np.ndarray, passed: np.ndarray) -> Tally:
-        """The tally of some samples."""
         order = np.argsort(distance, kind="stable")[:WORST_KEPT]
         worst = tuple((float(distance[k]), int(number[k]), float(value[k])) for k in order)
         return cls(int(passed.sum()), worst)
 
     def merged(self, other: Tally) -> Tally:
-        """The tally of the samples of both."""
         worst = sorted([*self.worst, *other.worst], key=lambda one: one[:2])[:WORST_KEPT]
         return Tally(self.passed + other.passed, tuple(worst))
 
@@ -159,7 +156,6 @@ class Reduction:
     tallies: tuple[Tally, ...] = ()
 
     def merged(self, other: Reduction) -> Reduction:
-        """What the samples of both come to."""
         if not self.count or not other.count:
             return self if self.count else other
         return Reduction(
@@ -213,11 +209,9 @@ class Reducing:
     task: SampleTask
 
     def sample(self) -> bytes:
-        """See `SampleTask.sample`."""
         return self.task.sample()
 
     def __call__(self, chunk: Chunk) -> Reduction:
-        """What the samples of a chunk come to."""
         made, first = Reduction(), chunk[0]
         draws = self.task.sampler.draw(*chunk)  # at once: far on it takes long
         for start in range(0, len(draws), BLOCK):
