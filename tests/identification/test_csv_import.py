@@ -1,6 +1,6 @@
-"""Records import hashlib
-from CSV: layouts, units, accounts of rows, and refusals that name line, column and reason."""
+"""Records from CSV: layouts, units, accounts of rows, and refusals that name line, column and reason."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
