@@ -48,6 +48,27 @@ def bound(panel: Panel, values: Iterable[float | None], *, span: float, top_room
     panel.y.limits(low - 0.04 * height, high + top_room * height)
 
 
+def decibels(values: np.ndarray) -> np.ndarray:
+    """Magnitude in dB; nothing is -inf, which a chart leaves out."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(20.0 * np.log10(np.abs(values)))
+
+
+def phases(values: np.ndarray) -> np.ndarray:
+    """Phase in degrees, without jumps."""
+    return np.degrees(np.unwrap(np.angle(values)))
+
+
+def bode_axes(
+    top: Panel, bottom: Panel, phase: Iterable[float | None], ends: Sequence[float] | None = None,
+    *, span: float = 900.0,
+) -> None:  # fmt: skip
+    """Name the axes of a Bode diagram; see `phase_axis`."""
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    frequency(bottom, ends)
+    phase_axis(bottom, phase, span=span)
+
+
 def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:
     """Set limits and ticks of a phase: multiples of 15, 45, 90, ... degrees."""
     bound(panel, values, span=span, top_room=0.08)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
@@ -16,8 +16,11 @@ from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
-from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words, unit_words
+from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
+
+if TYPE_CHECKING:
+    from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE_STATUS: dict[str, doc.Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
@@ -39,10 +42,6 @@ def _figure(quantity: str, key: str, format: str) -> doc.Shown:
     return figure_column(quantity, key, format=format), doc.of(of.reader, key, "", scale=of.shown[1])[1]
 
 
-def _at(name: str) -> Callable[[LoopFigures], float | None]:
-    return lambda figures: hertz(getattr(getattr(figures.margins, name), "frequency_rad_s", None))
-
-
 def _state(figures: LoopFigures) -> doc.State:
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
@@ -54,8 +53,7 @@ def _evidence(figures: LoopFigures) -> doc.State:
 
 
 def _samples(figures: LoopFigures) -> float | None:
-    delay = figures.margins.delay_margin
-    return delay.samples if delay and figures.margins.stable else None
+    return getattr(figures.margins.delay_margin, "samples", None) if figures.margins.stable else None
 
 
 HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
@@ -63,9 +61,9 @@ MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
     doc.of(_evidence, "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
-    doc.of(_at("gain_margin"), "gain_margin_hz", "at", **HERTZ),
+    doc.of("margins.gain_margin.frequency_hz", "gain_margin_hz", "at", **HERTZ),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
-    doc.of(_at("phase_margin"), "crossover_hz", "at", **HERTZ),
+    doc.of("margins.phase_margin.frequency_hz", "crossover_hz", "at", **HERTZ),
     _figure("delay_margin", "delay_margin_ms", "ms:3"),
     doc.of(_samples, "delay_margin_samples", "", "samples", format="sig:3", better=1),
     _figure("modulus_margin", "modulus_margin", "fix:3"),
@@ -87,15 +85,15 @@ LOOP = doc.column("loop", "Loop")
 MARGIN_COLUMNS = [LOOP, *(column for column, _ in MARGINS)]
 RESPONSE_COLUMNS = [LOOP, *(column for column, _ in RESPONSES)]
 CROSSING_COLUMNS = [
-    LOOP,
-    doc.column("kind", "Crossing"),
-    doc.column("value", "Margin", format="sig:5"),
-    doc.column("unit", "Unit"),
-    doc.column("rad_s", "at", "rad/s", format="sig:5"),
-    doc.column("hz", "at", "Hz", format="sig:4"),
-    figure_column("delay_margin", "delay_ms", format="ms:4"),
-    doc.column("samples", "", "samples", format="sig:4"),
-    doc.column("note", "Remark"),
+    doc.of("loop", "loop", "Loop"),
+    doc.of("kind", "kind", "Crossing"),
+    doc.of(lambda one: finite(one.value), "value", "Margin", format="sig:5"),
+    doc.of("unit", "unit", "Unit"),
+    doc.of(lambda one: finite(one.at.frequency_rad_s), "rad_s", "at", "rad/s", format="sig:5"),
+    doc.of(lambda one: finite(one.at.frequency_hz), "hz", "at", "Hz", format="sig:4"),
+    (figure_column("delay_margin", "delay_ms", format="ms:4"), doc.of("delay.seconds", "", "", scale=1e3)[1]),
+    doc.of("delay.samples", "samples", "", "samples", format="sig:4"),
+    doc.of("note", "note", "Remark"),
 ]
 
 
@@ -314,9 +312,32 @@ def range_words(range_: Spread, quantity: str) -> str:
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
+class _Crossing(NamedTuple):
+    loop: str
+    kind: str
+    value: float
+    unit: str
+    at: GainMargin | PhaseMargin
+    note: str
+    delay: DelayMargin | None = None
+
+
 def crossing_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
-    return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
+    found, touches = list[_Crossing](), "touches, does not cross"
+    for name, m in ((name, one.margins) for name, one in named.items()):
+        for gain in m.gain_margins:
+            note = f"{'upper' if gain.ratio >= 1.0 else 'lower'} limit of the gain"
+            note += f", {touches}" * gain.tangent
+            found.append(_Crossing(name, "phase crossover", gain.db, "dB", gain, note))
+        delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
+        for phase in m.phase_margins:
+            more = touches * phase.tangent, delays.get(phase.frequency_rad_s)
+            found.append(_Crossing(name, "gain crossover", phase.deg, "deg", phase, *more))
+    loops = {words: key for key, title in LOOPS.items() for words in (title, loop_words(key))}
+    return doc.listing(
+        "Every gain and phase crossover", found, CROSSING_COLUMNS,
+        more=lambda one: {"_loop": loops.get(one.loop, ""), "_hz": finite(one.at.frequency_hz) or None},
+    )  # fmt: skip
 
 
 def margin_row(figures: LoopFigures) -> Tree:
@@ -371,28 +392,6 @@ def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
     value = None if figures.margins.stable is False else quantity.raw(figures)
     return times(value, quantity.shown[1])
-
-
-def _crossings(name: str, figures: LoopFigures) -> list[doc.Row]:
-    m, touches = figures.margins, "touches, does not cross"
-    rows: list[doc.Row] = []
-    for gain in m.gain_margins:
-        note = f"{'upper' if gain.ratio >= 1.0 else 'lower'} limit of the gain{f', {touches}' * gain.tangent}"
-        rows.append(_crossing(name, "phase crossover", gain.db, "dB", gain.frequency_rad_s) | {"note": note})
-    delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
-    for phase in m.phase_margins:
-        delay = delays.get(phase.frequency_rad_s)
-        more: doc.Row = {"delay_ms": delay.seconds * 1e3, "samples": delay.samples} if delay else {}
-        more["note"] = touches if phase.tangent else ""
-        rows.append(_crossing(name, "gain crossover", phase.deg, "deg", phase.frequency_rad_s) | more)
-    return rows
-
-
-def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> doc.Row:
-    hz = finite(hertz(omega_rad_s))
-    loop = next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), "")
-    row = {"_loop": loop, "_hz": hz or None, "loop": name, "kind": kind, "value": finite(value), "unit": unit}
-    return {**row, "delay_ms": None, "samples": None, "rad_s": finite(omega_rad_s), "hz": hz}
 
 
 def worst_status(stable: Iterable[bool | None]) -> doc.Status:
