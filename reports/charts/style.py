@@ -59,14 +59,10 @@ def phases(values: np.ndarray) -> np.ndarray:
     return np.degrees(np.unwrap(np.angle(values)))
 
 
-def bode_axes(
-    top: Panel, bottom: Panel, phase: Iterable[float | None], ends: Sequence[float] | None = None,
-    *, span: float = 900.0,
-) -> None:  # fmt: skip
-    """Name the axes of a Bode diagram; see `phase_axis`."""
+def bode_axes(top: Panel, bottom: Panel, phase: Iterable[float | None]) -> None:
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
-    frequency(bottom, ends)
-    phase_axis(bottom, phase, span=span)
+    frequency(bottom)
+    phase_axis(bottom, phase)
 
 
 def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:

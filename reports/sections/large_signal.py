@@ -95,17 +95,15 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
         return []
     gain = max(abs(run.gain_error) for run in sawtooth.runs)
     lag = max(abs(run.lag_error_deg) for run in sawtooth.runs)
-    rows = (
-        ("gain", "fundamental from 4/(πx)", gain, GAIN_TOLERANCE, "%", 100.0),
-        ("lag", "lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, "deg", 1.0),
-    )
-    return [
-        doc.verdict(
-            f"validation-sawtooth-{key}", f"Sawtooth: difference of the {label}", comparison="<=",
-            value=scale * error, limit=scale * limit, unit=unit, passed=error <= limit,
-        )
-        for key, label, error, limit, unit, scale in rows
-    ]  # fmt: skip
+    items = []
+    for key, label, error, limit, of in (
+        ("gain", "fundamental from 4/(πx)", gain, GAIN_TOLERANCE, Unit(100.0, "%")),
+        ("lag", "lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, Unit(1.0, "deg")),
+    ):
+        found = {"value": of.scale * error, "limit": of.scale * limit, "unit": of.unit, "comparison": "<="}
+        words = f"Sawtooth: difference of the {label}"
+        items.append(doc.verdict(f"validation-sawtooth-{key}", words, passed=error <= limit, **found))
+    return items
 
 
 def _map_figure(result: LargeSignals, out: Unit) -> doc.Block:
