@@ -20,8 +20,7 @@ from reports.sections.identified import finding_table, input_table, judged, para
 def section(result: BenchResult) -> doc.Section:
     axis, model = result.design.axis, result.model
     blocks = [_parameters(model, axis)]
-    if result.design_values:
-        blocks.append(_against_design(result.design_values, axis))
+    blocks += [_against_design(result.design_values, axis)] if result.design_values else []
     if result.refined is not None:
         refined = result.refined
         note = (
@@ -36,10 +35,8 @@ def section(result: BenchResult) -> doc.Section:
         residual = 100.0 * result.electrical.relative_residual
         note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
         blocks.append(parameter_table("Voltage equation", result.electrical, note))
-    if result.laws:
-        blocks.append(law_table(result, axis))
-    if len(result.records) > 1:
-        blocks.append(scatter_table(model, axis))
+    blocks += [law_table(result, axis)] if result.laws else []
+    blocks += [scatter_table(model, axis)] if len(result.records) > 1 else []
     for part, record in zip(model.records, result.records, strict=True):
         blocks += [
             input_table(f"Inputs: {record.name}", result.inputs[record.name]),
