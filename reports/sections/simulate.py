@@ -102,10 +102,7 @@ def _limits(run: Trajectory) -> doc.Block:
 def _energy(run: Trajectory) -> doc.Block:
     assert run.energy is not None
     values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
-    rows = [
-        {"what": n.removesuffix("_J").replace("_", " "), "value": value, "unit": "J" if "_J" in n else ""}
-        for n, value in values.items()
-    ]
+    rows = [(n.removesuffix("_J").replace("_", " "), v, "J" * n.endswith("_J")) for n, v in values.items()]
     return doc.table("Where the electrical energy went", COLUMNS, rows)
 
 
