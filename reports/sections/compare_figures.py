@@ -40,13 +40,11 @@ def overlays(comparison: Comparison) -> doc.Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[doc.Block]:
-    which = "closed loop" if closed else "open loop"
-    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
-    top, bottom = chart.column(1.0, 1.0)
     known = [(one, one.loops[name]) for one in drawn if name in one.loops]
     known = [(one, result) for one, result in known if result.stable or not closed]
     if not known:
         return []
+    which = "closed loop" if closed else "open loop"
     lowest = min(frequency_grid(result, 140)[0] for _, result in known)
     curves = []
     for one, result in known:
@@ -56,10 +54,10 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         band = result.bandwidth if closed else None
         values = response.values / abs((band and band.dc_gain) or 1.0)  # in any unit it starts at 0 dB
         curves.append((one.variant.name[:60], replace(response, values=values)))
+    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
-    both(curves, None, top, bottom, span=whole, phase_span=whole, look=_look)
-    caption = f"{title}, {which}: the base and its variants."
-    return [doc.figure("overlay", chart, caption)]
+    both(curves, None, *chart.column(1.0, 1.0), span=whole, phase_span=whole, look=_look)
+    return [doc.figure("overlay", chart, f"{title}, {which}: the base and its variants.")]
 
 
 def _look(k: int) -> style.Style:

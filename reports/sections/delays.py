@@ -11,6 +11,7 @@ from reports.charts import style
 from reports.charts.paint import HATCHES
 from reports.sections.names import hertz, loop_words
 
+DEG: dict[str, Any] = {"unit": "deg", "format": "fix:2"}
 PARTS = {
     "controller": "controller",
     "plant": "motor, inner loops",
@@ -23,16 +24,15 @@ PARTS = {
 
 def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
     def part(key: str, label: str) -> doc.Shown:
-        return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, "deg", format="fix:2")
+        return doc.of(lambda one: one[1].items.get(key, 0.0), key, label, **DEG)
 
-    left: dict[str, Any] = {"unit": "deg", "format": "fix:2"}
     columns = [
         doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
         doc.of(lambda one: hertz(one[1].frequency_rad_s), "crossover_hz", "Crossover", "Hz", format="sig:4"),
         *(part(key, label.capitalize()) for key, label in _parts(budgets).items()),
-        doc.of(lambda one: one[1].total_deg, "total", "Phase in all", "deg", format="fix:2"),
-        doc.of(lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", **left, better=1),
-        doc.of(lambda one: one[1].one_more_sample_deg, "one_more", "One more sample", **left),
+        doc.of(lambda one: one[1].total_deg, "total", "Phase in all", **DEG),
+        doc.of(lambda one: 180.0 + one[1].total_deg, "margin", "Left to −180°", **DEG, better=1),
+        doc.of(lambda one: one[1].one_more_sample_deg, "one_more", "One more sample", **DEG),
     ]
     note = (
         "The loop is built up cause by cause, so the parts add up to the phase of the exact sampled loop. "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -100,9 +101,10 @@ def _sawtooth_verdicts(sawtooth: Sawtooth) -> list[doc.VerdictItem]:
         ("gain", "fundamental from 4/(πx)", gain, GAIN_TOLERANCE, Unit(100.0, "%")),
         ("lag", "lag from arccos(π/2x)", lag, LAG_TOLERANCE_DEG, Unit(1.0, "deg")),
     ):
-        found = {"value": of.scale * error, "limit": of.scale * limit, "unit": of.unit, "comparison": "<="}
+        found: dict[str, Any] = {"value": of.scale * error, "limit": of.scale * limit, "unit": of.unit}
         words = f"Sawtooth: difference of the {label}"
-        items.append(doc.verdict(f"validation-sawtooth-{key}", words, passed=error <= limit, **found))
+        id = f"validation-sawtooth-{key}"
+        items.append(doc.verdict(id, words, passed=error <= limit, comparison="<=", **found))
     return items
 
 

@@ -23,7 +23,11 @@ if TYPE_CHECKING:
     from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
-EVIDENCE_STATUS: dict[str, doc.Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
+EVIDENCE: dict[str, doc.State] = {
+    "certified": {"text": "certified", "status": "pass"},
+    "checked": {"text": "checked", "status": "info"},
+    "withheld": {"text": "withheld", "status": "warn"},
+}
 MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
@@ -48,10 +52,6 @@ def _state(figures: LoopFigures) -> doc.State:
     return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
 
 
-def _evidence(figures: LoopFigures) -> doc.State:
-    return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
-
-
 def _samples(figures: LoopFigures) -> float | None:
     return getattr(figures.margins.delay_margin, "samples", None) if figures.margins.stable else None
 
@@ -59,7 +59,7 @@ def _samples(figures: LoopFigures) -> float | None:
 HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
-    doc.of(_evidence, "evidence", "Margins are"),
+    doc.of(lambda figures: EVIDENCE[figures.margins.evidence], "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
     doc.of("margins.gain_margin.frequency_hz", "gain_margin_hz", "at", **HERTZ),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
@@ -102,28 +102,26 @@ def section(result: Margins) -> list[doc.Section]:
     judged, known = requirements.section(result.requirements, load_unit(result.design)), _named(result)
     how = f"{FORMS[result.asked.form].capitalize()}; {_where(result)}. "
     made = _loops(known, result.operating_points, how)
-    made["blocks"] += [doc.text(note) for note in _notes(result, known)]
+    made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
     said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
-    said += _below_custom(result)
-    return [{**made, "result": said}, judged]
+    return [{**made, "result": said + _below_custom(result)}, judged]
 
 
 def brief(result: Margins) -> Brief:
-    first, judged = section(result)
-    known = _named(result)
+    (first, judged), known = section(result), _named(result)
     every, own = with_held(known), with_own_margins(with_held(known))
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
-    crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
+    more, told = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
     if result.measured is not None:
-        crossings += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
-    told = [] if result.measured is None else [measured.words(result.measured)]
+        more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
+        told.append(measured.words(result.measured))
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
+    return Brief(first["result"], [SideBySide(head, tables), *more, *judged["blocks"]], notes)
 
 
 def _named(result: Margins) -> dict[str, LoopFigures]:
@@ -183,8 +181,7 @@ def _cogging(result: Margins) -> str:
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
     """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
     how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
-    made = _loops({LOOPS[name]: one for name, one in figures.items()}, points, how)
-    return {**made, "result": result(figures)}
+    return {**_loops({LOOPS[n]: one for n, one in figures.items()}, points, how), "result": result(figures)}
 
 
 def _loops(
@@ -239,12 +236,11 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
 
 def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
     """Say how the margins of some loops are known: "certified", or which of them are not."""
-    others: dict[str, list[str]] = {}
+    kinds: dict[str, list[str]] = {}
     for name, one in figures.items():
-        others.setdefault(one.margins.evidence, []).append(LOOPS.get(name, name).lower())
-    if len(others) == 1:
-        return next(iter(others))
-    return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
+        kinds.setdefault(one.margins.evidence, []).append(LOOPS[name].lower())
+    said = (f"{' and '.join(names)} {kind}" if len(kinds) > 1 else kind for kind, names in kinds.items())
+    return ", ".join(said)
 
 
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
@@ -258,7 +254,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
         "is not stable and has no margins. Disk margin: α, balanced (S + T)."
     )
-    rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
+    rows = [{"loop": name, **margin_row(one)} for name, one in named.items()]
     note += DOWNWARDS if any((row["gain_margin_db"] or 0.0) < 0.0 for row in rows) else ""
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
@@ -270,12 +266,12 @@ def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
         "the output shaft, with what the drive has of feed-forward, jerk limit and filter of the command; to "
         "the reference: behind profile and filter."
     )
-    rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
-    note += NONE_THERE if any(None in row.values() for row in rows) else ""
+    rows = [{"loop": name, **response_row(one)} for name, one in named.items()]
+    if any(None in row.values() for row in rows):
+        note += " A dash: the response never falls or peaks so far, or the loop is not stable."
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
 
 
-NONE_THERE = " A dash: the response never falls or peaks so far, or the loop is not stable."
 SPREAD_COLUMNS = [
     LOOP,
     doc.column("gain", "Gain margin, operating points", "dB"),
@@ -390,8 +386,8 @@ def response_row(figures: LoopFigures) -> Tree:
 
 def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
-    value = None if figures.margins.stable is False else quantity.raw(figures)
-    return times(value, quantity.shown[1])
+    value = None if figures.margins.stable is False else finite(quantity.raw(figures))
+    return None if value is None else value * quantity.shown[1]
 
 
 def worst_status(stable: Iterable[bool | None]) -> doc.Status:
@@ -402,8 +398,3 @@ def worst_status(stable: Iterable[bool | None]) -> doc.Status:
 
 def finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
-
-
-def times(value: float | None, factor: float) -> float | None:
-    known = finite(value)
-    return None if known is None else known * factor
