@@ -47,7 +47,6 @@ def judged(blocks: Iterable[Mapping[str, Any]]) -> list[Any]:
 
 
 def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
-    """Count the verdicts of some blocks, each kind by itself."""
     kinds: dict[str, Tally] = {}
     for block in blocks:
         if block["kind"] == "verdicts" and block["items"]:
@@ -85,7 +84,6 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:
-    """Give every block of a section or block, those inside details too."""
     for block in part.get("blocks", ()):
         yield block
         yield from walk(block)

@@ -173,7 +173,6 @@ LEADER = 26.0  # words further away from their point are tied to it by a line
 
 
 def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
-    """Write the words of a rule or note where they cover nothing."""
     w, h = text_box(item.words, NOTE)
     size = (w + 6.0, h + 2.0)
     if isinstance(item, Rule):

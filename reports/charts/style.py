@@ -55,7 +55,6 @@ def decibels(values: np.ndarray) -> np.ndarray:
 
 
 def phases(values: np.ndarray) -> np.ndarray:
-    """Phase in degrees, without jumps."""
     return np.degrees(np.unwrap(np.angle(values)))
 
 
@@ -79,7 +78,6 @@ def multiples(step: float, low: float, high: float) -> list[tuple[float, str]]:
 
 
 def nyquist_plane(chart: Chart) -> Panel:
-    """Add the plane of L with its axes and the unit circle."""
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
     panel.rule_y(0.0)
@@ -89,7 +87,6 @@ def nyquist_plane(chart: Chart) -> Panel:
 
 
 def critical_point(panel: Panel) -> None:
-    """Mark -1, and show what lies about it."""
     panel.points([-1.0], [0.0], marker="+", colour=INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
     panel.x.limits(-1.0 - FRAME, FRAME - 0.35)

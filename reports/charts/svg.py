@@ -75,7 +75,6 @@ def paper_svg(chart: Chart, prefix: str) -> str:
 
 
 def _column(column: Column, width: float, height: float, pen: Pen) -> str:
-    """Write the panels of a column on common edges."""
     above = [22.0 if panel.title else 8.0 for panel in column.panels]
     below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
     head = 16.0 if column.title else 0.0
@@ -129,7 +128,6 @@ def _shown(chart: Chart) -> list[tuple[str, Item]]:
 
 
 def _legend(chart: Chart, prefix: str) -> str:
-    """Write the legend as a list; the script makes switches of its items."""
     items = _shown(chart)
     if not items:
         return ""
@@ -144,7 +142,6 @@ def _legend(chart: Chart, prefix: str) -> str:
 
 
 def _key_rows(chart: Chart) -> list[list[tuple[str, Item, float]]]:
-    """Break the legend into lines of the chart's width."""
     rows: list[list[tuple[str, Item, float]]] = []
     x = math.inf
     for label, item in _shown(chart):

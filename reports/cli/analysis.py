@@ -120,7 +120,6 @@ def answer(
     quiet: bool = False,
     **chosen: Any,
 ) -> None:
-    """Ask, then print the section or the result, and leave with the verdict."""
     from actuator_lti.design import warnings_of
     from analyses.isolation import isolated
     from reports import document as doc

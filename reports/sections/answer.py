@@ -76,8 +76,7 @@ def believed(sections: Sequence[doc.Section]) -> str:
     tested = [block for part in sections if part["id"] == "validation" for block in doc.walk(part)]
     rows = [row for block in tested if block["kind"] == "table" for row in block["rows"]]
     relative = [row.get("error") for row in rows if row.get("predicted") is None and not row.get("unit")]
-    errors = [error for error in relative if isinstance(error, float)]
-    count = tally(checks)
+    errors, count = [error for error in relative if isinstance(error, float)], tally(checks)
     words = [f"Linear equals simulated to {power_above(max(errors))}"] if errors and max(errors) > 0.0 else []
     words += [f"{count.met} of {count.total} checks by simulation met"]
     words += [f"{count.not_met} not met"] if count.not_met else []

@@ -18,7 +18,6 @@ from reports.sections.names import POINTS, Unit, output_unit, speed_unit
 
 
 def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Section:
-    """Make the section: what the describing functions say, and what steps of growing size do."""
     out = output_unit(axis)
     result, *more = _words(conditional, out)
     size = conditional.threshold_rad or conditional.full_deflection_rad
@@ -99,7 +98,6 @@ NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 
 def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
-    """Make the section: standing error, ripple, limit cycles, and from where the loop is linear."""
     intro = (
         "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(π A)); for "
         "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "

@@ -26,7 +26,6 @@ _NOTE = "Gains and losses are changes of the distance to the limit, in percent o
 
 
 def section(comparison: Comparison) -> doc.Section:
-    """Make the section: the best design of each requirement, and each variant's gains and losses."""
     id, title = "best", "Which variant for what"
     if not comparison.base.verdicts:
         return doc.section(id, title, [], result="The base states no requirement.")
@@ -49,7 +48,6 @@ def section(comparison: Comparison) -> doc.Section:
 
 
 def failed(one: Compared) -> int:
-    """Number of requirements that a design does not meet, or that are not proven of it."""
     return sum(not v.passes for v in one.verdicts)
 
 

@@ -26,7 +26,6 @@ def sections(comparison: Comparison) -> list[doc.Section]:
 
 
 def overlays(comparison: Comparison) -> doc.Section:
-    """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
     drawn = comparison.all[:MOST_CURVES]
     blocks: list[doc.Block] = []
     for name, title in LOOPS.items():

@@ -60,7 +60,6 @@ def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
 
 
 def chart(result: Corners) -> style.Chart:
-    """Draw for each figure and corner a line from nominal to the corner, one a loop; and the limit."""
     made = style.Chart(width=style.WIDE, height=96.0 + 38.0 * len(result.corners), legend=True)
     nominal = result.corners[0]
     for quantity in (QUANTITIES[name] for name in CORNERED):

@@ -79,7 +79,6 @@ def _share(signal: SignalComparison) -> str:
 
 
 def _summary(results: Sequence[CorrelationResult], error_limit: float | None) -> doc.Section:
-    """Make the section of all records together: a table with a row for all, and the worst one's figure."""
     rows: list[tuple[str, SignalComparison | SignalSummary]] = []
     for name, one in summarise(results).items():
         rows += [(result.record, result[name]) for result in results if name in result.signals]

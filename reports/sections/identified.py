@@ -31,7 +31,6 @@ def judged(
 
 
 def _verdict(item: Item) -> doc.VerdictItem:
-    """One item; shares in per cent."""
     value, limit = (None if share is None else 100.0 * share for share in (item.value, item.limit))
     return doc.verdict(
         item.id, item.label, value=value, limit=limit, unit="" if value is None else "%",
@@ -78,7 +77,6 @@ def parameter_table(
 
 
 def input_table(caption: str, inputs: Sequence[InputUse]) -> doc.Block:
-    """The columns of files: meaning, unit, range in SI, whether each is used and why not."""
     columns = [
         *([doc.of("file", "file", "File")] if any(one.file for one in inputs) else []),
         doc.of("column", "column", "Column"),
@@ -93,7 +91,6 @@ def input_table(caption: str, inputs: Sequence[InputUse]) -> doc.Block:
 
 
 def finding_table(record: str, findings: Sequence[Finding]) -> doc.Block:
-    """Whether a record agrees with itself and with the design's limits."""
     words = {True: "yes", False: "NO", None: "not told"}
     columns = [
         doc.of("subject", "subject", "Looked at"),

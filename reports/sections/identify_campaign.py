@@ -44,7 +44,6 @@ def section(answer: CampaignAnswer) -> doc.Section:
 
 
 def coefficient_table(fit: SurfaceFit) -> doc.Block:
-    """Values, standard errors, 95 % intervals, and how they go together."""
     random = np.diag(fit.random_covariance) / np.maximum(np.diag(fit.covariance), 1e-300)
     scatter = dict(zip(NAMES, (100.0 * random).tolist(), strict=True))
     more = [doc.of(scatter.get, "scatter", "Share of scatter", "%", format="fix:0")]
@@ -72,7 +71,6 @@ def contribution_table(answer: CampaignAnswer) -> doc.Block:
 
 
 def shared_table(fit: SurfaceFit) -> doc.Block:
-    """What the bound of each shared error does to each coefficient."""
     columns = [doc.column("name", "Systematic error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
     rows = [

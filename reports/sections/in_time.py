@@ -26,7 +26,6 @@ TESTED = "locked"  # how the rotor stands in the current loop that is put to the
 
 
 def sections(validation: Validation) -> list[doc.Section]:
-    """Make the section of the sweep and that of steps and margins, as far as there are any."""
     made = [_injection(list(validation.sweeps.values()))] if validation.sweeps else []
     return made + ([_in_time(validation)] if validation.steps or validation.margins else [])
 

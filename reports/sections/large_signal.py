@@ -125,8 +125,6 @@ def _map_figure(result: LargeSignals, out: Unit) -> doc.Block:
 
 
 def _shift_table(shift: LimitShift, design: Design, out: Unit) -> doc.Block:
-    """List the linear limit and what friction makes of it, frequency by frequency."""
-
     def percent(k: int) -> float | None:
         same = shift.linear_limiter[k] == shift.simulated_limiter[k]
         return 100.0 * (shift.ratio[k] - 1.0) if same else None
@@ -240,7 +238,6 @@ def _sawtooth(sawtooth: Sawtooth, out: Unit, load: str) -> doc.Block:
 
 
 def _sawtooth_column(panels: list[style.Panel], run: SawtoothRun, out: Unit) -> None:
-    """Draw the motion at one load, on panels of position, rate and (where there is one) current."""
     formula, time, scale = run.formula, run.time_s, out.scale
     peak = "–" if formula.peak is None else out.of(formula.peak)
     impure = f"distortion {100.0 * run.distortion:.1f} % (12.1 %)"

@@ -33,50 +33,26 @@ Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 
 
 def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
-    locked = figures.locked
-    grid = frequency_grid(figures)
-    title, status = LOOPS[name], worst_status([figures.sound])
+    title, grid, locked = LOOPS[name], frequency_grid(figures), figures.locked
     blocks = [_facts(figures), loop_charts.open_bode(title, figures, grid, name=name)]
-    if figures.stable:
-        blocks.append(loop_charts.closed_bode(title, figures, grid, locked, name=name))
+    blocks += [loop_charts.closed_bode(title, figures, grid, locked, name=name)] if figures.stable else []
     blocks.append(loop_charts.nyquist(title, figures, grid))
-    if figures.peaks is not None:
-        blocks.append(sensitivity(title, design, name, figures, grid))
-    if figures.step is not None:
-        blocks.append(step(title, figures, locked, name=name))
+    blocks += [sensitivity(title, design, name, figures, grid)] if figures.peaks is not None else []
+    blocks += [step(title, figures, locked, name=name)] if figures.step is not None else []
     blocks.append(doc.details("Nichols chart", [loop_charts.nichols(title, figures, grid)]))
     corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
     said, known = said_of(design, corner), {title: figures}
     notes = [*([said] if said else []), *by_itself_notes(known), *evidence_notes(known)]
-    blocks += [doc.remark(note) for note in (*notes, *figures.margins.notes, *figures.notes)]
-    words, intro = result(figures), _intro(name, figures)
-    return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
-
-
-def result(figures: LoopFigures) -> str:
-    row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
-    parts = [
-        ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
-        ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
-    ]
-    words = []
-    for name, value, unit, hz, write in parts:
-        if value is not None:
-            words.append(f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else ""))
-    if bandwidth is not None:
-        to = " to the command" if figures.loop.name == "position" else ""
-        words.append(f"bandwidth{to} {style.hertz(bandwidth)}")
-    rotor = "Rotor free, " if figures.loop.name == "current" else ""
-    verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
-    return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
-
-
-def _intro(name: str, figures: LoopFigures) -> str:
-    period = figures.loop.period_s
+    blocks += map(doc.remark, (*notes, *figures.margins.notes, *figures.notes))
+    period, evidence = figures.loop.period_s, figures.margins.evidence
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
-    words = f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}."
-    return f"{words} The margins are {figures.margins.evidence}: {MEANING[figures.margins.evidence]}."
+    intro = (
+        f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
+        f"{MEANING[evidence]}."
+    )
+    words, status = result(figures), worst_status([figures.sound])
+    return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
@@ -88,6 +64,22 @@ def _facts(figures: LoopFigures) -> doc.Block:
     return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
 
 
+def result(figures: LoopFigures) -> str:
+    row, bandwidth, words = margin_row(figures), response_row(figures)["minus3db_hz"], []
+    for name, value, unit, hz, write in (
+        ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
+        ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
+    ):
+        if value is not None:
+            words.append(f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else ""))
+    if bandwidth is not None:
+        to = " to the command" if figures.loop.name == "position" else ""
+        words.append(f"bandwidth{to} {style.hertz(bandwidth)}")
+    rotor = "Rotor free, " if figures.loop.name == "current" else ""
+    verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
+    return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
+
+
 def _short(value: float | None, format: str) -> float | None:
     """Cut a figure to what a reader remembers; the tables hold every digit."""
     if value is None:
@@ -97,7 +89,6 @@ def _short(value: float | None, format: str) -> float | None:
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
-    """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
     asked = [one for one in design.requirements if one.quantity == "sensitivity_peak"]
@@ -137,7 +128,6 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
 def step(
     title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
 ) -> doc.Block:
-    """Draw the step responses, as stairs where sampled, and the figures read from the first."""
     figures, end = loop_figures.step, None
     assert figures is not None
     drawn = {"rotor free" if locked else "closed loop": loop_figures}

@@ -29,19 +29,16 @@ def nyquist_hz(figures: LoopFigures) -> float | None:
 def open_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "", small: bool = False
 ) -> doc.Block:
-    """Draw magnitude and phase of the open loop, every margin where it is; ``small`` on the first screen."""
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 410.0)
     chart = style.Chart(width=width, height=height, loop=name)
     top, bottom = chart.column(1.15, 1.0)
-    drawn, margins = curve(figures.loop.plain_open, grid), figures.margins
+    drawn, margins, shown = curve(figures.loop.plain_open, grid), figures.margins, 1 if small else LABELLED
     both([("open loop", drawn)], nyquist_hz(figures), top, bottom, span=100.0)
     top.rule_y(0.0, colour=style.INK)
-    _gain_margins(drawn, margins, top, 1 if small else LABELLED)
-    _phase_margins(drawn, margins, top, bottom, 1 if small else LABELLED)
-    caption = (
-        f"{title}, open loop: gain margins at the phase crossovers (■), "
-        "phase margins at the gain crossovers (●)."
-    )
+    _gain_margins(drawn, margins, top, shown)
+    _phase_margins(drawn, margins, top, bottom, shown)
+    caption = f"{title}, open loop: gain margins at the phase crossovers (■), phase margins at the gain "
+    caption += "crossovers (●)."
     return doc.figure("bode", chart, caption, alt=margin_words(title, figures), layout="half")
 
 
@@ -54,7 +51,6 @@ def margin_words(title: str, figures: LoopFigures) -> str:
 
 
 def _gain_margins(curve: Curve, margins: StabilityMargins, top: style.Panel, shown: int) -> None:
-    """Draw each gain margin as the distance to 0 dB at its phase crossover."""
     first, last = curve.frequency_hz[[0, -1]]
     inside = [(-m.db, m.frequency_rad_s / (2.0 * math.pi)) for m in margins.gain_margins]
     low, high = top.y.span()

@@ -179,7 +179,6 @@ def _cogging(result: Margins) -> str:
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
-    """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
     how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
     return {**_loops({LOOPS[n]: one for n, one in figures.items()}, points, how), "result": result(figures)}
 
@@ -211,7 +210,6 @@ def _loops(
 
 
 def result(figures: Mapping[str, LoopFigures]) -> str:
-    """Say whether all loops are stable, and which has the smallest margins."""
     doubts = [
         f"{words}: {', '.join(names)}."
         for words, sound in (("Not stable", False), ("Not known to be stable", None))
@@ -280,7 +278,6 @@ SPREAD_COLUMNS = [
 
 
 def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of the least and largest margins over the operating points that the drive has."""
     seen = [point for point in points if point.kind != "describing-function"]
     places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
     ranges, rows = spread(seen), list[doc.Row]()

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 
 def words(one: Measured) -> str:
-    """Say within what the model explains the measurement."""
     db, deg = np.abs(one.difference_db), np.abs(one.difference_deg)
     ends = f"{db.max():.2f} dB (at {one.frequency_hz[db.argmax()]:.4g} Hz) and {deg.max():.1f} deg"
     told = f"The model explains the measurement within {ends} (at {one.frequency_hz[deg.argmax()]:.4g} Hz)"
@@ -37,7 +36,6 @@ def section(one: Measured) -> doc.Section:
 
 
 def blocks(one: Measured) -> list[doc.Block]:
-    """Give verdict, margins, differences and charts."""
     made = [doc.text(words(one))]
     if one.margins is not None:
         made.append(_margins(one.margins))

@@ -146,7 +146,6 @@ def _words(name: str) -> str:
 
 
 def _figures(result: MonteCarloResult) -> list[doc.Block]:
-    """Draw the distribution behind every requirement, at most three a figure, in rows of like length."""
     shown = [
         (odds, result.columns[name])
         for odds in result.odds

@@ -92,7 +92,6 @@ def tolerance_words(item: Parameter) -> str:
 def provenance(
     design: Mapping[str, Any], head: Mapping[str, Any], findings: Sequence[doc.Finding] = ()
 ) -> doc.Section:
-    """Make the section of provenance from the document's own head."""
     rows = {
         "design": f"{design['name']}, revision {design['revision'] or 'none'}",
         "design file": design["origin"] or "none",
