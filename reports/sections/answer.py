@@ -191,15 +191,16 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
         return []
     view = point.view if point else None
     name = view.loop if view and view.loop else list(figures)[-1]
-    result = figures[name]
-    there = view.found if view else None  # drawn where it crosses: in a gap nothing comes back at all
+    result, there = figures[name], view.found if view else None
+    # drawn where it crosses: in a gap nothing comes back at all
     seen = there if there and (there.margins.gain_margins or there.margins.phase_margins) else result
     own = seen is result
     title = LOOPS[name] if own or view is None else weakest_label(view)
     bode = loop_charts.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
-    if result.step is None:
-        return [bode]
-    return [bode, loop_section.step(LOOPS[name], result, None, name=name, small=True)]
+    step = (
+        [] if result.step is None else [loop_section.step(LOOPS[name], result, None, name=name, small=True)]
+    )
+    return [bode, *step]
 
 
 def unchecked() -> doc.Finding:
