@@ -67,7 +67,7 @@ def _fields(of: Any, *names: str) -> Tree:
 def loop_json(figures: LoopFigures) -> Tree:
     """Give everything known of one loop; a figure that does not exist is null."""
     m, peaks = figures.margins, figures.peaks
-    others = (
+    others: tuple[tuple[str, Tree, LoopFigures | None], ...] = (
         ("judged", {"how": HELD.get(figures.loop.name)}, figures.held),
         ("rotor_locked", {}, figures.locked),
         ("to_reference", {}, figures.reference),

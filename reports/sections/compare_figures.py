@@ -65,20 +65,19 @@ def _look(k: int) -> style.Style:
 
 
 def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]:
-    steps = [(one, one.loops[name].step) for one in drawn if name in one.loops]
-    shown = [(one.variant.name[:60], step) for one, step in steps if step is not None]
+    steps = [(one.variant.name[:60], one.loops[name].step) for one in drawn if name in one.loops]
+    shown = [(label, step) for label, step in steps if step is not None]
     if not shown:
         return []
     chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
     panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
     for k, (label, step) in enumerate(shown):
-        keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
-        response = np.asarray(step.response)[keep] / step.final_value
-        panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
+        time, response = np.asarray(step.time_s), np.asarray(step.response)
+        keep = np.unique(np.linspace(0, len(time) - 1, min(len(time), 240)).astype(int))
+        panel.curve(time[keep] * scale, response[keep] / step.final_value, label, **_look(k))
     panel.x.limits(0.0)
-    caption = f"{title}, unit step: the base and its variants."
-    return [doc.figure("overlay", chart, caption)]
+    return [doc.figure("overlay", chart, f"{title}, unit step: the base and its variants.")]
 
 
 def tornadoes(comparison: Comparison) -> doc.Section:

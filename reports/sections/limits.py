@@ -111,11 +111,11 @@ class _Linear:
 def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     rows: list[_Linear] = []
     for fraction in design.validation.amplitude_fractions if _full(design) else ():
-        amplitude = fraction * _full(design)
+        amplitude, up_to, limiter = fraction * _full(design), None, "none in this range"
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
-        first = int(reached[0]) if len(reached) else None
-        up_to = None if first is None else hertz(_crossing(border, first, amplitude))
-        limiter = "none in this range" if first is None else words_of(border.active[first])
+        if len(reached):
+            up_to = hertz(_crossing(border, int(reached[0]), amplitude))
+            limiter = words_of(border.active[int(reached[0])])
         rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
     return rows
 
@@ -132,15 +132,10 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
-COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED} | {
-    name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()
-}
-WORDS = {
-    "friction": "dry friction",
-    "stiction": "stiction",
-    "none": "linear",
-    "other": "play, gravity or counts",
-} | {name: limiter.words for name, limiter in LIMITERS.items()}
+COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED}
+COLOURS |= {name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()}
+WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"}
+WORDS |= {"other": "play, gravity or counts"} | {name: one.words for name, one in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},

@@ -15,17 +15,7 @@ from analyses.specification.asked_figures import said_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, fixed, gain_margin, seconds, to_minus
-from reports.sections import loop_charts
-from reports.sections.margins import (
-    MEANING,
-    by_itself_notes,
-    evidence_notes,
-    finite,
-    margin_row,
-    response_row,
-    shown,
-    worst_status,
-)
+from reports.sections import loop_charts, margins
 from reports.sections.names import LOOPS, hertz
 
 STEP_POINTS = 300
@@ -42,30 +32,30 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
     blocks.append(doc.details("Nichols chart", [loop_charts.nichols(title, figures, grid)]))
     corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
     said, known = said_of(design, corner), {title: figures}
-    notes = [*([said] if said else []), *by_itself_notes(known), *evidence_notes(known)]
+    notes = [*([said] if said else []), *margins.by_itself_notes(known), *margins.evidence_notes(known)]
     blocks += map(doc.remark, (*notes, *figures.margins.notes, *figures.notes))
     period, evidence = figures.loop.period_s, figures.margins.evidence
     rate = "" if period is None else f", every {seconds(period)}"
     inner = "no loop inside it" if name == "current" else "the loops inside it closed"
     intro = (
         f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
-        f"{MEANING[evidence]}."
+        f"{margins.MEANING[evidence]}."
     )
-    words, status = result(figures), worst_status([figures.sound])
+    words, status = result(figures), margins.worst_status([figures.sound])
     return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
     items = []
     for of in AT_A_GLANCE:
-        value = _short(shown(of, figures), of.at_a_glance)
+        value = _short(margins.shown(of, figures), of.at_a_glance)
         items.append(doc.fact(of.label, value, of.shown[0], better=of.direction))
-    crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
+    crossover = _short(margins.margin_row(figures)["crossover_hz"], "sig:3")
     return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
 
 
 def result(figures: LoopFigures) -> str:
-    row, bandwidth, words = margin_row(figures), response_row(figures)["minus3db_hz"], []
+    row, bandwidth, words = margins.margin_row(figures), margins.response_row(figures)["minus3db_hz"], []
     for name, value, unit, hz, write in (
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
@@ -101,7 +91,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         ("T", figures.loop.plain_closed, peaks.complementary_rad_s, peaks.complementary_db, style.BLUE),
     )
     for k, (letter, system, omega, peak, colour) in enumerate(drawn):
-        at, db = finite(hertz(omega)), finite(peak)
+        at, db = margins.finite(hertz(omega)), margins.finite(peak)
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"

@@ -146,15 +146,9 @@ def _words(name: str) -> str:
 
 
 def _figures(result: MonteCarloResult) -> list[doc.Block]:
-    shown = [
-        (odds, result.columns[name])
-        for odds in result.odds
-        if odds.id != "all"
-        for name in odds.columns
-        if len(result.columns[name].counts) >= 2  # the same in every sample: nothing to draw
-    ]
-    blocks = []
-    rows = -(-len(shown) // 3)
+    shown = [(odds, result.columns[n]) for odds in result.odds if odds.id != "all" for n in odds.columns]
+    shown = [pair for pair in shown if len(pair[1].counts) >= 2]  # the same in every sample: nothing to draw
+    blocks, rows = [], -(-len(shown) // 3)
     for row in range(rows):
         part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
         chart = style.Chart(width=style.WIDE, height=250.0, legend=True)
