@@ -7,8 +7,6 @@ from html import escape
 from math import isinf
 from typing import TYPE_CHECKING, Any
 
-from actuator_lti.drawing.faces import face
-
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
     from actuator_lti.loops.result import Loops
@@ -29,7 +27,6 @@ def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]])
     return f"<table>{caption}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
-@face
 def design_html(design: Design) -> str:
     """Every value of a design as it was written, with source, grade and tolerance."""
     rows = []
@@ -40,7 +37,6 @@ def design_html(design: Design) -> str:
     return html_table(title, ("key", "symbol", "value", "tolerance", "grade", "source"), rows)
 
 
-@face
 def loops_html(loops: Loops) -> str:
     """The loops that there are: where each is cut, its unit and its period."""
     rows = []
@@ -51,7 +47,6 @@ def loops_html(loops: Loops) -> str:
     return html_table(head, ("loop", "cut at", "unit", "period"), rows)
 
 
-@face
 def run_html(run: Any) -> str:
     """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
     linear = run.axis == "linear"
@@ -80,14 +75,13 @@ def _least(values: Any, which: Any) -> float:
     return float(which(values)) if len(values) else float("nan")
 
 
-@face
 def margins_html(margins: StabilityMargins) -> str:
     """The figures to quote, and how they are known."""
     result = [
         ("gain margin", _figure(margins.gain_margin_db, 1.0, "dB")),
         ("phase margin", _figure(margins.phase_margin_deg, 1.0, "deg")),
         ("delay margin", _figure(margins.delay_margin_s, 1e3, "ms")),
-        ("modulus margin", _figure(margins.modulus_margin, 1.0, "")),
+        ("modulus margin", _figure(margins.modulus_margin)),
         ("peak of S", _figure(margins.sensitivity_peak_db, 1.0, "dB")),
         ("evidence", margins.evidence),
         *(("note", note) for note in margins.notes),
@@ -95,7 +89,7 @@ def margins_html(margins: StabilityMargins) -> str:
     return html_table(f"closed loop: {margins.verdict}", ("figure", "value"), result)
 
 
-def _figure(value: float | None, factor: float, unit: str) -> str:
+def _figure(value: float | None, factor: float = 1.0, unit: str = "") -> str:
     if value is None:
         return "not known"
     return "none" if isinf(value) else f"{factor * value:.4g} {unit}".rstrip()

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.drawing.faces import face
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
 
@@ -115,7 +114,6 @@ def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.nda
     return omega, response(system, omega)
 
 
-@face
 def plot_bode(
     system: Any, *, label: str = "", margins: StabilityMargins | None = None, axes: Any = None
 ) -> list[Axes]:
@@ -178,7 +176,6 @@ def _mark_margins(
         phase.axhline(here - margin.deg, color=INK, linewidth=0.8)
 
 
-@face
 def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     """The locus of an open loop near -1, in the square that holds the unit circle twice.
 
@@ -201,7 +198,6 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     return panel
 
 
-@face
 def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", axes: Any = None) -> Axes:
     """Unit step response of a closed loop; without a duration, eight times 1/bandwidth (in rad/s).
 
@@ -226,12 +222,9 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     (panel,) = _panels(axes, 1)
     sampled = system.isdtime(strict=True)
     times = np.arange(0.0, duration_s, system.dt) if sampled else np.linspace(0.0, duration_s, _POINTS)
-    answer = control.step_response(system, times)
-    values = np.asarray(answer.y).ravel()
-    if sampled:
-        panel.step(1e3 * times, values, where="post", label=label or None)
-    else:
-        panel.plot(1e3 * times, values, label=label or None)
+    values = np.asarray(control.step_response(system, times).y).ravel()
+    held = "steps-post" if sampled else "default"
+    panel.plot(1e3 * times, values, drawstyle=held, label=label or None)
     panel.axhline(1.0, color=INK, linewidth=0.8)
     panel.set(xlabel="time, ms", ylabel="response to a unit step")
     if label:
@@ -239,7 +232,6 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     return panel
 
 
-@face
 def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
     """Bode figure of the open loop of a `Loop`, its margins drawn; see `Loop.plot_bode`."""
     from actuator_lti.margins import stability_margins
@@ -247,7 +239,6 @@ def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
     return plot_bode(loop.open_loop, label=loop.name, margins=stability_margins(loop.open_loop), axes=axes)
 
 
-@face
 def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     """Angle, speed, current, voltage of a run over time; grey: the rotor rests, red: a limit acts.
 
@@ -261,12 +252,9 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     factor, unit = (1e3, "mm") if linear else (np.degrees(1.0), "deg")
     scale, time_unit = (1e3, "ms") if run.time_s[-1] < 1.0 else (1.0, "s")
     time = scale * run.time_s
-    panels = {"position": angle, "velocity": speed, "current": current, "voltage": voltage}
-    scales = {"position": factor, "velocity": run.ratio}
-    ordered = panels[run.stage]
-    ordered.plot(
-        time, scales.get(run.stage, 1.0) * run.reference_rad, color=MUTED, linewidth=1.0, label="command"
-    )
+    panels = {"position": (angle, factor), "velocity": (speed, run.ratio), "current": (current, 1.0)}
+    ordered, size = panels.get(run.stage, (voltage, 1.0))
+    ordered.plot(time, size * run.reference_rad, color=MUTED, linewidth=1.0, label="command")
     angle.plot(time, factor * run.output_angle_rad, label="output")
     speed.plot(time, run.motor_speed_rad_s)
     current.plot(time, run.current_A)
@@ -288,7 +276,6 @@ def _shade(panel: Axes, time: np.ndarray, where: np.ndarray, colour: str) -> Non
                            transform=panel.get_xaxis_transform())  # fmt: skip
 
 
-@face
 def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> Axes:
     """The limit of linear validity: the command amplitude over frequency at which each limiter sets in.
 
@@ -312,7 +299,6 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
     return panel
 
 
-@face
 def plot_map(
     frequency_hz: np.ndarray,
     amplitude_rad: np.ndarray,
@@ -329,11 +315,11 @@ def plot_map(
     from matplotlib.patches import Patch
 
     factor = 1e3 if linear_axis else np.degrees(1.0)
-    present = [k for k in range(len(names)) if np.any(kind == k)]
+    present, places = np.unique(kind, return_inverse=True)
     shades = {k: COLOURS[k % len(COLOURS)] if names[k] != "none" else "#ffffff" for k in present}
-    places = np.searchsorted(present, kind)
-    panel.pcolormesh(frequency_hz, factor * amplitude_rad, places, cmap=ListedColormap(list(shades.values())),
-                     vmin=-0.5, vmax=len(present) - 0.5, alpha=0.45, shading="nearest")  # fmt: skip
+    colours, codes = ListedColormap(list(shades.values())), places.reshape(kind.shape)
+    look: Any = {"vmin": -0.5, "vmax": len(present) - 0.5, "alpha": 0.45, "shading": "nearest"}
+    panel.pcolormesh(frequency_hz, factor * amplitude_rad, codes, cmap=colours, **look)
     for amplitude in (onset_rad or {}).values():
         panel.plot(frequency_hz, factor * amplitude, color=INK, linewidth=1.0)
     _amplitude_axes(panel, linear_axis)

@@ -22,19 +22,7 @@ from actuator_lti.loops import assemble_loops
 from analyses.failures.asked import Asked
 from nonlinear import Drive, State
 
-
-@dataclass
-class Measured:
-    """What the controller gets at t_k: motor side, and output shaft."""
-
-    current_A: float
-    speed_rad_s: float
-    angle_rad: float
-    output_angle_rad: float
-    output_speed_rad_s: float
-
-
-Sensing = Callable[[Measured], Measured]
+Sensing = Callable[[State], State]
 Driving = Callable[[float, float], float]
 
 
@@ -62,33 +50,37 @@ class Rig:
         twin.plant.set(self.plant.get())
         return twin
 
-    def measured(self) -> Measured:
+    def measured(self) -> State:
         """The truth about the plant at t_k."""
-        value, N = self.plant.value, self.design.total_ratio
-        i, w, th = value("current"), value("speed"), value("angle")
-        if self.design.coupling is None:
-            return Measured(i, w, th, th / N, w / N)
-        return Measured(i, w, th, value("output"), value("output_speed"))
+        value, rigid = self.plant.value, self.design.coupling is None
+        return State(
+            motor_angle_rad=value("angle"),
+            motor_speed_rad_s=value("speed"),
+            current_A=value("current"),
+            voltage_V=value("voltage"),
+            output_angle_rad=self.output_rad,
+            output_speed_rad_s=value("speed") / self.design.total_ratio if rigid else value("output_speed"),
+        )
+
+    @property
+    def output_rad(self) -> float:
+        """Angle of the output at t_k."""
+        rigid = self.design.coupling is None
+        return self.plant.value("angle") / self.design.total_ratio if rigid else self.plant.value("output")
 
     def fail(self, broken: Design) -> None:
         """Go on with another plant from the same angles, speeds, current and voltage."""
-        true, elastic = self.measured(), self.design.coupling is not None
-        state = State(
-            motor_angle_rad=true.angle_rad,
-            motor_speed_rad_s=true.speed_rad_s,
-            current_A=true.current_A,
-            voltage_V=self.plant.value("voltage"),
-            output_angle_rad=true.output_angle_rad if elastic else None,
-            output_speed_rad_s=true.output_speed_rad_s if elastic else None,
-        )
+        state = self.measured()
+        if self.design.coupling is None:  # no twist, and one speed
+            state = replace(state, output_angle_rad=None, output_speed_rad_s=None)
         self.plant = Drive(plant_of(broken), state, self.load_Nm)
 
-    def step(self, command: float) -> Measured:
+    def step(self, command: float) -> State:
         """One tick; gives the truth at its start. `moment_Nm` is what the train carried, at the output."""
         true, design, bus = self.measured(), self.design, self.plant.value("voltage_limit")
         seen = true if self.sensing is None else self.sensing(true)
         u = self.controller.control(
-            command, seen.current_A, seen.speed_rad_s, seen.angle_rad,
+            command, seen.current_A, seen.motor_speed_rad_s, seen.motor_angle_rad,
             seen.output_angle_rad, bus, seen.output_speed_rad_s,
         )  # fmt: skip
         if self.driving is not None:
@@ -108,10 +100,6 @@ OPEN = 1e4  # times the resistance: of a winding with an open phase
 Course = Callable[[float], float]
 
 
-def _whole(rig: Rig) -> None:
-    """Nothing is done to the rig: the command alone fails."""
-
-
 @dataclass(frozen=True)
 class Case:
     """One failure."""
@@ -119,7 +107,7 @@ class Case:
     name: str
     words: str
     command: Course  # command over the time from the failure on (from the step on, where ``at_rad`` is given)
-    broken: Callable[[Rig], None] = _whole  # what is done to the rig
+    broken: Callable[[Rig], None] = lambda _: None  # what is done to the rig
     start_rad: float = 0.0  # where the drive holds before
     # The failure happens on the way, when the output is this far from the start; ``None``: at once
     at_rad: float | None = None
@@ -133,8 +121,8 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
         more = "a DC equivalent has one winding; the pulsating torque of two phases left is not modelled"
         open_phase += f" ({more})"
     made = (
-        Case("hard-over", "the power stage puts the whole bus on the motor", _hold(0.0), _hard_over),
-        Case("open-phase", open_phase, _hold(0.0), _open),
+        Case("hard-over", "the power stage puts the whole bus on the motor", lambda _: 0.0, _hard_over),
+        Case("open-phase", open_phase, lambda _: 0.0, _open),
     )
     if design.controller.position is None:
         return made, dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
@@ -152,20 +140,16 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
 
     jams = "the output jams half-way through a step to the stop"
     of_loop = (
-        Case("hard-over-command", "the command jumps to the stop", _hold(far)),
-        Case("jam", jams, _hold(far), jam, at_rad=half, stops=False),
-        Case("frozen-sensor", frozen, _hold(near), partial(_sense, lose=False)),
-        Case("lost-sensor", lost, _hold(half), partial(_sense, lose=True), start_rad=half),
+        Case("hard-over-command", "the command jumps to the stop", lambda _: far),
+        Case("jam", jams, lambda _: far, jam, at_rad=half, stops=False),
+        Case("frozen-sensor", frozen, lambda _: near, partial(_sense, lose=False)),
+        Case("lost-sensor", lost, lambda _: half, partial(_sense, lose=True), start_rad=half),
         Case("oscillatory-command", waves, sine, stops=False),
     )
     return made + of_loop, {}
 
 
 _LOOP_CASES = ("hard-over-command", "jam", "frozen-sensor", "lost-sensor", "oscillatory-command")
-
-
-def _hold(value: float) -> Course:
-    return lambda _: value
 
 
 def _hard_over(rig: Rig) -> None:
@@ -195,12 +179,9 @@ def _open(rig: Rig) -> None:
 
 def _sense(rig: Rig, *, lose: bool) -> None:
     """Freeze the position loop's sensor, or let it read zero; a speed taken from it is zero."""
-    frozen, part = rig.measured(), 0.0 if lose else 1.0
-    if rig.design.controller.position_loop.sensor == "output":
-        stuck = {"output_angle_rad": part * frozen.output_angle_rad, "output_speed_rad_s": 0.0}
-    else:
-        stuck = {"angle_rad": part * frozen.angle_rad, "speed_rad_s": 0.0}
-    rig.sensing = lambda true: replace(true, **stuck)
+    sensor, part = rig.design.controller.position_loop.sensor, 0.0 if lose else 1.0
+    angle = part * getattr(rig.measured(), f"{sensor}_angle_rad")
+    rig.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
 
 
 def _followed_most_hz(design: Design) -> tuple[float, str]:

@@ -120,12 +120,12 @@ def _settling_s(design: Design, asked: Asked) -> float:
 
 def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
     """What comes of a failure."""
-    Ts, start = rig.design.controller.period_s, rig.measured().output_angle_rad
+    Ts, start = rig.design.controller.period_s, rig.output_rad
     case.broken(rig)
     rows = []
     for k in range(ceil(asked.watched_s / Ts) + 1):
+        moved = rig.output_rad - start
         true = rig.step(case.command(k * Ts))
-        moved = true.output_angle_rad - start
         rows.append((k * Ts, moved, true.current_A, rig.moment_Nm, rig.controller.value("overloaded")))
         if case.stops and abs(moved) >= asked.stop_rad:
             break
@@ -149,9 +149,9 @@ def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:
 
 def _reaches(rig: Rig, case: Case) -> bool:
     """Follow the command until the output is where the failure happens; whether it gets there."""
-    start, period = rig.measured().output_angle_rad, rig.design.controller.period_s
+    start, period = rig.output_rad, rig.design.controller.period_s
     for k in range(0 if case.at_rad is None else ceil(LONGEST_S / period)):
-        if abs(rig.measured().output_angle_rad - start) >= (case.at_rad or 0.0):
+        if abs(rig.output_rad - start) >= (case.at_rad or 0.0):
             return True
         rig.step(case.command(k * period))
     return case.at_rad is None

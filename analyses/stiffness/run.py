@@ -124,8 +124,6 @@ class Stiffness:
 
 
 AGREED, READ = 1e-6, 1e-5
-
-
 _MOST_TICKS = 400_000
 SKIPPED = 6  # periods at rest, before one is looked at
 PERIODS_WITHIN = 10  # of the load on the spring, within the part of the loading that is read
@@ -247,14 +245,10 @@ def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
     checks = check_stiffness(design, CHECKED_HZ) if simulated and held else ()
     largest = design.load.moment_max_Nm if any(np.isfinite(one.foreseen_Nm_rad) for one in checks) else 0.0
     asked = [(f, share * largest) for f in REST_HZ for share in REST_FRACTIONS]
-    return Stiffness(
-        design,
-        stiffness_curves(design),
-        lost_motion(design, seen=simulated and held),
-        checks,
-        stiffness_at_rest(design, asked) if largest > 0.0 else (),
-        "no position loop holds the output" if simulated and not checks else "",
-    )
+    seen = stiffness_at_rest(design, asked) if largest > 0.0 else ()
+    unproven = "no position loop holds the output" if simulated and not checks else ""
+    lost = lost_motion(design, seen=simulated and held)
+    return Stiffness(design, stiffness_curves(design), lost, checks, seen, unproven)
 
 
 def unpowered(design: Design, winding: State) -> Design:

@@ -33,35 +33,32 @@ Floats = npt.NDArray[np.float64]
 SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class ExportedDesign:
     """What an export knows of a design.
 
     ``row``: parameters of a run: the design at rest, its load torque an input.
-    ``p_size``, ``s_size``: lengths of the rows of parameters and state.
-    ``derived``: the row with all that follows from it.
+    ``p``, ``s``: the row with all that follows from it, and the state at the start.
     """
 
     design: Design
     row: Floats
-    p_size: int
-    s_size: int
-    derived: Floats
+    p: Floats
+    s: Floats
 
 
 def exported(design: Design) -> ExportedDesign:
-    """The row of a design whose load torque comes from outside, and the lengths that it needs."""
+    """The rows of a design whose load torque comes from outside."""
     row = design_row(design)
     row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
-    p, s = parameters(row)
-    return ExportedDesign(design=design, row=row, p_size=p.size, s_size=s.size, derived=p)
+    return ExportedDesign(design, row, *parameters(row))
 
 
 def spare_parameters(ours: ExportedDesign) -> int:
     """Numbers to keep free in p so that a coupling may become ``4**SPARE_LEVELS`` times as stiff."""
     if ours.row[at.ELASTIC_DRIVE] <= 0.0:
         return 0
-    modes = (ours.p_size - elastic.EL_MODES) // int(ours.derived[elastic.EL_MODE_SIZE])
+    modes = (ours.p.size - elastic.EL_MODES) // int(ours.p[elastic.EL_MODE_SIZE])
     return SPARE_LEVELS * modes * (1 + elastic.STEP_SIZE)
 
 
@@ -89,16 +86,12 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
         _refuse_single(design)
     ours = exported(design)
     values = _values(ours)
-    texts = {
-        "drive.h": header_text(),
-        "drive.c": source_text(),
-        f"{prefix}design.h": filled("design.h", values),
-        f"{prefix}design.c": filled("design.c", values),
-    }
+    texts = {"drive.h": header_text(), "drive.c": source_text()}
+    texts |= {f"{prefix}{name}": filled(name, values) for name in ("design.h", "design.c")}
     if single_precision:
         texts = {name: single(text) for name, text in texts.items()}
     texts["main.c"] = filled("main.c", {"REAL": "float" if single_precision else "double"})
-    texts["README.md"] = readme_text(ours, single_precision)
+    texts["README.md"] = _readme(ours, single_precision)
     names = {"prefix": prefix, "PREFIX": prefix.upper()}
     return {name: replaced(text, names) for name, text in texts.items()}
 
@@ -110,25 +103,22 @@ def refuse_prefix(prefix: str) -> None:
 
 
 def _refuse_single(design: Design) -> None:
-    where = design.origin or design.name
-    instruments = design.instruments
-    noise = (instruments.current_noise_A, instruments.angle_noise_rad, instruments.output_angle_noise_rad)
-    if any(noise) or instruments.jitter_s:
+    seen, message = design.instruments, ""
+    if any((seen.current_noise_A, seen.angle_noise_rad, seen.output_angle_noise_rad, seen.jitter_s)):
         message = "instruments: noise and jitter need double precision; allowed: none of them"
     elif is_elastic(design):
         message = "coupling, friction.point: an elastic drive train or a friction map needs double precision"
         message += "; allowed: neither"
-    else:
-        return
-    raise InputError(f"{message}, or no --single", where=where)
+    if message:
+        raise InputError(f"{message}, or no --single", where=design.origin or design.name)
 
 
 def stage_words(design: Design) -> tuple[str, str]:
     """What the command of the outermost stage is, and its unit."""
-    linear = design.axis == "linear"
+    angle, unit = ("output position", "m") if design.axis == "linear" else ("output angle", "rad")
     table = {
-        "position": ("output angle" if not linear else "output position", "m" if linear else "rad"),
-        "velocity": ("output speed", "m/s" if linear else "rad/s"),
+        "position": (angle, unit),
+        "velocity": ("output speed", f"{unit}/s"),
         "current": ("motor current", "A"),
         "voltage": ("motor voltage", "V"),
     }
@@ -155,7 +145,7 @@ def _values(ours: ExportedDesign) -> dict[str, str]:
         "DESIGN": plain(design.name), "TITLE": plain(design.title),
         "NAME": c_text(design.name), "REVISION": c_text(design.revision or ""),
         "DESIGN_HASH": design_hash(design), "HASH": source_hash(), "VERSION": exporter_version(),
-        "P": str(ours.p_size), "S": str(ours.s_size), "VALUES": "\n".join(lines),
+        "P": str(ours.p.size), "S": str(ours.s.size), "VALUES": "\n".join(lines),
     }  # fmt: skip
 
 
@@ -169,8 +159,7 @@ def _seen(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
-    """The README of an export."""
+def _readme(ours: ExportedDesign, single_precision: bool) -> str:
     design, row = ours.design, ours.row
     what, unit = stage_words(design)
     number, step = 4 if single_precision else 8, spare_parameters(ours) // SPARE_LEVELS
@@ -183,10 +172,10 @@ def readme_text(ours: ExportedDesign, single_precision: bool) -> str:
         "PERIOD": f"{row[at.PERIOD]:g}",
         "EVENTS": f"{int(row[at.MAX_EVENTS])}",
         "SEGMENTS": "2" if row[at.DELAY_FRACTION] > 0.0 else "1",
-        "P": str(ours.p_size),
-        "S": str(ours.s_size),
+        "P": str(ours.p.size),
+        "S": str(ours.s.size),
         "IO": str(at.IO_SIZE),
-        "BYTES": str(number * (ours.p_size + ours.s_size + at.IO_SIZE)),
+        "BYTES": str(number * (ours.p.size + ours.s.size + at.IO_SIZE)),
         "STIFFER": longer if step else "",
         "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",

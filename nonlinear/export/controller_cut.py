@@ -82,7 +82,7 @@ class Controller:
 
 def controller_of(design: Design, prefix: str, *, single_precision: bool = False) -> Controller:
     """Cut the controller out of the tick."""
-    p = exported(design).derived
+    p = exported(design).p
     functions = _followed(p, single_precision)
     structs = _structs(design, p, prefix, functions.values())
     rows = Rows(structs, float(p[layout.COUNTS_PER_RAD]))

@@ -97,26 +97,21 @@ def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
 
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
     texts = c_export(design)
-    bits = ", ".join(str(bit) for bit in of.flag_bits())
+    sizes: dict[str, int | str] = {
+        "SPARE": spare_parameters(exported(design)),
+        "KEYS": len(trace.keys),
+        "CONSTANTS": len(trace.constants),
+        "TEXTS": len(of.texts_of(design)),
+        **{name: getattr(of, name) for name in ("FIRST_KEY", "FIRST_CONSTANT", "FIRST_TEXT")},
+        "SUPPLY_VOLTAGE": c_float(of.supply_voltage(design)),
+    }
     return {
         **{name: texts[name] for name in ("drive.h", "drive.c", "drive_design.h", "drive_design.c")},
-        "fmu_design.h": filled("fmu_design.h", _header_values(design, trace)),
+        "fmu_design.h": filled("fmu_design.h", {name: str(value) for name, value in sizes.items()}),
         "fmu_design.c": filled("fmu_design.c", _source_values(design, trace)),
         "fmu_core.h": template("fmu_core.h"),
-        "fmu_core.c": filled("fmu_core.c", {"BITS": bits}),
+        "fmu_core.c": filled("fmu_core.c", {"BITS": ", ".join(map(str, of.FLAG_BITS))}),
         f"fmi{version}.c": template(f"fmi{version}.c"),
-    }
-
-
-def _header_values(design: Design, trace: KeyTrace) -> dict[str, str]:
-    """What stands for the words of ``fmu_design.h``."""
-    return {
-        "SPARE": str(spare_parameters(exported(design))),
-        "KEYS": str(len(trace.keys)),
-        "CONSTANTS": str(len(trace.constants)),
-        "TEXTS": str(len(of.texts_of(design))),
-        **{name: str(getattr(of, name)) for name in ("FIRST_KEY", "FIRST_CONSTANT", "FIRST_TEXT")},
-        "SUPPLY_VOLTAGE": c_float(of.supply_voltage(design)),
     }
 
 
@@ -138,12 +133,11 @@ def _source_values(design: Design, trace: KeyTrace) -> dict[str, str]:
 
 def _relations_text(relations: Sequence[Sequence[str]]) -> str:
     """One function a check, and one that calls them."""
-    arguments = "const double *k, char *why, size_t size"
-    texts = []
+    arguments, calls, texts = "const double *k, char *why, size_t size", "", []
     for number, lines in enumerate(relations):
         body = "\n".join(f"    {line}" for line in lines)
         texts.append(f"static int related_{number}({arguments})\n{{\n{body}\n}}\n")
-    calls = "".join(f" && (related_{number}(k, why, size) != 0)" for number in range(len(relations)))
+        calls += f" && (related_{number}(k, why, size) != 0)"
     texts.append(f"int fmu_related({arguments})\n{{\n    return ((size > 0U){calls}) ? 1 : 0;\n}}\n")
     return "\n".join(texts)
 

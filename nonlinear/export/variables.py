@@ -20,6 +20,7 @@ COMMAND, MOMENT, SUPPLY = 1, 2, 3
 FIRST_OUTPUT, FIRST_FLAG, INITIAL_ANGLE = 10, 30, 90
 FIRST_KEY, FIRST_CONSTANT, FIRST_TEXT = 100, 1000, 2000
 
+FLAG_BITS = (*at.LIMITER_BITS, at.FLAG_STICK)  # of each Boolean output, in order
 SHOWN = {"rad": "deg", "rad/s": "deg/s", "m": "mm"}  # unit that a host shows a value in
 
 Causality = Literal["input", "output", "parameter", "local", "independent"]
@@ -73,6 +74,7 @@ def sizes(design: Design) -> dict[str, float]:
     if motor.resistance_ohm is not None:
         current = min(current, voltage / motor.resistance_ohm)
     kM, kV = motor.torque_constant_Nm_A, motor.source_gain_Nm_V
+    commands = {"position": angle, "velocity": speed / ratio, "current": current, "voltage": voltage}
     return {
         "output.angle": angle,
         "output.rate": speed / ratio,
@@ -84,9 +86,7 @@ def sizes(design: Design) -> dict[str, float]:
         "control.current_command": current,
         "control.speed_command": speed,
         "supply_voltage": voltage,
-        "command": {"position": angle, "velocity": speed / ratio, "current": current, "voltage": voltage}[
-            design.controller.outermost
-        ],
+        "command": commands[design.controller.outermost],
         "hinge_moment": design.load.moment_max_Nm,
     }
 
@@ -144,11 +144,6 @@ def _flags() -> tuple[Variable, ...]:
     )  # fmt: skip
 
 
-def flag_bits() -> tuple[int, ...]:
-    """Bit of each Boolean output, in order."""
-    return (*at.LIMITER_BITS, at.FLAG_STICK)
-
-
 def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
     angle, _ = _units(design)
     start = Variable(
@@ -156,11 +151,9 @@ def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
         description="output angle at the start, everything at rest", unit=angle, start=0.0,
         shown=SHOWN[angle],
     )  # fmt: skip
-    ours = [
-        _of_key(key, FIRST_KEY + n, "parameter", "fixed" if key.fixed else "tunable")
-        for n, key in enumerate(trace.keys)
-    ]
-    rest = [_of_key(key, FIRST_CONSTANT + n, "local", "constant") for n, key in enumerate(trace.constants)]
+    rest = [_of_key(key, n, "local", "constant") for n, key in enumerate(trace.constants, FIRST_CONSTANT)]
+    keys = enumerate(trace.keys, FIRST_KEY)
+    ours = [_of_key(key, n, "parameter", "fixed" if key.fixed else "tunable") for n, key in keys]
     return (start, *ours, *rest)
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from actuator_lti.asked.quantities import AT_A_GLANCE
 from actuator_lti.design.model import Design
+from actuator_lti.loops.commanded import sampled_step
 from actuator_lti.step import StepFigures
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.responses import frequency_grid, response_at, sampled_step
+from analyses.linear.responses import frequency_grid, response_at
 from analyses.specification.asked_figures import said_of
 from reports import document as doc
 from reports.charts import style

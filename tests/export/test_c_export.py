@@ -58,7 +58,7 @@ class Twins:
     def __init__(self, library: ctypes.CDLL, ours: ExportedDesign) -> None:
         self.library = library
         self.rows, self.c_rows = (
-            (np.zeros(ours.p_size), np.zeros(ours.s_size), np.zeros(at.IO_SIZE)) for _ in range(2)
+            (np.zeros(ours.p.size), np.zeros(ours.s.size), np.zeros(at.IO_SIZE)) for _ in range(2)
         )
         self.set(slice(0, at.SIZE), ours.row)
         self.derive()
@@ -172,7 +172,7 @@ def test_single_precision_keeps_its_stated_error(name: str, tmp_path) -> None:
     design = load_design(name)
     lib = opened(tmp_path, c_export(design, single_precision=True))
     ours = exported(design)
-    p, s, io = (np.zeros(n, np.float32) for n in (ours.p_size, ours.s_size, at.IO_SIZE))
+    p, s, io = (np.zeros(n, np.float32) for n in (ours.p.size, ours.s.size, at.IO_SIZE))
     lib.drive_load_design(pointer(p))
     lib.drive_prepare_sizes(pointer(p))
     lib.drive_derive(pointer(p), pointer(s))
