@@ -43,7 +43,11 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     if cutoff_hz is None and decimation is None and is_benchmark(record):
         return Recipe()
     cutoff = min(100.0, 0.1 / period) if cutoff_hz is None else cutoff_hz
+    if not cutoff > 0.0:
+        raise InputError(f"cutoff = {cutoff:g} Hz: must be between 0 and {0.5 / period:g} Hz")
     factor = max(1, round(1.0 / (cutoff * period))) if decimation is None else decimation
+    if factor < 1:
+        raise InputError(f"decimation = {factor}: must be 1 or more")
     skip = max(round(0.049 / period), 5)
     return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip, points=7)
 
