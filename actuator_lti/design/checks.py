@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import fields, replace
 from math import isfinite
 from numbers import Real
@@ -12,9 +13,15 @@ import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.checks_control import CONTROL_CHECKS
-from actuator_lti.design.checks_plant import PLANT_CHECKS, check_motor, check_place, check_temperature
+from actuator_lti.design.checks_plant import (
+    PLANT_CHECKS,
+    check_motor,
+    check_place,
+    check_temperature,
+    with_stand_ins,
+)
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
-from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.sections import part_at, parts_of
 from actuator_lti.files.reading import shown
@@ -82,8 +89,10 @@ def contradictions(design: Design) -> Iterator[Refusal]:
     for check in FIRST_RELATIONS:
         refused = tuple(readable(check(design)))
         yield from refused
-        unsure = {path.partition(".")[0] for path, *_ in refused}
+        unsure = {path.partition(".")[0] for path, *_ in refused} - {"motor"}
         design = replace(design, **dict.fromkeys(unsure, UNREAD))
+    with suppress(UnreadError):
+        design = with_stand_ins(design)
     for check in (*RELATIONS, _requirements, _waivers, _correlations):
         yield from readable(check(design))
 

@@ -33,7 +33,7 @@ SHEET: tuple[Field, ...] = (
 
 FROM = "from data sheet: "
 """What the source of a value begins with that follows from such keys."""
-_WORD = re.compile(r"(?P<table>motor|gear\.[\w-]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
+_WORD = re.compile(r"(?P<table>motor|gear\.[^.=;,]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
 _OPEN = "100.0 %"  # tolerance of a friction whose share is not said
 _TAKEN = {
     _CURRENT: ("dry_torque", "viscous", "dry_torque_reverse", "viscous_reverse", "point"),
