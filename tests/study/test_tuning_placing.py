@@ -95,8 +95,7 @@ def distance_of(tuned):
 
 def nearest_drawn(design, most):
     """Of many notches about the resonance, with any gain and depth: the nearest that does, below a change."""
-    placed = place(design, ("notch",))
-    problem = problem_of(placed.design, loop_requirements(design), {}, placed.variables)
+    problem = problem_of(design, loop_requirements(design), {}, ("notch",))
     rng, size = np.random.default_rng(5), 60_000
     frequency = 2 * np.pi * 700.0 * np.exp(rng.uniform(-0.3, 0.3, size))
     gain, depth = 0.02 * np.exp(rng.uniform(0.0, 1.5, size)), np.exp(rng.uniform(-1.5, 0.0, size))
@@ -140,12 +139,12 @@ def test_a_design_that_meets_all_is_left_as_it_is():
 def test_neutral_elements_change_nothing():
     """A notch of depth 1 is a factor 1; feed-forward starts at what the design has."""
     design = servo(stiffness=RESONANT, position=PositionLoop(gain=20.0, feedforward=0.4))
-    placed = place(design, ("notch", "feedforward"))
-    starts = {v.path: v.start for v in placed.variables}
+    placed, variables = place(design, ("notch", "feedforward"))
+    starts = {v.path: v.start for v in variables}
     assert starts["control.position.feedforward"] == 0.4
     for name in ("velocity", "position"):
         before = stability_margins(getattr(assemble_loops(design), name).open_loop)
-        after = stability_margins(getattr(assemble_loops(placed.design), name).open_loop)
+        after = stability_margins(getattr(assemble_loops(placed), name).open_loop)
         assert after.gain_margin_db == pytest.approx(before.gain_margin_db, rel=1e-9)
         assert after.phase_margin_deg == pytest.approx(before.phase_margin_deg, rel=1e-9)
 
