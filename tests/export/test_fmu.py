@@ -176,16 +176,15 @@ def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, 
     """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at
     from nonlinear._kernels.start import derive, prepare_sizes, retune
-    from nonlinear.export.c_files import exported, spare_parameters
+    from nonlinear.export.c_files import exported_row, spare_parameters
     from nonlinear.native import parameters, tick
 
     design = load_design(name)
     values = {path: parameter_value(design, path) * factor for path, factor in change.items()}
     path = written(tmp_path, design)
     assert set(change) <= {key.path for key in trace_keys(design).keys if not key.fixed}
-    ours = exported(design)
-    p, s = parameters(ours.row)
-    p = np.concatenate([p, np.zeros(spare_parameters(ours))])
+    p, s = parameters(exported_row(design))
+    p = np.concatenate([p, np.zeros(spare_parameters(p))])
     row = np.zeros(at.IO_SIZE)
     row[at.IN_COMMAND] = 0.05
     period = design.controller.period_s
@@ -194,7 +193,7 @@ def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, 
         for k in range(400):
             if k == 200:
                 host.put({structured(key): value for key, value in values.items()})
-                p[: at.SIZE] = exported(with_values(design, values)).row
+                p[: at.SIZE] = exported_row(with_values(design, values))
                 prepare_sizes(p)
                 derive(p, s)
                 retune(p, s)

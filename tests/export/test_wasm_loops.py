@@ -30,7 +30,7 @@ from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from nonlinear.export import linear, linear_loops
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.page import line_of
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
@@ -49,7 +49,7 @@ def in_node(designs: list[Design], folder: Path) -> list[dict[str, Any]]:
         return float(value) if np.isfinite(value) else str(value).replace("inf", "Infinity")
 
     given = {
-        "rows": [[plain(value) for value in exported(design).row] for design in designs],
+        "rows": [[plain(value) for value in exported_row(design)] for design in designs],
         "stages": STAGES,
         "quoted": len(LOOP_QUANTITIES) + 1,
         "angles": ANGLES.tolist(),
