@@ -29,15 +29,16 @@ from tests.validation.random_drives import full_drive
 FILE = Path(__file__).with_name("conditional.toml")
 
 
-def look(design: Design) -> Conditional:
-    loops = assemble_loops(design)
-    settle = settling_ticks_of(loops.position.closed_loop, design.controller.position.every, design.name)
-    return conditional_stability(design, loops, settle)
+def looked(design: Design) -> tuple[Conditional, int]:
+    """What is found, and the ticks in which the linear drive settles."""
+    loops, every = assemble_loops(design), design.controller.position_loop.every
+    settle = settling_ticks_of(loops.present["position"].closed_loop, every, design.name)
+    return conditional_stability(design, loops, settle), settle
 
 
 @pytest.fixture(scope="module")
 def conditional() -> Conditional:
-    return look(load_design(str(FILE)))
+    return looked(load_design(str(FILE)))[0]
 
 
 def test_the_margins_are_healthy() -> None:
@@ -48,15 +49,12 @@ def test_the_margins_are_healthy() -> None:
         assert margins.phase_margin_deg > 45.0
 
 
-def test_it_is_found(conditional: Conditional) -> None:
+def test_it_is_found_where_steps_stop_settling(conditional: Conditional) -> None:
+    """By the simulator itself, outside the validator: below the threshold it settles, above it runs away."""
     assert conditional.diverges
     assert conditional.hidden
     assert conditional.limiter == "voltage"
     assert conditional.threshold_rad < conditional.full_deflection_rad
-
-
-def test_the_threshold_is_where_steps_stop_settling(conditional: Conditional) -> None:
-    """By the simulator itself, outside the validator: below it settles, above it runs away."""
     design = load_design(str(FILE))
     for factor, settles in ((0.99, True), (1.01, False)):
         size = factor * conditional.threshold_rad
@@ -90,9 +88,9 @@ def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
     """More voltage: the border moves away. The current limited where the velocity controller knows: none."""
     design = load_design(str(FILE))
     more = replace(design, limits=replace(design.limits, voltage_V=48.0))
-    assert not look(more).diverges
+    assert not looked(more)[0].diverges
     known = replace(design, limits=replace(design.limits, peak_current_A=12.0, voltage_V=200.0))
-    kept = look(known)
+    kept, _ = looked(known)
     assert not kept.diverges
     assert all(one.antiwindup for one in kept.predictions)
 
@@ -108,7 +106,7 @@ def test_the_threshold_grows_with_the_limit(conditional: Conditional) -> None:
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps"])
 def test_shipped_designs_settle_from_every_step(name: str) -> None:
-    result = look(load_design(name))
+    result, _ = looked(load_design(name))
     assert not result.diverges
     assert result.next_rad is None
 
@@ -139,13 +137,6 @@ def test_without_limits_there_is_nothing_to_find() -> None:
     design = load_design(str(FILE))
     free = replace(design, limits=replace(design.limits, voltage_V=1e9, peak_current_A=inf))
     assert step_threshold(free, 1822) == (None, None)
-
-
-def looked(design: model.Design) -> tuple[Conditional, int]:
-    loops = assemble_loops(design)
-    place = design.controller.position_loop
-    settle = settling_ticks_of(loops.present["position"].closed_loop, place.every, design.name, 400_000)
-    return conditional_stability(design, loops, settle), settle
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ import pytest
 
 from actuator_lti.batch import Population
 from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Requirement
 from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
@@ -44,10 +45,8 @@ def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -
     """Four toleranced numbers of the fin: all sixteen corners looked at (the figures are monotone there)."""
     kept = ("motor.rotor_inertia", "motor.resistance", "load.inertia", "friction.viscous")
     design = load_design("fin")
-    parameters = {
-        path: one if path in kept else replace(one, tolerance=None) for path, one in design.parameters.items()
-    }
-    design = replace(design, parameters=type(design.parameters)(parameters))
+    bare = {path: replace(one, tolerance=None) for path, one in design.parameters.items() if path not in kept}
+    design = replace(design, parameters=FrozenMap({**design.parameters, **bare}))
     chosen = worst_ends(design, quantity)
     nominal = {path: design.parameters[path].value for path in kept}
     width = {path: design.parameters[path].tolerance.half_width for path in kept}

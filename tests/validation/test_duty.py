@@ -1,7 +1,7 @@
 """Duty cycle: closed forms of current and temperature, and the overload state of the running drive."""
 
 from dataclasses import replace
-from math import exp, inf, pi, sin
+from math import inf, pi, sin
 
 import numpy as np
 import pytest
@@ -43,9 +43,8 @@ def test_without_any_rating_nothing_is_proven() -> None:
 def test_motion_and_rest_add_by_their_squares() -> None:
     design = load_design("joint")
     result = duty(design, Asked.of(design, share=0.25, cycle_s=8.0, load_Nm=30.0))
-    assert result.rms_A**2 == pytest.approx(
-        0.25 * result.moving_rms_A**2 + 0.75 * result.holding_A**2, rel=1e-12
-    )
+    both = 0.25 * result.moving_rms_A**2 + 0.75 * result.holding_A**2
+    assert result.rms_A**2 == pytest.approx(both, rel=1e-12)
     assert result.holding_A > 0.0
 
 
@@ -90,14 +89,11 @@ def test_temperature_against_its_equation(rms: float) -> None:
         t_eval=result.time_s, rtol=1e-10, atol=1e-9,
     )  # fmt: skip
     assert result.temperature_degC == pytest.approx(course.y[0], rel=1e-7)
-    if P * 0.00393 >= 1.0:
-        assert result.final_degC == inf
-    else:
-        assert result.final_degC == pytest.approx(25.0 + P / (1.0 - 0.00393 * P), rel=1e-12)
+    final = 25.0 + P / (1.0 - 0.00393 * P) if P * 0.00393 < 1.0 else inf
+    assert result.final_degC == pytest.approx(final, rel=1e-12)
     if result.limit_after_s is not None:
-        assert np.interp(result.limit_after_s, result.time_s, result.temperature_degC) == pytest.approx(
-            125.0, rel=5e-3
-        )
+        there = np.interp(result.limit_after_s, result.time_s, result.temperature_degC)
+        assert there == pytest.approx(125.0, rel=5e-3)
     assert (result.limit_after_s is None) == (result.final_degC <= 125.0)
 
 
@@ -105,8 +101,8 @@ def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
     design = with_overrides(load_design("fin"), {**HOT, "temperature.resistance_coefficient": "0 1/K"})
     result = heating(design, 5.0)
     assert result is not None
-    k = 100
-    assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
+    expected = 25.0 + 50.0 * (1.0 - np.exp(-result.time_s / 60.0))
+    assert result.temperature_degC == pytest.approx(expected)
 
 
 def test_section_figure_and_command(cli) -> None:

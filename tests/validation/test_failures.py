@@ -9,7 +9,7 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from actuator_lti.design import load_design, with_overrides
-from actuator_lti.design.model import Design, Load
+from actuator_lti.design.model import Load, PositionLoop
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.failures import Asked, failures
@@ -34,9 +34,6 @@ def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
     assert [one.current_A for one in seen] == run.current_A.tolist()
 
 
-SLOW = "its output does not get half-way to the stop in 5 s"
-
-
 def test_hard_over_is_the_motor_on_the_bus() -> None:
     """Rigid, dry friction constant while it moves: di, dw, dth linear in (i, w, th, 1), after the delay d."""
     design = load_design("ilr33-amber")
@@ -59,9 +56,8 @@ def test_hard_over_is_the_motor_on_the_bus() -> None:
 
 def test_an_open_phase_leaves_the_output_to_its_load() -> None:
     """Without current and viscous friction: a (t - 0)^2/2 with J dw/dt = M/N - Tc, the winding gone."""
-    design = free(
-        "ilr33-amber", **{"friction.viscous": "0 N*m*s/rad", "friction.load_coefficient": "0 mN*m/(N*m)"}
-    )
+    changes = {"friction.viscous": "0 N*m*s/rad", "friction.load_coefficient": "0 mN*m/(N*m)"}
+    design = with_overrides(load_design("ilr33-amber"), {"load.path": "back-drivable", **changes})
     M, N = 20.0, design.total_ratio
     rate = (M / N - design.friction.dry_torque_Nm) / design.inertia_kgm2 / N
     result = failures(design, Asked.of(design, load_Nm=M)).case("open-phase")
@@ -111,8 +107,9 @@ def test_a_frozen_sensor_runs_away_at_the_speed_of_its_error() -> None:
 
 def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
     """No dry friction, no play, inside every limit: the amplitude is |T| times the command's."""
-    design = replace(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"))
-    design = replace(design, controller=replace(load_position(design), computing_delay_s=1e-4))
+    position = PositionLoop(gain=150.0, every=2)
+    control = replace(drive_d().controller, position=position, computing_delay_s=1e-4)
+    design = replace(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"), controller=control)
     asked = Asked.of(design, stop_rad=0.1, deflection_rad=0.001, watched_s=3.0)
     case = failures(design, asked).case("oscillatory-command")
     response = assemble_loops(design).reference_to_output
@@ -145,23 +142,9 @@ def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
         Asked.of(design, stop_rad=0.1, deflection_rad=0.2)
 
 
-def free(name: str, **changes: str) -> Design:
-    """A shipped design, back-drivable, with numbers changed."""
-    return with_overrides(load_design(name), {"load.path": "back-drivable", **changes})
-
-
-def load_position(design: Design):
-    """The controller of drive D with a position loop of 150 1/s around it."""
-    from actuator_lti.design.model import PositionLoop
-
-    return replace(design.controller, position=PositionLoop(gain=150.0, every=2))
-
-
 def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
     """A follower that falls from zero frequency on would be asked to creep at 0.1 Hz, which moves nothing."""
-    design = load_design("ilr33-amber")
-    slow = replace(design, controller=replace(design.controller, position=replace(
-        design.controller.position_loop, gain=40.0)))  # fmt: skip
+    slow = with_overrides(load_design("ilr33-amber"), {"control.position.gain": "40 1/s"})
     frequency, words = _followed_most_hz(slow)
     response = assemble_loops(slow).reference_to_output
     size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))
@@ -187,7 +170,8 @@ def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
         design = with_overrides(load_design("emps"), {"control.position.gain": f"{gain} 1/s"})
         result = failures(design)
         assert ("jam" in {case.name for case in result.cases}) is there
-        assert result.left_out == ({} if there else {"jam": SLOW})
+        slow = {"jam": "its output does not get half-way to the stop in 5 s"}
+        assert result.left_out == ({} if there else slow)
 
 
 def test_the_headline_names_what_reaches_the_stop_first() -> None:

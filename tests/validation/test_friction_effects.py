@@ -12,7 +12,7 @@ from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from analyses.friction_effects import friction_effects
-from analyses.friction_effects.breakaway import Hysteresis, hysteresis, static_threshold, threshold
+from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, static_threshold, threshold
 from analyses.friction_effects.result import limit_cycles
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
@@ -20,6 +20,7 @@ from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 
+STIFFNESS = 5.9e-3 * 0.12 * 120.0 * 2376.0  # of ilr33-amber: motor torque over error of the output
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
 
 
@@ -81,27 +82,23 @@ def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant"])
 def test_a_small_step_waits_for_the_integral(name: str) -> None:
-    """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N).
-
-    Behind a spring too: it carries the load before the step comes.
-    """
+    """The threshold is Tc/(kM Kp Kv N); behind a spring too: it carries the load before the step comes."""
     for point in friction_effects(load_design(name)).points:
-        result = point.threshold
-        expected = point.dry_torque_Nm / (5.9e-3 * 0.12 * 120.0 * 2376.0)
-        assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
-        for wait in result.waiting:
-            assert wait.simulated_s is not None
-            assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
+        waits(point.threshold, point.dry_torque_Nm)
+
+
+def waits(result: Threshold, torque_Nm: float) -> None:
+    """Tn (A0/A - 1), and a few ticks until the current follows; A0 by the torque that holds the motor."""
+    assert result.static.forward_rad == pytest.approx(torque_Nm / STIFFNESS, rel=1e-12)
+    assert len(result.waiting) == 5
+    for wait in result.waiting:
+        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
 
 
 def test_a_small_step_waits_at_the_angle_where_it_stands(amber: Design) -> None:
     """Cogging of 1 mN m that turns forward, half of it where the drive stands, leaves less to overcome."""
     cogging = {"motor.cogging": 1e-3, "motor.cogging_periods": 4.0, "motor.cogging_phase": math.pi / 6.0}
-    result = threshold(quiet(with_values(amber, cogging)), 0.0)
-    expected = (2.25e-3 - 0.5e-3) / (5.9e-3 * 0.12 * 120.0 * 2376.0)
-    assert result.static.forward_rad == pytest.approx(expected, rel=1e-12)
-    for wait in result.waiting:
-        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
+    waits(threshold(quiet(with_values(amber, cogging)), 0.0), 2.25e-3 - 0.5e-3)
 
 
 def test_breakaway_above_friction_counts_in_the_threshold(amber: Design) -> None:
@@ -179,9 +176,8 @@ def test_stick_slip_is_foreseen(amber: Design, integral_time: float, gain: float
 
 
 def test_stick_slip_needs_breakaway_above_friction_and_an_integral(amber: Design) -> None:
-    for point in friction_effects(amber).points:
-        assert point.cycles.stick_slip is None
-        assert point.cycles.as_predicted
+    cycles = [point.cycles for point in friction_effects(amber).points]
+    assert {(one.stick_slip, one.as_predicted) for one in cycles} == {(None, True)}
     emps = with_values(load_design("emps"), {"friction.breakaway_ratio": 2.0})
     assert friction_effects(emps).points[0].cycles.stick_slip is None
 
@@ -194,15 +190,11 @@ def test_a_smoothed_law_is_not_said_to_have_a_threshold() -> None:
     assert "below the threshold" not in threshold["note"]
 
 
-def test_not_applicable_without_dry_friction() -> None:
+def test_not_applicable_without_dry_friction_and_too_weak_to_move(amber: Design) -> None:
     result = friction_effects(load_design("ctms-motor-position"))
     assert result.points == ()
     assert "no dry friction" in result.reason
-
-
-def test_too_weak_to_move() -> None:
-    design = load_design("ilr33-amber")
-    weak = replace(design, limits=replace(design.limits, peak_current_A=0.3))
+    weak = replace(amber, limits=replace(amber.limits, peak_current_A=0.3))
     assert static_threshold(weak).forward_rad == math.inf
     assert friction_effects(weak).points[0].threshold is None
 
@@ -267,10 +259,8 @@ def test_the_position_integral_moves_a_small_step(tmp_path) -> None:
     """T (A0/A - 1) with the position's integral time; no error stays, and the words say who integrates."""
     result = friction_effects(_design(tmp_path, 'integral_time = "0.4 s"'))
     assert result.integrator == "position"
-    waits = result.points[0].threshold.waiting
-    assert len(waits) == 5
-    for k, wait in enumerate(waits):
-        assert wait.predicted_s == pytest.approx(0.4 * (1.0 / (0.2, 0.3, 0.5, 0.7, 0.9)[k] - 1.0))
+    for share, wait in zip((0.2, 0.3, 0.5, 0.7, 0.9), result.points[0].threshold.waiting, strict=True):
+        assert wait.predicted_s == pytest.approx(0.4 * (1.0 / share - 1.0))
         assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=2e-3)
     words = section(result)["result"]
     assert "position" in words
@@ -292,23 +282,17 @@ def test_two_integrals_one_behind_the_other(tmp_path) -> None:
         assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)
 
 
-@pytest.mark.parametrize(
-    "kick",
-    [
-        ("feedforward", 1.0),
-        ("acceleration_feedforward", 1.0),
-        ("derivative_time", 1e-3),
-        ("friction_feedforward", 2.0),
-    ],
-    ids=lambda kick: kick[0],
-)
-def test_a_step_that_kicks_does_not_wait_for_the_integral(amber: Design, kick: tuple[str, float]) -> None:
+KICKS = {"acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0}
+KICKS["feedforward"] = 1.0
+
+
+@pytest.mark.parametrize("key", KICKS)
+def test_a_step_that_kicks_does_not_wait_for_the_integral(amber: Design, key: str) -> None:
     """Of half the threshold the integral alone takes Tn = 15 ms; each kick takes less than 1 ms."""
-    design = quiet(with_values(amber, {f"control.position.{kick[0]}": kick[1]}))
+    design = quiet(with_values(amber, {f"control.position.{key}": KICKS[key]}))
     assert design.controller.position_loop.kicks
-    half = 0.5 * 2.25e-3 / (5.9e-3 * 0.12 * 120.0 * 2376.0)
     rows = Rows.of(design)
-    rows.step("command", half)
+    rows.step("command", 0.5 * 2.25e-3 / STIFFNESS)
     assert first_motion_s(rows.running()) < 1e-3
     result = friction_effects(replace(design, validation=replace(design.validation, loads_Nm=(0.0,))))
     assert result.points[0].threshold.waiting == ()

@@ -88,8 +88,7 @@ def test_the_cycle_of_a_counted_speed_is_there_from_rest(encoder: dict[str, obje
     """Without friction, pushed off the edge a little; size and frequency within a fifth (first harmonic)."""
     design = counting(4000, **encoder)
     (cycle,) = cycles_of_quantisation(design)
-    q = design.angle_quantum_rad
-    free = without_nonlinearities(design)
+    q, free = design.angle_quantum_rad, without_nonlinearities(design)
     run = simulate(free, commands.hold(-1e-3 * q / design.total_ratio), 2.0, limits_on=False)
     tail = run.motor_angle_rad[-6000:]
     tail = tail - tail.mean()
@@ -117,14 +116,12 @@ def test_steps_of_the_speed_and_scale() -> None:
 
 
 def test_below_the_linear_amplitude_the_simulator_is_off_and_beyond_it_is_not() -> None:
+    """And the report says what counts do in a sentence."""
     found = of_difference(1024)
     assert found.off[0] > 0.3
     assert (found.off[2:] < 0.05).all()
     assert found.linear_seen_rad == pytest.approx(found.linear_rad)
-
-
-def test_the_report_says_it_in_a_sentence() -> None:
-    made = counts_section([of_difference(1024)])
+    made = counts_section([found])
     assert "steps of 61.4 rad/s in the speed estimate" in made["result"]
     assert made["status"] == "info"
 
@@ -156,12 +153,9 @@ def test_cycles_of_the_fin_s_play_are_found_by_the_simulator() -> None:
     assert seen.frequency_hz == pytest.approx(attracting.frequency_hz, rel=0.1)
 
 
-def test_friction_quiets_the_fin() -> None:
-    assert cycles_of_play(load_design("fin"), friction=True) == ()
-
-
-def test_without_play_there_is_no_cycle_of_it() -> None:
+def test_with_friction_or_without_play_the_fin_is_quiet() -> None:
     design = load_design("fin")
+    assert cycles_of_play(design, friction=True) == ()
     tight = replace(design, coupling=replace(design.coupling, play_rad=0.0))
     assert cycles_of_play(tight, friction=False) == ()
 
@@ -178,18 +172,15 @@ def test_amplitudes_go_with_the_play() -> None:
 def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     """A relay of one count has the gain 2 q/(pi A); in a clean drive without friction the cycle is there."""
     design = load_design("fin")
-    (cycle,) = cycles_of_quantisation(design)
-    margins = assemble_loops(without_nonlinearities(design)).break_points["output"]
+    (cycle,), free = cycles_of_quantisation(design), without_nonlinearities(design)
+    margins = assemble_loops(free).break_points["output"]
     omega = 2 * pi * cycle.frequency_hz
     L = margins.open_loop(np.exp(1j * omega * margins.period_s))
     assert L.imag == pytest.approx(0.0, abs=1e-6)
     q = 2 * pi / 65536
     assert cycle.output_rad == pytest.approx(2 * q / pi * abs(L), rel=1e-6)  # 1/g = |L| there
-    free = without_nonlinearities(design)
     run = simulate(free, commands.hold(-0.5 * q), 4.0, limits_on=False)
-    tail = run.output_angle_rad[-5000:]
-    seen = 0.5 * float(np.ptp(tail))
-    assert seen == pytest.approx(cycle.output_rad, rel=0.15)
+    assert 0.5 * np.ptp(run.output_angle_rad[-5000:]) == pytest.approx(cycle.output_rad, rel=0.15)
 
 
 def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
@@ -205,6 +196,5 @@ def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
     words = "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
     assert made["result"] == words
-    design: Design = load_design("fin")
     with pytest.raises(InputError, match="position loop"):
-        limit_cycles(replace(design, controller=replace(design.controller, position=None)))
+        limit_cycles(replace(AMBER, controller=replace(AMBER.controller, position=None)))

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -44,9 +45,8 @@ def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
     assert result.ticks == updates * every
     assert math.gcd(result.cycles, updates) == 1
     assert updates >= LEAST_UPDATES
-    assert result.cycles / (result.ticks * design.controller.period_s) == pytest.approx(
-        result.frequency_hz, rel=1e-12
-    )
+    hertz = result.cycles / (result.ticks * design.controller.period_s)
+    assert hertz == pytest.approx(result.frequency_hz, rel=1e-12)
     assert result.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
 
 
@@ -88,12 +88,10 @@ def test_without_friction_the_linear_response_holds_below_the_border(amber: Desi
         begin = np.minimum(amplitude, 0.9 * border.amplitude_rad)
         result = run_tones(amber, tones, which, amplitude, start, begin, friction_on=False)
         linear = result.phasor("output_angle_rad") / amplitude / start.output
-        names = [CAUSES[k] for k in causes(result, start.output, amplitude)]
+        names = tuple(CAUSES[k] for k in causes(result, start.output, amplitude))
+        assert names == (("none",) * 4 if everything else border.active)
         if everything:
             np.testing.assert_allclose(linear, 1.0, atol=1e-7)
-            assert names == ["none"] * 4
-        else:
-            assert names == list(border.active)
 
 
 def test_the_linear_response_is_that_of_the_loops(amber: Design) -> None:
@@ -105,14 +103,9 @@ def test_the_linear_response_is_that_of_the_loops(amber: Design) -> None:
 
 
 def test_what_the_map_shows(amber: Design, amber_map: AmplitudeMap) -> None:
-    cause, waveform = amber_map.cause, amber_map.waveform
-    assert CAUSES[cause[-1, 0]] == "speed"
-    assert WAVEFORMS[waveform[-1, 0]] == "triangle"
-    assert CAUSES[cause[0, 0]] == "stiction"
-    assert WAVEFORMS[waveform[0, 0]] == "stick-slip"
-    middle = len(amber_map.amplitude_rad) // 2
-    assert CAUSES[cause[middle, 0]] == "none"
-    assert WAVEFORMS[waveform[middle, 0]] == "sine"
+    middle, waveform = len(amber_map.amplitude_rad) // 2, amber_map.waveform
+    seen = [(CAUSES[amber_map.cause[k, 0]], WAVEFORMS[waveform[k, 0]]) for k in (-1, 0, middle)]
+    assert seen == [("speed", "triangle"), ("stiction", "stick-slip"), ("none", "sine")]
     changed = amber_map.response[middle, 0] / amber_map.linear[0]
     assert abs(20.0 * np.log10(abs(changed))) < 0.1
     assert abs(np.degrees(np.angle(changed))) < 2.0
@@ -138,31 +131,21 @@ def test_a_command_below_the_threshold_moves_nothing() -> None:
     assert CAUSES[causes(result, start.output, small)[0]] == "stiction"
 
 
-def test_a_drive_without_limits_has_no_border(amber: Design) -> None:
+def test_without_limits_or_stability_there_is_no_border_and_still_a_map(amber: Design) -> None:
     names = ("voltage_V", "speed_rad_s", "acceleration_rad_s2", "peak_current_A")
-    design = replace(amber, limits=replace(amber.limits, **dict.fromkeys(names, math.inf)))
-    loops = assemble_loops(design)
-    assert limit_shift(design, loops, count=3) is None
-    map_ = amplitude_map(design, loops, counts=(6, 4))
-    assert map_.share("speed", "acceleration", "current", "voltage") == 0.0
-
-
-def test_an_unstable_loop_has_no_border_and_still_a_map(amber: Design) -> None:
-    design = with_values(amber, {"control.position.gain": 6000.0})
-    loops = assemble_loops(design)
-    assert limit_shift(design, loops, count=3) is None
-    map_ = amplitude_map(design, loops, counts=(6, 4))
-    assert np.isfinite(map_.response).all()
+    unlimited = replace(amber, limits=replace(amber.limits, **dict.fromkeys(names, math.inf)))
+    unstable = with_values(amber, {"control.position.gain": 6000.0})
+    for design in (unlimited, unstable):
+        assert limit_shift(design, assemble_loops(design), count=3) is None
+        map_ = mapped(design, (6, 4))
+        assert np.isfinite(map_.response).all()
+        assert design is unstable or map_.share("speed", "acceleration", "current", "voltage") == 0.0
 
 
 def test_every_start_has_a_state_of_the_linear_drive() -> None:
     """A name that no drive has would be passed over, and the run would begin at rest."""
-    names = {
-        state
-        for name in ("ilr33-amber", "ilr33-amber-multirate")
-        for state in assemble_loops(load_design(name)).tick_system.states
-    }
-    assert set(PLACES) <= names
+    both = (assemble_loops(name).tick_system.states for name in ("ilr33-amber", "ilr33-amber-multirate"))
+    assert set(PLACES) <= {*chain(*both)}
 
 
 def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
@@ -213,17 +196,13 @@ def mapped(design: Design, counts: tuple[int, int] = (2, 9)) -> AmplitudeMap:
 def jerky(design: Design) -> Design:
     """With a command whose jerk is limited: n = 2 a/(j T) = 25 samples."""
     period = design.controller.position_loop.every * design.controller.period_s
-    return replace(
-        design,
-        command=Command(acceleration_rad_s2=100.0, jerk_rad_s3=200.0 / (25.0 * period), filter_time_s=2e-3),
-    )
+    jerk = 200.0 / (25.0 * period)
+    return replace(design, command=Command(acceleration_rad_s2=100.0, jerk_rad_s3=jerk, filter_time_s=2e-3))
 
 
+ELASTIC = ("ballscrew", "joint", "fin", "ilr33-amber-compliant")
 SPRINGS = {
-    **{
-        name: without_friction(load_design(name))
-        for name in ("ballscrew", "joint", "fin", "ilr33-amber-compliant")
-    },
+    **{name: without_friction(load_design(name)) for name in ELASTIC},
     "drive F": without_friction(drive_f()),
     "drive F behind a profile": jerky(without_friction(drive_f())),
 }

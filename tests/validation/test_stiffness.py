@@ -81,27 +81,16 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
     assert not replace(result, checks=(wrong,)).passed
 
 
-@pytest.mark.parametrize(
-    ("play", "dry"),
-    [
-        (0.0, 0.02),
-        (2e-4, 0.02),
-        (3e-3, 0.02),
-        (0.0, 0.2),
-        (2e-4, 0.2),
-        (3e-3, 0.35),
-        (2e-4, 0.5),
-        (3e-3, 0.5),
-    ],
-)
+PLAYS = {0.02: (0.0, 2e-4, 3e-3), 0.2: (0.0, 2e-4), 0.35: (3e-3,), 0.5: (2e-4, 3e-3)}  # by dry friction
+
+
+@pytest.mark.parametrize(("play", "dry"), [(play, dry) for dry, each in PLAYS.items() for play in each])
 def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: float) -> None:
     """0.36 N m of 12: 2 b + 2 m/k as it moves the load; where friction is larger play is in the width."""
     design = load_design("fin")
     assert design.load.moment_max_Nm == 12.0
-    friction = replace(design.load.friction, dry_torque_Nm=dry)
-    changed = replace(
-        design, coupling=replace(design.coupling, play_rad=play), load=replace(design.load, friction=friction)
-    )
+    load = replace(design.load, friction=replace(design.load.friction, dry_torque_Nm=dry))
+    changed = replace(design, coupling=replace(design.coupling, play_rad=play), load=load)
     expected = 2 * 0.36 / 800.0 + (play if dry < 0.36 else 0.0)
     assert lost_motion_rad(changed) == pytest.approx(expected, rel=1e-12)
     assert lost_motion_seen(changed) == pytest.approx(expected, rel=1e-6)
