@@ -16,14 +16,7 @@ from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
 from analyses.finite import finite
 from analyses.friction_effects.breakaway import static_threshold
-from analyses.large_signal.classify import (
-    CAUSES,
-    WAVEFORMS,
-    causes,
-    limiter_fractions,
-    not_linear,
-    waveforms,
-)
+from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
 from analyses.large_signal.tones import (
     MOST_TICKS,
     amplitudes,

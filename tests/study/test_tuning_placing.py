@@ -8,20 +8,8 @@ from toleranced import QUICK, need
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.design.model import (
-    Controller,
-    ControllerObjects,
-    Coupling,
-    Design,
-    Friction,
-    Gear,
-    Limits,
-    Load,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
+from actuator_lti.design.model import Coupling, Design, Gear, Load, Motor, PositionLoop
 from actuator_lti.errors import InputError
 from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
@@ -38,10 +26,11 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
         name="servo", title="", motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
         gears=(Gear(name="none", ratio=1.0),), coupling=coupling,
         load=Load(inertia_kgm2=inertia, path="back-drivable"),
-        friction=Friction(viscous_Nms_rad=1e-4), limits=Limits(voltage_V=10.0),
-        controller=Controller(period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
-                              velocity=VelocityLoop(gain=gain, integral_time_s=integral_time)),
-        validation=Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
+        friction=model.Friction(viscous_Nms_rad=1e-4), limits=model.Limits(voltage_V=10.0),
+        controller=model.Controller(
+            period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
+            velocity=model.VelocityLoop(gain=gain, integral_time_s=integral_time)),
+        validation=model.Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
     )  # fmt: skip
 
 
@@ -87,8 +76,7 @@ def test_a_requirement_that_only_a_notch_meets():
 
 def distance_of(tuned):
     """Squares of the ln ratios of gain and depth, and of the width of the notch over its frequency."""
-    velocity = tuned.design.controller.velocity
-    notch = velocity.filters[-1]
+    velocity, notch = tuned.design.controller.velocity, tuned.design.controller.velocity.filters[-1]
     ratios = np.log([velocity.gain / 0.02, notch.depth])
     return ratios @ ratios + (notch.width_rad_s / notch.frequency_rad_s) ** 2
 
@@ -167,7 +155,7 @@ def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
     baseline = load_design("ilr33-amber")
     assert baseline.objects.named
     assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
-    other = replace(baseline, objects=ControllerObjects())
+    other = replace(baseline, objects=model.ControllerObjects())
     assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
     assert step_of_gain(load_design("joint"), "control.position.gain") is None
 
