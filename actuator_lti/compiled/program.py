@@ -26,6 +26,14 @@ _MINMAX = {
     "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
 }
 
+# a form of a loop, once for processors with AVX2 and once for all others; the arithmetic is the same
+_CLONES = """\
+#if defined(__GLIBC__) && defined(__x86_64__) && !defined(__clang__)
+#define @clones __attribute__((target_clones("avx2", "default")))
+#else
+#define @clones
+#endif
+"""
 _INLINED = "static inline __attribute__((always_inline)) "
 _ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false", "count": "0"}
 __all__ = ["EmitError", "Program", "emit_c"]
@@ -40,6 +48,7 @@ class Program:
     functions: str  # definitions, callees first; entries have external linkage, all others are static
     declarations: Mapping[str, str]  # prototype of each entry function
     prefix: str  # in front of every function and type name
+    cloned: bool = False  # whether it has forms
 
     @property
     def helpers(self) -> list[str]:
@@ -50,7 +59,8 @@ class Program:
     @property
     def source(self) -> str:
         """All of it as one file."""
-        parts = [_INCLUDES, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
+        clones = _CLONES.replace("@", self.prefix) if self.cloned else ""
+        parts = [_INCLUDES + clones, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
         return "\n".join([*parts, self.types, *self.declarations.values(), self.functions])
 
     def constants_text(self, notes: Mapping[str, str] | None = None) -> str:
@@ -99,11 +109,13 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
         if function.returns is not None and len(function.returns) > 1:
             fields = " ".join(f"{C_TYPES[kind]} r{n};" for n, kind in enumerate(function.returns))
             types.append(f"typedef struct {{ {fields} }} {result_type(function)};")
-        inner = function.prefix != prefix and all(function is not formed.root for formed in second)
-        linkage = "" if public else _INLINED if inner else "static "
+        root = any(function is formed.root for formed in second)
+        inner = function.prefix != prefix and not root
+        linkage = "" if public else _INLINED if inner else f"static {prefix}clones " if root else "static "
         texts.append(collector.definition(function, linkage + head, lines))
     texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
-    return Program(collector.constants, "\n".join(types), "\n".join(texts), declarations, prefix)
+    parts = "\n".join(types), "\n".join(texts)
+    return Program(collector.constants, *parts, declarations, prefix, cloned=bool(second))
 
 
 class Collector:

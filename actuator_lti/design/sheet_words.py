@@ -30,7 +30,8 @@ _WORDS: dict[str, dict[str, str]] = {
     "motor": {
         "km kt torque_sensitivity": "torque_constant",
         "ki current_constant": "torque_constant, one over it",
-        "ke back_emf voltage_constant ac_voltage_constant emf_constant": "back_emf_constant",
+        "ke back_emf backemf bemf voltage_constant ac_voltage_constant emf_constant": "back_emf_constant",
+        "flux_linkage psi lambda": 'back_emf_constant, times the pole pairs, of constants = "peak-phase"',
         "kn speed_constant": 'back_emf_constant, which takes "317 rpm/V" too',
         "kv": 'back_emf_constant, which takes "480 KV"',
         "r rm ra phase_resistance terminal_resistance": "resistance",
@@ -92,8 +93,8 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "friction": {
         "no_load_starting_torque starting_torque": "dry_torque, with breakaway_ratio",
-        "static_friction coulomb_friction friction_torque": "dry_torque",
-        "viscous_friction damping": "viscous",
+        "c0 co static_friction coulomb_friction friction_torque": "dry_torque",
+        "cv viscous_friction damping": "viscous",
     },
     "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
     "encoder": {

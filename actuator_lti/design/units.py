@@ -79,7 +79,8 @@ _DERIVED = {
 # What makers write into a unit that is none, and what is to be written instead.
 _PULSES = 'is not the same of all makers; write "lines" (4 counts each) or "counts"'
 _ASIDE = {
-    **dict.fromkeys(("ppr", "PPR", "cpt", "ppt", "pulse", "pulses"), _PULSES),
+    **dict.fromkeys(("ppr", "PPR", "cpt", "ppt", "p", "pulse", "pulses"), _PULSES),
+    "erpm": 'is electrical; over the pole pairs it is "rpm"',
     "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
@@ -255,15 +256,10 @@ _FREQUENCY = "speed or angular frequency"
 _GAIN_OF_TORQUE = (
     "such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
 )
-_BANDWIDTH = "a bandwidth of {size:.6g} rad/s becomes a gain times "
 _ADVICE = {
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     (_FREQUENCY, "s"): "a period of {period:.6g} s",
-    (_FREQUENCY, "A*s/rad"): f"{_BANDWIDTH}J/kM, J of all that turns, seen at the motor",
-    (_FREQUENCY, "V*s/rad"): f"{_BANDWIDTH}J R/kM, J of all that turns, seen at the motor",
-    (_FREQUENCY, "V/A"): f"{_BANDWIDTH}L",
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
-    ("viscous friction", "A*s/rad"): _GAIN_OF_TORQUE,
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
     ("mass", "kg*m^2"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -116,20 +115,17 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
 
 
 def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[int] = ()) -> FloatArray:
-    """Covariance of least-squares values whose residuals are correlated in time as these are.
-
-    ``(W'W)^-1 W' G W (W'W)^-1``, G the autocovariance of the residual's own autoregressive model: with
-    ``A(q) e = v`` white, ``W' G W = var(v) Z'Z``, Z the rows filtered backward by 1/A. No row of one record
-    is correlated with one of another.
-    """
-    edges = (0, *(ends or (len(residual),)))
-    return covariance_of([(w[a:b], residual[a:b]) for a, b in pairwise(edges)])
+    """As `covariance_of`, of rows of several records, one after the other."""
+    return covariance_of(zip(*(np.split(rows, ends[:-1]) for rows in (w, residual)), strict=True))
 
 
-def covariance_of(blocks: Sequence[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """As `correlated_covariance`, of the rows of each record and (at least a part of) its noise.
+def covariance_of(blocks: Iterable[tuple[FloatArray, FloatArray]]) -> FloatArray:
+    """Covariance of least-squares values, of the rows of each record and (at least a part of) its noise.
 
-    Grown by rows over rows less all that was found of them: the values, and the coefficients of A.
+    ``(W'W)^-1 W' G W (W'W)^-1``, G the autocovariance of the noise's own autoregressive model: with ``A(q) e
+    = v`` white, ``W' G W = var(v) Z'Z``, Z the rows filtered backward by 1/A. No row of one record is
+    correlated with one of another. Grown by rows over rows less all that was found of them: the values, and
+    the coefficients of A.
     """
     return joint_covariance([information_of(*block) for block in blocks])
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
-from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification import verdict
 from analyses.identification.asked import Settings, fixed_values, held_by_name
@@ -20,11 +19,11 @@ from analyses.identification.design_values import (
     given_constant,
     with_given_constant,
 )
-from analyses.identification.diagnosis import Diagnosed, Fitted, diagnosed
+from analyses.identification.diagnosis import Diagnosed, diagnosed
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
-from analyses.identification.friction_map import LawChoice, fit_map
+from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import NAMES, FrictionForm, JointModel
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, LawChoice, Recipe
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.own_bias import without_bias
 from analyses.identification.residuals import ResidualTest, residual_tests
@@ -92,11 +91,14 @@ def identify_bench(
         start = design_with_fit(start, electrical_values(start, electrical), f"voltage equation of {names}")
     judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
     findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
-    fits = _Fits(design, start, used, settings)
-    right = diagnosed(design, start, used, fits, fits.recipe)
+    limit, cutoff, decimation = settings.residual_limit / 100.0, settings.cutoff_hz, settings.decimation
+    usual = cutoff is None and decimation is None
+    recipe = None if usual else recipe_for(used[0], cutoff, decimation)
+    held = _held(design, start, settings)
+    right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     used, model = right.records, right.model
     if electrical is None:
-        model = with_given_constant(start, model, used, fits.recipe)
+        model = with_given_constant(start, model, used)
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
     source, given = f"identified from {names}", given_constant(model)
     if given is not None:
@@ -104,9 +106,9 @@ def identify_bench(
     compared = design_values(design, model, used, start)
     loaded = any(is_loaded(record) for record in used)
     size = verdict.size_item(design, compared, kept_constants=electrical is None, loaded=loaded)
-    items = list(_items(design, findings, size, right, model, fits))
+    items = list(_items(design, findings, size, right, model, held, limit))
     try:
-        values = fits.values(model)
+        values = joint_values(start, model, inertia_to=settings.inertia_to)
         for record in used:
             for key in record.settings.keys() & set(values.names):
                 allowed = f"any other key, or --fix {key}=VALUE"
@@ -121,11 +123,12 @@ def identify_bench(
         refined = refine_records(made, used, values.names, progress=progress)
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
     text = write_design(made)
-    again = resimulate(read_design_text(text), (*used, *unseen), model.form)
+    written = read_design_text(text)
+    again = tuple(resimulate(written, record, model.form) for record in (*used, *unseen))
     for record in unseen:
         residual = held_out_residual(start, model, record)
-        items.append(verdict.held_out_item(record.name, residual, model.relative_residual, fits.limit))
-    items += [verdict.simulated_item(one.record, one.relative_error, fits.limit, one.how) for one in again]
+        items.append(verdict.held_out_item(record.name, residual, model.relative_residual, limit))
+    items += [verdict.simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
     return BenchResult(
         records=used,
         validation=unseen,
@@ -138,53 +141,44 @@ def identify_bench(
         items=tuple(items),
         settings=settings,
         design_values=compared,
-        laws=fits.laws,
+        laws=model.laws,
         electrical=electrical,
     )
 
 
-class _Fits:
-    """Fits records as the settings ask: the joint model less its own bias, and the simulated records.
+def _held(design: Design, start: Design, settings: Settings) -> dict[str, float]:
+    """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
+    form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
+    names = (*NAMES[form], "load_coefficient")
+    held = held_by_name(fixed_values(design, settings.fix), names, dict.fromkeys(INERTIAS, "inertia"))
+    return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
 
-    ``laws`` are the friction laws that the last fit tried.
-    """
 
-    def __init__(self, design: Design, start: Design, used: Sequence[Record], settings: Settings) -> None:
-        self.start, self.settings = start, settings
-        self.limit = settings.residual_limit / 100.0
-        self.laws: tuple[LawChoice, ...] = ()
-        cutoff, decimation = settings.cutoff_hz, settings.decimation
-        usual = cutoff is None and decimation is None
-        self.recipe = None if usual else recipe_for(used[0], cutoff, decimation)
-        form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
-        fixed = fixed_values(design, settings.fix)
-        self.held = held_by_name(
-            fixed, (*NAMES[form], "load_coefficient"), dict.fromkeys(INERTIAS, "inertia")
-        )
-        if "inertia" in self.held:  # a fixed rotor or load inertia fixes the whole
-            self.held["inertia"] = start.inertia_kgm2
+def _fitted(
+    start: Design,
+    settings: Settings,
+    held: Mapping[str, float],
+    recipe: Recipe | None,
+    records: Sequence[Record],
+) -> JointModel:
+    """The joint model as the settings ask, less its own bias."""
+    gravity = settings.gravity or start.load.gravity is not None
+    if settings.friction == "map":
+        model = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
+    else:
+        form = settings.friction
+        model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
+    parts = []
+    for part, record in zip(model.records, records, strict=True):
+        command = command_of(start, record)
+        more = {} if command is None else {command.signal: "command of the simulated drive"}
+        parts.append(replace(part, used={**more, **part.used}))
 
-    def __call__(self, records: Sequence[Record]) -> Fitted:
-        """The model of records, and these as the design that comes of it simulates them."""
-        start, form, recipe, held = self.start, self.settings.friction, self.recipe, self.held
-        gravity = self.settings.gravity or start.load.gravity is not None
-        if form == "map":
-            model, self.laws = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
-        else:
-            model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
-        parts = []
-        for part, record in zip(model.records, records, strict=True):
-            command = command_of(start, record)
-            more = {} if command is None else {command.signal: "command of the simulated drive"}
-            parts.append(replace(part, used={**more, **part.used}))
-        model = replace(model, records=tuple(parts))
-        return without_bias(start, self.design, model, records, recipe)
+    def made(model: JointModel) -> Design:
+        values = joint_values(start, model, inertia_to=settings.inertia_to)
+        return design_with_fit(with_structure(start, model), values, "")
 
-    def values(self, model: JointModel) -> Fit:
-        return joint_values(self.start, model, inertia_to=self.settings.inertia_to)
-
-    def design(self, model: JointModel) -> Design:
-        return design_with_fit(with_structure(self.start, model), self.values(model), "")
+    return without_bias(start, made, replace(model, records=tuple(parts)), records)
 
 
 def _items(
@@ -193,16 +187,17 @@ def _items(
     size: verdict.Item,
     right: Diagnosed,
     model: JointModel,
-    fits: _Fits,
+    held: Mapping[str, float],
+    limit: float,
 ) -> Iterator[verdict.Item]:
     """What must hold before a design is made, and what is kept of the old one."""
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
     yield size
     yield verdict.rows_item(model.rows_used, len(model.names))
-    yield verdict.residual_item(model.relative_residual, fits.limit)
+    yield verdict.residual_item(model.relative_residual, limit)
     yield from verdict.offset_items(design, model)
-    yield from verdict.kept_items(model, fits.held, design.axis)
+    yield from verdict.kept_items(model, held, design.axis)
     for record in right.records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():

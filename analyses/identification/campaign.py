@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,6 @@ from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
-from analyses.records.campaign_file import Instruments
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
 from analyses.records.consistency import Finding, check_record
 from analyses.records.factors import named_factor
@@ -103,16 +101,16 @@ def identify_campaign(
         except InputError as error:
             restless.append(SetAside(id=run.id, reason=str(error)))
             continue
-        findings[run.id] = tuple(check_run(design, imported.runs, run, point, campaign.instruments))
+        findings[run.id] = tuple(check_run(design, imported, run, point))
         wrong = [f"{one.subject}: {one.text}" for one in findings[run.id] if one.passed is False]
         if wrong:
             contradicting.append(SetAside(id=run.id, reason="; ".join(wrong)))
         else:
             points.append(point)
     aside = (*imported.set_aside, *restless, *contradicting)
-    settings: dict[str, Any] = {"outliers": campaign.outliers, "fixed": fixed, "kept": _values_of(design)}
+    tools, outliers, kept = campaign.instruments, campaign.outliers, _values_of(design)
     try:
-        fit = fit_surface(points, campaign.instruments, constant, **settings)
+        fit = fit_surface(points, tools, constant, outliers=outliers, fixed=fixed, kept=kept)
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
         message = f"{error.message} ({told})" if told else error.message
@@ -130,40 +128,30 @@ def identify_campaign(
 
 
 def check_run(
-    design: Design,
-    runs: Sequence[ImportedRun],
-    run: ImportedRun,
-    point: SteadyPoint,
-    instruments: Instruments,
+    design: Design, imported: ImportedCampaign, run: ImportedRun, point: SteadyPoint
 ) -> Iterator[Finding]:
     """Hold a run against its set speed and load, itself, and the design's limits.
 
     The speed may be off by 5 % of its setting, the load by 10 % and twice the sensor's accuracy.
     """
     speed, load = abs(run.entry.speed_rad_s or 0.0), abs(run.entry.load_Nm or 0.0)
-    if speed:
-        yield _against("speed", "rad/s", point.speed_rad_s, speed, SPEED_TOLERANCE)
-    if load:
-        sensor = 2.0 * instruments.torque_accuracy * instruments.torque_full_scale_Nm / load
-        yield _against("load", "N m", point.load_Nm, load, LOAD_TOLERANCE + sensor)
+    tools = imported.campaign.instruments
+    sensor = 2.0 * tools.torque_accuracy * tools.torque_full_scale_Nm / max(load, 1e-300)
+    for what, unit, measured, wanted, allowed in (
+        ("speed", "rad/s", point.speed_rad_s, speed, SPEED_TOLERANCE),
+        ("load", "N m", point.load_Nm, load, LOAD_TOLERANCE + sensor),
+    ):
+        if wanted:
+            ratio, text = measured / wanted, f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}"
+            passed, factor = abs(ratio - 1.0) <= allowed, named_factor(ratio)
+            text += "" if passed else f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
+            yield Finding(subject=f"set {what}", passed=passed, text=text)
     yield from check_record(design, run.record)
-    same = (
-        other
-        for other in runs
-        if other is not run and run.sensor_file and run.sensor_file == other.sensor_file
-    )
-    if (other := next(same, None)) is not None:
-        text = f"the sensor's file is that of run {other.id} as well"
-        yield Finding(subject="sensor file", passed=False, text=text)
-
-
-def _against(what: str, unit: str, measured: float, wanted: float, allowed: float) -> Finding:
-    ratio = measured / wanted
-    text, passed = f"{what} {measured:.4g} {unit}, set {wanted:.4g} {unit}", abs(ratio - 1.0) <= allowed
-    if not passed:
-        factor = named_factor(ratio)
-        text += f": {ratio:.4g} times" + (f", factor {factor}" if factor else "")
-    return Finding(subject=f"set {what}", passed=passed, text=text)
+    for other in imported.runs:
+        if other is not run and run.sensor_file and run.sensor_file == other.sensor_file:
+            text = f"the sensor's file is that of run {other.id} as well"
+            yield Finding(subject="sensor file", passed=False, text=text)
+            break
 
 
 def _values_of(design: Design) -> dict[str, float]:

@@ -24,10 +24,8 @@ ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01
 
-Fitted = tuple[JointModel, tuple[Record, ...]]
 
-
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Lag:
     """How much later than the motion a record's drive signal is, with its standard error, s."""
 
@@ -39,27 +37,15 @@ class Lag:
         return abs(self.seconds) > SURE * self.standard_error
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Followed:
-    """The recorded following error over the simulated one, and the scale of the recorded position.
+    """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it.
 
-    The scale is what the position has too much of the motion that was asked for, as a share.
+    Of the following error, recorded over simulated, and of what the position has too much of the motion.
     """
 
-    ratio: float
-    ratio_error: float
-    scale: float = 0.0
-    scale_error: float = 0.0
-
-    @property
-    def clock(self) -> float:
-        """The share by which a clock is off, 0 where chance explains it."""
-        return self.ratio - 1.0 if abs(self.ratio - 1.0) > SURE * self.ratio_error else 0.0
-
-    @property
-    def off(self) -> float:
-        """The share by which the scale is off, 0 where chance explains it."""
-        return self.scale if abs(self.scale) > SURE * self.scale_error else 0.0
+    clock: float
+    off: float = 0.0
 
     @property
     def fails(self) -> bool:
@@ -81,34 +67,32 @@ def diagnosed(
     design: Design,
     start: Design,
     records: Sequence[Record],
-    fit: Callable[[Sequence[Record]], Fitted],
+    fit: Callable[[Sequence[Record]], JointModel],
     recipe: Recipe | None,
 ) -> Diagnosed:
     """Fit records, rows of clipped current left out and lags taken back where they are sure.
 
-    ``start`` is the design with what the voltage equation gave; ``fit`` gives the model of records, and
-    these as the design that comes of it simulates them (none: it cannot).
+    ``start`` is the design with what the voltage equation gave; ``fit`` gives the model of records.
     """
     whole = [_without_flat_tops(start, record, recipe) for record in records]
     used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
-    model, simulated = fit(used)
+    model = fit(used)
     sure: dict[int, Lag] = {}
-    for k, (record, like) in enumerate(zip(used, simulated, strict=bool(simulated))):
-        own, other = (lag_of(start, one, like, model, recipe) for one in (record, like))
+    for k, (record, like) in enumerate(zip(used, model.simulated, strict=False)):
+        own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
             error = float(np.hypot(own.standard_error, other.standard_error))
-            lag = Lag(seconds=own.seconds - other.seconds, standard_error=error)
+            lag = Lag(own.seconds - other.seconds, error)
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
             sure |= {k: lag} if lag.is_sure else {}
     if sure:
         for k, lag in sure.items():
             used[k] = shifted(start, used[k], lag.seconds)
-        before = model
-        model, simulated = fit(used)
+        before, model = model, fit(used)
         if before.names == model.names:
             share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure.values()])
             model = _widened(model, np.sqrt(share) * (model.values - before.values))
-    pairs = zip(used, simulated, strict=bool(simulated))
+    pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
     seen = {record.name: followed(start, record, like) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
@@ -207,11 +191,10 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> 
     except (InputError, NumericalError):
         return record, []
     rows = (whole.keep & ~fit.records[0].keep)[whole.keep]
-    if not np.any(rows):
-        return record, []
+    count = int(np.count_nonzero(rows))
     more = np.sign(whole.y) * (whole.explained(fit, whole.names) - whole.y)
-    error = float(np.std(fit.residual)) * np.sqrt(correlation_time(fit.residual) / np.count_nonzero(rows))
-    if not float(np.mean(more[rows])) > SURE * error:
+    error = float(np.std(fit.residual)) * np.sqrt(correlation_time(fit.residual) / max(count, 1))
+    if not count or not float(np.mean(more[rows])) > SURE * error:
         return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
     text = (
@@ -228,27 +211,23 @@ def shifted(design: Design, record: Record, seconds: float) -> Record:
     return replace(record, signals={**record.signals, name: moved})
 
 
-def lag_of(
-    design: Design, record: Record, simulated: Record, model: JointModel, recipe: Recipe | None
-) -> Lag | None:
+def lag_of(design: Design, record: Record, simulated: Record, model: JointModel) -> Lag | None:
     """The lag with which the inverse model leaves the least, the model's values being found anew.
 
     Gauss-Newton on the shift of the drive signal, its derivative by a difference over the record's period.
     The rows of the simulated record are the instruments (IDIM-IV; Janot, Vandanjon, Gautier, 2014), so that
     noise of motion and current does not bias the steps. None where the motion does not tell a lag from
-    inertia and friction, and for the record of the EMPS benchmark.
+    inertia and friction.
     """
 
     def slopes(record: Record) -> FloatArray:
         """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
         half = 0.5 * record.period_s
-        late, early = (rows_under(design, shifted(design, record, s), model, recipe) for s in (half, -half))
+        late, early = (rows_under(design, shifted(design, record, s), model) for s in (half, -half))
         return np.column_stack([late.columns(model.names), (early.y - late.y) / (2.0 * half)])
 
-    if is_benchmark(record):
-        return None
     try:
-        own, other = (rows_under(design, one, model, recipe) for one in (record, simulated))
+        own, other = (rows_under(design, one, model) for one in (record, simulated))
         if len(other.keep) > len(own.keep):
             return None
         both = own.keep[: len(other.keep)] & other.keep
@@ -258,7 +237,7 @@ def lag_of(
         lag, error = 0.0, np.inf
         for _ in range(ROUNDS):
             late = shifted(design, record, lag)
-            y = rows_under(design, late, model, recipe).y - model.kept(own)
+            y = rows_under(design, late, model).y - model.kept(own)
             table = picked(slopes(late), own.keep, both)
             step, error = _step(z, table, picked(y, own.keep, both))
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
@@ -268,7 +247,7 @@ def lag_of(
         feigned = _step(z, table, turned[0] - turned[1])[0]
     except (InputError, NumericalError, np.linalg.LinAlgError):
         return None
-    return Lag(seconds=lag, standard_error=float(np.hypot(error, feigned)))
+    return Lag(lag, float(np.hypot(error, feigned)))
 
 
 def _step(z: FloatArray, table: FloatArray, y: FloatArray) -> tuple[float, float]:
@@ -291,12 +270,11 @@ def followed(design: Design, record: Record, simulated: Record) -> Followed | No
     (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
     factor shows as about the same factor between the recorded following error and the simulated one, a
     scale of the position as a part of the motion in it. Both are regressed together; noise is in the
-    recorded position alone. None where the drive has no such loops, or the motion does not tell, and for the
-    record of the EMPS benchmark.
+    recorded position alone. None where the drive has no such loops, or the motion does not tell.
     """
     design = record.drive(design)
     control = design.controller
-    if control.position is None or control.velocity is None or is_benchmark(record):
+    if control.position is None or control.velocity is None:
         return None
     command, place = "position_reference", "position"
     if design.axis == "rotary":
@@ -313,6 +291,6 @@ def followed(design: Design, record: Record, simulated: Record) -> Followed | No
         return None
     size = np.linalg.norm(table[:, kept], axis=0)
     solved = solve(table[:, kept] / size, wanted - own)
-    (ratio, *more), errors = (solved.values / size).tolist(), np.sqrt(np.diag(solved.correlated)) / size
-    scale = {"scale": -more[0], "scale_error": float(errors[1])} if more else {}
-    return Followed(ratio=ratio, ratio_error=float(errors[0]), **scale)
+    (ratio, *more), errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
+    shares = np.array([ratio - 1.0, *(-scale for scale in more)])
+    return Followed(*np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())

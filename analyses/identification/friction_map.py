@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -12,7 +12,7 @@ from actuator_lti.design.model import Design
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, Recipe, Rows, linear_basis
+from analyses.identification.joint_model import JointModel, LawChoice, Recipe, Rows, linear_basis
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
@@ -23,22 +23,6 @@ CLEARLY_BETTER = 6.0
 """A law is taken where its criterion is lower by this much (strong evidence; Kass and Raftery 1995)."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LawChoice:
-    """One law: its break points (rad/s at the motor), parameters, residual, and Bayesian criterion.
-
-    ``criterion`` is ``n ln(mean square) + p ln n`` with n the number of rows worth one independent one, less
-    that of the plain law: below -6 the law is taken.
-    """
-
-    name: str
-    breaks_rad_s: tuple[float, ...]
-    parameters: int
-    relative_residual: float
-    criterion: float
-    taken: bool
-
-
 def fit_map(
     design: Design,
     records: Sequence[Record],
@@ -46,10 +30,8 @@ def fit_map(
     recipe: Recipe | None = None,
     fixed: Mapping[str, float] | None = None,
     gravity: bool = False,
-) -> tuple[JointModel, tuple[LawChoice, ...]]:
+) -> JointModel:
     """Fit friction maps with one to four break points, and take one only where it is clearly better.
-
-    The model of the law that is taken, and all laws that were tried.
 
     The break points are found one after the other, each where it lowers the residual most among 24 speeds
     (evenly spaced in the logarithm), and then moved in turn.
@@ -76,7 +58,7 @@ def fit_map(
         if law.criterion < laws[best].criterion - (0.0 if best else CLEARLY_BETTER):
             best = k
     laws[best] = replace(laws[best], taken=True)
-    return models[best], tuple(laws)
+    return replace(models[best], laws=tuple(laws))
 
 
 def _law(breaks: tuple[float, ...], model: JointModel, gain: float) -> LawChoice:

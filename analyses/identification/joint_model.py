@@ -13,10 +13,10 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
 from analyses.estimation.arrays import BoolArray, FloatArray
 from analyses.estimation.fit import Fit
 from analyses.records.differentiation import Motion, filtered_motion
+from analyses.records.record import Record
 
 FrictionForm = Literal["symmetric", "per-direction"]
 
@@ -41,12 +41,6 @@ class Recipe:
     decimation: int = 10
     skip_end_samples: int = 0
     points: int = 3
-
-    def __post_init__(self) -> None:
-        least = {"filter_order": 1, "skip_samples": 0, "skip_end_samples": 0, "decimation": 1}
-        for name, low in least.items():
-            if getattr(self, name) < low:
-                raise InputError(f"{name} = {getattr(self, name)}: must be {low} or more")
 
     def motion(self, values: FloatArray, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
@@ -156,6 +150,22 @@ class RecordFit(Rows):
 
 
 @dataclass(frozen=True, kw_only=True)
+class LawChoice:
+    """One law: its break points (rad/s at the motor), parameters, residual, and Bayesian criterion.
+
+    ``criterion`` is ``n ln(mean square) + p ln n`` with n the number of rows worth one independent one, less
+    that of the plain law: below -6 the law is taken.
+    """
+
+    name: str
+    breaks_rad_s: tuple[float, ...]
+    parameters: int
+    relative_residual: float
+    criterion: float
+    taken: bool
+
+
+@dataclass(frozen=True, kw_only=True)
 class JointModel(Fit):
     """The inverse dynamic model of all records together.
 
@@ -167,21 +177,26 @@ class JointModel(Fit):
     correlation in time, and the scatter between records where there are several, which ``between`` has alone
     (by name, a standard deviation of one record). ``relative_residual``: norm of the residual over that of
     the drive signal, after decimation. ``alone`` are the records fitted one by one; ``bias`` was taken
-    off each value as the fit's own, ``bias_told`` says how, or why not.
+    off each value as the fit's own, ``bias_told`` says how, or why not, ``simulated`` are the records as the
+    design simulates them that comes of it (none: it cannot). ``laws`` are the friction laws that were tried.
+    ``recipe`` is that of the first record, ``asked`` that of all (none: each has its own).
     """
 
-    form: FrictionForm
+    form: FrictionForm = "symmetric"
     white_errors: FloatArray
     between: Mapping[str, float]
     relative_residual: float
     records: tuple[RecordFit, ...]
     recipe: Recipe
+    asked: Recipe | None = field(default=None, repr=False)
     condition: float
     alone: tuple[Fit, ...] = field(default=(), repr=False)
     knots_rad_s: tuple[float, ...] | None = None
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)
     bias_told: str = ""
+    simulated: tuple[Record, ...] = field(default=(), repr=False)
+    laws: tuple[LawChoice, ...] = field(default=(), repr=False)
 
     def kept(self, rows: Rows) -> FloatArray:
         """What the values that were not found explain of rows."""

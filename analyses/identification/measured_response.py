@@ -151,6 +151,9 @@ def _model(
         return sampled.loop(wired, name).open_loop
 
     def response(tried: Design) -> ComplexArray:
+        if tried.coupling is not None and not tried.load_side_inertia_kgm2 > 0.0:
+            told = f"wants no inertia behind the coupling; allowed: a response of {name}, --of {of}"
+            raise InputError(told, where=measured.name)
         system = seen(tried)
         value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()
         over = {"T": value, "S": np.ones_like(value)}.get(of)
@@ -195,15 +198,14 @@ def _determined(
         names = tuple(name for name in names if name != names[worst])
     else:
         raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
-    fixed = {}
-    for key, why in left.items():
-        reason = f"{why}: not determined, the design's value kept"
-        fixed[key] = Fixed(value=parameter_value(start, key), reason=reason)
-    misfit = float(np.sqrt(variance)) if known else None
-    values: dict[str, Any] = {
-        "names": names,
-        "values": found.values,
-        "covariance": covariance,
-        "fixed": fixed,
-    }
-    return ResponseFit(**values, misfit=misfit, at_bound=found.at_bound), found.rest
+    kept_at = {key: parameter_value(start, key) for key in left}
+    told = {key: f"{why}: not determined, the design's value kept" for key, why in left.items()}
+    fit = ResponseFit(
+        names=names,
+        values=found.values,
+        covariance=covariance,
+        fixed={key: Fixed(value=value, reason=told[key]) for key, value in kept_at.items()},
+        misfit=float(np.sqrt(variance)) if known else None,
+        at_bound=found.at_bound,
+    )
+    return fit, found.rest

@@ -92,12 +92,10 @@ def fit_output(
         nonlocal count
         values = dict(zip(paths, values_at(moved).tolist(), strict=True))
         output = output_of(with_values(design, values, check=False))
-        if output.shape != measured.shape:
-            raise InputError(f"output and measurement have the shapes {output.shape} and {measured.shape}")
         count += 1
         if progress is not None:
             progress(min(count, most), most)
-        return np.asarray(measured - output)
+        return measured - output
 
     begin = np.ones(len(paths))
     first = residual(begin)
@@ -131,34 +129,6 @@ def _scale(design: Design, path: str, start: float) -> float:
     if start == 0.0 == like:
         raise InputError(f"{path} = 0: a fit needs a start that is not zero")
     return abs(start) or like
-
-
-def refine_by_output_error(
-    design: Design,
-    paths: tuple[str, ...],
-    simulate_output: Callable[[Design], FloatArray],
-    measured: FloatArray,
-    *,
-    ends: Sequence[int] = (),
-    progress: Callable[[int, int], None] | None = None,
-) -> OutputErrorResult:
-    """Refine values by key so that the simulated output fits the measured one, as `fit_output`.
-
-    ``ends`` tell where each record ends in it.
-    """
-    found = fit_output(design, paths, simulate_output, measured, progress)
-    norm = float(np.linalg.norm(measured))
-    values = dict(zip(paths, found.values.tolist(), strict=True))
-    return OutputErrorResult(
-        names=paths,
-        values=found.values,
-        covariance=correlated_covariance(found.slopes, found.rest, ends),
-        error_before=float(np.linalg.norm(found.first)) / norm,
-        error_after=float(np.linalg.norm(found.rest)) / norm,
-        iterations=found.iterations,
-        design=with_values(design, values, check=False),
-        at_bound=found.at_bound,
-    )
 
 
 def output_name(design: Design, record: Record) -> str:
@@ -200,20 +170,27 @@ def refine_records(
         parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
         return np.concatenate(parts)
 
-    ends = np.cumsum([len(record) for record in records]).tolist()
-    return refine_by_output_error(design, paths, output, wanted, ends=ends, progress=progress)
+    found = fit_output(design, paths, output, wanted, progress)
+    norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
+    values = dict(zip(paths, found.values.tolist(), strict=True))
+    return OutputErrorResult(
+        names=paths,
+        values=found.values,
+        covariance=correlated_covariance(found.slopes, found.rest, ends),
+        error_before=float(np.linalg.norm(found.first)) / norm,
+        error_after=float(np.linalg.norm(found.rest)) / norm,
+        iterations=found.iterations,
+        design=with_values(design, values, check=False),
+        at_bound=found.at_bound,
+    )
 
 
-def resimulate(design: Design, records: Sequence[Record], form: FrictionForm) -> tuple[Resimulated, ...]:
-    """Simulate a design with each record's own command, and compare the signal that tells most.
+def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
+    """Simulate a design with a record's own command, and compare the signal that tells most.
 
     A record without a command is held against the torque that the design's own inertia and friction need for
     its motion.
     """
-    return tuple(_one(design, record, form) for record in records)
-
-
-def _one(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     why = ""
     if command_of(design, record) is not None:
         try:

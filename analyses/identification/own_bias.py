@@ -17,7 +17,7 @@ from analyses.estimation.arrays import FloatArray, picked
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of
 from analyses.identification.inverse import fit_records, with_scatter
-from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
+from analyses.identification.joint_model import JointModel, RecordFit, default_value
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
@@ -34,8 +34,7 @@ def without_bias(
     make: Callable[[JointModel], Design],
     model: JointModel,
     records: Sequence[Record],
-    recipe: Recipe | None,
-) -> tuple[JointModel, tuple[Record, ...]]:
+) -> JointModel:
     """The model less what the same fit finds too much in records simulated with the design that came of it.
 
     Sampling between the controller's ticks, filtered speeds at reversals, play and rest are met by the
@@ -45,16 +44,15 @@ def without_bias(
     errors are those of the difference of the two residuals, with its own autocorrelation. A record without
     a command is simulated with one that moves the drive as recorded; of a long one the first part is. That
     of the EMPS benchmark, with published figures, is left as it is. ``make`` gives the design that comes of
-    a model. With the model go the records as they were simulated; none where they could not be.
+    a model.
     """
     less = model
-    simulated: tuple[Record, ...] = ()
     driven: tuple[Record, ...] = ()
     fit = partial(
         fit_records,
         start,
         form=model.form,
-        recipe=recipe,
+        recipe=model.asked,
         fixed={name: one.value for name, one in model.fixed.items()},
         gravity="gravity_sin" in model,
         knots_rad_s=model.knots_rad_s,
@@ -65,16 +63,16 @@ def without_bias(
             made = make(less)
             reason = "" if driven else _cannot(made, records)
             if reason:
-                return replace(model, bias_told=reason), ()
+                return replace(model, bias_told=reason)
             driven = driven or tuple(_driven(made, record) for record in records)
-            simulated = tuple(_with_model_signals(made, record) for record in driven)
-            again = fit(simulated)
+            less = replace(less, simulated=tuple(_with_model_signals(made, record) for record in driven))
+            again = fit(less.simulated)
         except (InputError, NumericalError) as error:
-            return replace(less, bias_told=f"not taken off: {error}"), simulated
-        before, less = less.values, _corrected(start, made, model, again)
-        if not less.bias or np.all(np.abs(less.values - before) < SETTLED * less.standard_errors):
+            return replace(less, bias_told=f"not taken off: {error}")
+        before, less = less, replace(_corrected(start, made, model, again), simulated=less.simulated)
+        if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
             break
-    return less, simulated
+    return less
 
 
 def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:

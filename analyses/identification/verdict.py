@@ -177,7 +177,7 @@ def following_item(record: str, followed: Followed) -> Item:
         f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with: "
         "counts a revolution, the reduction, or a unit"
         if abs(off) > RATE_TOLERANCE
-        else f"the following error is {followed.ratio:.4g} times that of the design's loops at this motion: "
+        else f"the following error is {1.0 + clock:.4g} times that of the design's loops at this motion: "
         f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
     )
     return share_item(f"following-{record}", label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)

@@ -38,6 +38,7 @@ from nonlinear._kernels.energy import NODES, WEIGHTS
 
 FINITE = 1e15
 LARGEST = 1e300
+SURE = 1.001  # rounding does not decide what a bound allows
 
 
 @kernel
@@ -127,12 +128,12 @@ def put_torques(p, s):
 
 
 @kernel
-def speed_of_change(p, s):
-    """Norm of x' in the units of energy; it bounds every derivative of a guard."""
+def pace(p, s):
+    """Square of the norm of x' in the units of energy, which bounds every derivative of a guard."""
     di, dw, dW, dd = elastic_slopes(p, s)
     weight = int(s[at.ES_MODE]) + at.MODE_WEIGHT
     di, dw, dW, dd = di * p[weight], dw * p[weight + 1], dW * p[weight + 2], dd * p[weight + 3]
-    return math.sqrt(di * di + dw * dw + dW * dW + dd * dd)
+    return di * di + dw * dw + dW * dW + dd * dd
 
 
 @kernel
@@ -176,8 +177,9 @@ def stride(p, s, number, h):
     d1 = row_of(p, o + 3 * at.STEP_COLUMNS, i, w, W, d, u, a, b)
     turned = row_of(p, o + 4 * at.STEP_COLUMNS, i, w, W, d, u, a, b)
     if s[at.ES_GUARDS] > 0.0:
-        reach = p[m + at.MODE_REACH + number] * speed_of_change(p, s)
-        if s[at.ES_ROOM] > 2.0 * reach:  # twice: rounding does not decide
+        far, squared = p[m + at.MODE_REACH + number], pace(p, s)
+        reach = far * math.sqrt(squared)
+        if s[at.ES_ROOM] * s[at.ES_ROOM] > SURE * (far * far * squared):  # does not wait for the root
             s[at.ES_ROOM] -= reach
         elif not guards_hold(p, s, 0.125 * h * reach, i1, w1, W1, d1):
             return False
@@ -245,7 +247,7 @@ def first_event(p, s, h):
     best, event = h, at.NO_EVENT
     m, n = int(s[at.ES_MODE]), int(p[at.EL_TERMS])
     i, w, W, d, _turned = series_state(p, s, h)
-    chord = 0.125 * h * h * p[m + at.MODE_GROWTH] * speed_of_change(p, s)
+    chord = 0.125 * h * h * p[m + at.MODE_GROWTH] * math.sqrt(pace(p, s))
     if not (chord < LARGEST):
         return best, event
     for j in range(int(s[at.ES_GUARDS])):

@@ -232,12 +232,13 @@ def put_room(p, s, mode, g):
 
     Over no more than that the chord bound of a whole period holds too: |g| and Ts/8 |g''| for |x'| = 1.
     """
-    steep, moved = 0.125 * p[layout.PERIOD] * s[g + at.G_CURVE], 0.0
+    total, moved = 0.0, 0.0
     for j in range(4):
         weight = p[mode + at.MODE_WEIGHT + j]
         if s[g + j] != 0.0:
-            steep += abs(s[g + j]) / weight if weight > 0.0 else math.inf
+            total += (s[g + j] / weight) * (s[g + j] / weight) if weight > 0.0 else math.inf
         moved += abs(s[g + at.G_U + j])
+    steep = math.sqrt(total) + 0.125 * p[layout.PERIOD] * s[g + at.G_CURVE]
     s[g + at.G_ROOM] = 1.0 / steep if moved == 0.0 and steep > 0.0 else 0.0
 
 
@@ -317,8 +318,10 @@ def put_output(p, s):
         s[layout.S_OUTPUT] = s[layout.S_ANGLE] / p[layout.RATIO]
         s[layout.S_OUTPUT_SPEED] = s[layout.S_SPEED] / p[layout.RATIO]
         return
-    s[layout.S_OUTPUT] = s[at.ES_LOAD_ANGLE] / p[at.EL_RATIO_BEHIND]
-    s[layout.S_OUTPUT_SPEED] = s[at.ES_LOAD_SPEED] / p[at.EL_RATIO_BEHIND]
+    s[layout.S_OUTPUT], s[layout.S_OUTPUT_SPEED] = s[at.ES_LOAD_ANGLE], s[at.ES_LOAD_SPEED]
+    if p[at.EL_RATIO_BEHIND] != 1.0:
+        s[layout.S_OUTPUT] /= p[at.EL_RATIO_BEHIND]
+        s[layout.S_OUTPUT_SPEED] /= p[at.EL_RATIO_BEHIND]
 
 
 @kernel

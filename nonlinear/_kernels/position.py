@@ -186,7 +186,8 @@ def position_law(p, s, io, reference, th):
     s[layout.S_ERROR] = e
     s[layout.S_ERROR_RATE] += p[layout.DERIVATIVE_COEFFICIENT] * (rate - s[layout.S_ERROR_RATE])
     direct = p[layout.POSITION_GAIN] * e + feedforward(p, s, reference)
-    direct += p[layout.DERIVATIVE] * s[layout.S_ERROR_RATE]
+    if p[layout.DERIVATIVE] != 0.0:  # nobody waits for the division otherwise
+        direct += p[layout.DERIVATIVE] * s[layout.S_ERROR_RATE]
     if p[layout.HAS_VELOCITY] <= 0.0:
         direct += s[layout.S_TORQUE_FEEDFORWARD]
     integral = s[layout.S_POSITION_INTEGRATOR]

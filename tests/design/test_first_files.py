@@ -107,11 +107,9 @@ def motor(constants: str, **values: str) -> str:
 def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     constants: str, values: dict[str, str]
 ) -> None:
-    missing, unit = ("back_emf_constant", "V*s/rad")
-    if missing in values:
-        missing, unit = "torque_constant", "N*m/A"
-    answer = told(motor(constants, **values)).rpartition(" ")[2]
-    design = read_design_text(motor(constants, **values, **{missing: f"{answer} {unit}"}))
+    missing = "torque_constant" if "back_emf_constant" in values else "back_emf_constant"
+    answer = " ".join(told(motor(constants, **values)).split()[-2:])
+    design = read_design_text(motor(constants, **values, **{missing: answer}))
     same = design.effective_motor
     # six digits are told
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
@@ -184,11 +182,16 @@ def test_a_speed_without_an_angle_is_asked_for_it(limit: str) -> None:
     assert "write rev or rad into it" in told(DRIVE.replace("[limits]\n", f"[limits]\n{limit}\n"))
 
 
-def test_a_gain_in_torque_is_told_how_to_become_one_in_amperes() -> None:
-    current = '[control.current]\ngain = "1 V/A"\n'
-    for stage, gain in (("position", "50 Nm/rev"), ("velocity", "0.16 Nm/(rev/s)")):
-        text = told(f'{DRIVE}{current}[control.{stage}]\ngain = "{gain}"\n')
-        assert "over kM, and over the ratio squared" in text
+def test_a_gain_of_the_position_in_torque_is_told_how_to_become_one_in_amperes() -> None:
+    """Makers state it at the output as often as at the motor."""
+    text = told(f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.position]\ngain = "50 Nm/rev"\n')
+    assert "over kM, and over the ratio squared" in text
+
+
+def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -> None:
+    text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
+    told_of = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
+    assert told_of.endswith("in SI, 0.0127 V*s/rad")
 
 
 @pytest.mark.parametrize(

@@ -101,9 +101,15 @@ def test_the_example_is_a_campaign_file(tmp_path, cli) -> None:
         (("identify", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
         (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
+        (("identify", "r.csv", "--design", "emps", "--cutoff", "0"), "0 Hz: must be between 0 and 50 Hz"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(arguments: tuple[str, ...], reason: str, cli) -> None:
+def test_bad_input_is_one_line_and_status_2(
+    arguments: tuple[str, ...], reason: str, tmp_path, monkeypatch, cli
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99))
+    Path("r.csv").write_text(f"time_s,position_m,force_N\n{rows}")
     assert reason in cli.refused(*arguments)
 
 

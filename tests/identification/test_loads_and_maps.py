@@ -103,8 +103,8 @@ def _axis_record(law: str, seed: int = 0) -> Record:
 
 def test_a_friction_map_is_found_with_its_break_points() -> None:
     """Truth: 30, 18, 15 N at 0, 0.01, 0.05 m/s, then rising 100 N per m/s."""
-    model, laws = fit_map(load_design("emps"), [_axis_record("map")])
-    taken = next(law for law in laws if law.taken)
+    model = fit_map(load_design("emps"), [_axis_record("map")])
+    taken = next(law for law in model.laws if law.taken)
     assert taken.breaks_rad_s == pytest.approx((0.01, 0.05), rel=0.25)
     assert taken.criterion < -100.0
     knots = model.knots_rad_s
@@ -118,9 +118,9 @@ def test_a_friction_map_is_found_with_its_break_points() -> None:
 def test_a_plain_law_needs_no_map() -> None:
     """Over five draws of noise the criterion never takes a map for a drive that has none."""
     for seed in range(5):
-        model, laws = fit_map(load_design("emps"), [_axis_record("plain", seed)])
+        model = fit_map(load_design("emps"), [_axis_record("plain", seed)])
         assert model.knots_rad_s is None
-        assert next(law for law in laws if law.taken).name.startswith("plain")
+        assert next(law for law in model.laws if law.taken).name.startswith("plain")
 
 
 def test_the_map_goes_into_the_design_with_its_errors() -> None:

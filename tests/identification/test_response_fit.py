@@ -149,6 +149,17 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
     assert next(item["passed"] for item in result["items"]) is False
 
 
+def test_a_response_that_leaves_no_load_behind_the_coupling_is_refused(tmp_path, cli) -> None:
+    """Ten times the loop is that of a tenth of the inertia: less than the rotor's, which is held."""
+    loop, design = 10.0 * open_loop(HERTZ), _design(tmp_path, OFF)
+    (tmp_path / "r.csv").write_text(
+        "f_hz,re,im\n" + "".join(f"{f},{v.real},{v.imag}\n" for f, v in zip(HERTZ, loop, strict=True))
+    )
+    words = ("identify", "--response", tmp_path / "r.csv", "--design", design)
+    said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
+    assert "wants no inertia behind the coupling; allowed: a response of position, --of L" in said
+
+
 @pytest.mark.parametrize(
     ("more", "reason"),
     [

@@ -11,27 +11,22 @@ from actuator_lti.design.model import Design, Friction, Limits, Motor
 from nonlinear import Probe, Rows, State, Trajectory, commands, simulate
 from nonlinear._kernels import layout
 from nonlinear.runs.running import Running
+from tests.changed import changed
 from tests.nonlinear.elastic_drive import random_drive, run_plant, stribeck, two_mass
 from tests.nonlinear.elastic_reference import reference
 
+AMBER = load_design("ilr33-amber")
 DRY = Friction(dry_torque_Nm=0.02, viscous_Nms_rad=5e-6)
-UNEVEN = Friction(
-    dry_torque_Nm=0.02,
-    viscous_Nms_rad=5e-6,
-    dry_torque_reverse_Nm=0.03,
-    viscous_reverse_Nms_rad=2e-5,
-    breakaway_ratio=1.5,
-    offset_torque_Nm=0.004,
+UNEVEN = replace(
+    DRY, dry_torque_reverse_Nm=0.03, viscous_reverse_Nms_rad=2e-5, breakaway_ratio=1.5, offset_torque_Nm=0.004
 )
 LONG = 2e-3  # a tick longer than every time constant: much happens in it
 
 
 def bare_drive(friction: Friction, period_s: float, delay_s: float = 0.0, **motor: float) -> Design:
     """The baseline's plant with other friction, tick and motor values, voltage unlimited."""
-    design = load_design("ilr33-amber")
-    control = replace(design.controller, period_s=period_s, computing_delay_s=delay_s)
-    motor = replace(design.motor, **motor)
-    return replace(design, motor=motor, friction=friction, limits=Limits(voltage_V=1e9), controller=control)
+    control, limits = {"period_s": period_s, "computing_delay_s": delay_s}, Limits(voltage_V=1e9)
+    return changed(AMBER, motor=motor, friction=friction, limits=limits, controller=control)
 
 
 def drive_open(design: Design, voltages: np.ndarray, start: State, load_Nm: float = 0.0) -> Trajectory:
@@ -72,7 +67,7 @@ def assert_same(
 def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: float) -> None:
     design = bare_drive(friction, LONG, delay * LONG)
     value = {"real": 6e-6, "complex": 4e-5, "double": double_inductance(design)}[inductance]
-    design = replace(design, motor=replace(design.motor, inductance_H=value))
+    design = changed(design, motor={"inductance_H": value})
     rng = np.random.default_rng(3)
     voltages = rng.uniform(0.15, 0.9, 30) * (-1.0) ** np.arange(30)
     voltages[10:14] = 0.0
@@ -80,24 +75,21 @@ def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: fl
 
 
 def test_ringing_faster_than_the_tick() -> None:
-    # electromechanical resonance above Nyquist: the speed crosses zero several times under one held voltage
+    """Electromechanical resonance above Nyquist: the speed crosses zero several times in a tick."""
     design = bare_drive(replace(DRY, dry_torque_Nm=5e-4), 0.2, inductance_H=6e-3, resistance_ohm=0.005)
     assert_same(design, np.array([0.5, 0.0, -0.3, 0.2, 0.0, 0.0]), State(), 4)
 
 
 def test_events_with_a_load_that_drives_back() -> None:
-    design = bare_drive(UNEVEN, LONG)
-    design = replace(design, load=replace(design.load, path="back-drivable"))
-    voltages = 0.6 * np.sin(np.arange(24.0))
-    assert_same(design, voltages, State(), 1, load_Nm=60.0)
+    design = changed(bare_drive(UNEVEN, LONG), load={"path": "back-drivable"})
+    assert_same(design, 0.6 * np.sin(np.arange(24.0)), State(), 1, load_Nm=60.0)
 
 
 def test_torque_source() -> None:
     design = bare_drive(UNEVEN, LONG, 0.3 * LONG)
     motor = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=0.1)
-    design = replace(design, motor=motor, controller=replace(design.controller, current=None))
-    voltages = 0.5 * np.sin(0.9 * np.arange(60.0))
-    assert_same(design, voltages, State(motor_speed_rad_s=5.0), 2)
+    design = changed(design, motor=motor, controller={"current": None})
+    assert_same(design, 0.5 * np.sin(0.9 * np.arange(60.0)), State(motor_speed_rad_s=5.0), 2)
 
 
 def test_breakaway_at_the_edge_of_a_tick() -> None:
@@ -110,23 +102,19 @@ def test_breakaway_at_the_edge_of_a_tick() -> None:
 
 
 def test_start_from_rest_without_friction() -> None:
-    design = bare_drive(Friction(), 1e-4)
-    assert_same(design, np.sin(0.3 * np.arange(100.0)), State(), 0)
+    assert_same(bare_drive(Friction(), 1e-4), np.sin(0.3 * np.arange(100.0)), State(), 0)
 
 
 def test_friction_above_the_stall_torque_never_moves() -> None:
-    design = bare_drive(Friction(dry_torque_Nm=2.0), 1e-4)
-    run = drive_open(design, np.full(2000, 12.0), State())
+    run = drive_open(bare_drive(Friction(dry_torque_Nm=2.0), 1e-4), np.full(2000, 12.0), State())
     assert run.current_A[-1] == pytest.approx(12.0 / 0.055, rel=1e-12)  # stall current, 1.29 N m
     assert not run.motor_speed_rad_s.any()
     assert not run.motor_angle_rad.any()
-    assert run.events == 0
-    assert run.stick_fraction == 1.0
+    assert (run.events, run.stick_fraction) == (0, 1.0)
 
 
 def test_comes_to_rest_and_stays() -> None:
-    design = bare_drive(DRY, 1e-4)
-    run = drive_open(design, np.zeros(3000), State(motor_speed_rad_s=300.0))
+    run = drive_open(bare_drive(DRY, 1e-4), np.zeros(3000), State(motor_speed_rad_s=300.0))
     assert run.motor_speed_rad_s[-1] == 0.0
     assert np.ptp(run.motor_angle_rad[-100:]) == 0.0
     assert run.events == 1
@@ -136,48 +124,35 @@ TICKS = np.arange(24)
 SQUARE = 4.0 * np.sign(np.sin(2 * np.pi * TICKS / 13 + 0.3))
 WAVE = 0.5 * np.sin(TICKS / 5)
 FRICTION = {
-    "dry_torque_Nm": 0.05,
-    "dry_torque_reverse_Nm": 0.03,
-    "viscous_Nms_rad": 1e-4,
-    "load_coefficient": 0.02,
-    "breakaway_ratio": 1.3,
-    "offset_torque_Nm": 0.01,
-}
+    "dry_torque_Nm": 0.05, "dry_torque_reverse_Nm": 0.03, "viscous_Nms_rad": 1e-4, "load_coefficient": 0.02,
+    "breakaway_ratio": 1.3, "offset_torque_Nm": 0.01,
+}  # fmt: skip
 LOAD = {"dry_torque_Nm": 0.3, "viscous_Nms_rad": 1e-3, "breakaway_ratio": 1.2, "offset_torque_Nm": 0.02}
 CURVE = stribeck((0, 0.06), (5, 0.02), (40, 0.03), (80, 0.05))
-ONE_SIDED = stribeck((0, 0.03), (30, 0.01), direction="reverse") + stribeck(
-    (0, 0.06), (5, 0.02), direction="forward"
-)
+BACKWARD = stribeck((0, 0.03), (30, 0.01), direction="reverse")
+ONE_SIDED = BACKWARD + stribeck((0, 0.06), (5, 0.02), direction="forward")
+TIGHT, BY_LOAD = {"play_rad": 0.0}, {"load_coefficient": 0.13}
+MAPPED = {"points": CURVE, "load_coefficient": 0.01}
 HARD = {
     "play and damping": ({}, 0.0),
     "play without damping": ({"coupling": {"damping_Nms_rad": 0.0}}, 0.0),
     "play, damped beyond its critical value": ({"coupling": {"damping_Nms_rad": 0.6}}, 0.0),
-    "bilateral": ({"coupling": {"play_rad": 0.0}}, 0.0),
+    "bilateral": ({"coupling": TIGHT}, 0.0),
     "stick of both sides": ({"friction": FRICTION, "load_friction": LOAD}, 0.0),
     "friction follows the sign of T_s": (
-        {"coupling": {"play_rad": 0.0}, "friction": {"load_coefficient": 0.03, "dry_torque_Nm": 0.01}},
+        {"coupling": TIGHT, "friction": {"load_coefficient": 0.03, "dry_torque_Nm": 0.01}},
         WAVE,
     ),
     "self-locking stage": (
-        {
-            "path": "self-locking",
-            "friction": {"load_coefficient": 0.13, "dry_torque_Nm": 0.01},
-            "load_friction": LOAD,
-        },
+        {"path": "self-locking", "friction": {**BY_LOAD, "dry_torque_Nm": 0.01}, "load_friction": LOAD},
         WAVE,
     ),
-    "self-locking, bilateral": (
-        {"path": "self-locking", "friction": {"load_coefficient": 0.13}, "coupling": {"play_rad": 0.0}},
-        WAVE,
-    ),
+    "self-locking, bilateral": ({"path": "self-locking", "friction": BY_LOAD, "coupling": TIGHT}, WAVE),
     "Stribeck map": ({"friction": {"points": CURVE}, "load_friction": LOAD}, WAVE),
     "map of each side": ({"friction": {"points": ONE_SIDED, "load_coefficient": 0.01}}, WAVE),
-    "rigid drive with a map": (
-        {"coupling": None, "friction": {"points": CURVE, "load_coefficient": 0.01}},
-        WAVE,
-    ),
+    "rigid drive with a map": ({"coupling": None, "friction": MAPPED}, WAVE),
     "rigid and self-locking with a map": (
-        {"coupling": None, "path": "self-locking", "friction": {"points": CURVE, "load_coefficient": 0.2}},
+        {"coupling": None, "path": "self-locking", "friction": {**MAPPED, "load_coefficient": 0.2}},
         WAVE,
     ),
 }

@@ -1,7 +1,7 @@
 """Model.md section 4: where no friction turns, no limit and no event acts, the running drive is the loop."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf
 
 import control
@@ -12,6 +12,7 @@ from test_running_controller import some_drive
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.model import Command, Design, Friction, Limits, LoadFriction
 from nonlinear import Rows, State, Trajectory, commands, simulate
+from tests.changed import changed
 from tests.nonlinear.elastic_drive import drive_f
 
 TICKS = 20_000
@@ -22,17 +23,15 @@ SIGNALS = {
     "i_ref": "current_command_A", "w_ref": "speed_command_rad_s", "output_angle": "output_angle_rad",
     "W": "output_speed_rad_s", "T_s": "coupling_torque_Nm",
 }  # fmt: skip
-every_delay = pytest.mark.parametrize("delay", [0.0, 0.5, 1.0, 1.5])
-every_rate = pytest.mark.parametrize("rates", [(1, 1), (2, 10)])
+DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
 
 
 def timed(design: Design, delay: float, rates: tuple[int, int], feedforward: float = 0.0) -> Design:
     """The design with a computing delay in ticks and the updates of its velocity and position loop."""
-    c = design.controller
-    velocity = replace(c.velocity, every=rates[0])
-    position = replace(c.position, every=rates[1], feedforward=feedforward)
-    c = replace(c, computing_delay_s=delay * c.period_s, velocity=velocity, position=position)
-    return replace(design, controller=c)
+    late, velocity = delay * design.controller.period_s, {"every": rates[0]}
+    position = {"every": rates[1], "feedforward": feedforward}
+    control = {"computing_delay_s": late, "velocity": velocity, "position": position}
+    return changed(design, controller=control)
 
 
 def linear_run(
@@ -62,8 +61,9 @@ def assert_identical(
 BY_DIFFERENCE = {"speed": "difference", "filter_time_s": 2e-4}
 RIGID = [
     # delay, rates, feed-forward, encoder, friction and load, limits
-    *((delay, rates, 0.0, {}, None, True) for delay in (0.0, 0.5, 1.0, 1.5) for rates in ((1, 1), (2, 10))),
-    *((delay, rates, 0.0, {}, 4.0, True) for delay, rates in ((1.0, (1, 1)), (0.5, (2, 10)))),
+    *((delay, rates, 0.0, {}, None, True) for delay in DELAYS for rates in RATES),
+    (1.0, (1, 1), 0.0, {}, 4.0, True),
+    (0.5, (2, 10), 0.0, {}, 4.0, True),
     (1.0, (1, 1), 0.0, {**BY_DIFFERENCE, "difference_samples": 1}, 0.0, False),
     (1.5, (2, 10), 0.0, {**BY_DIFFERENCE, "difference_samples": 3}, 0.0, False),
     (1.0, (2, 10), 0.2, {}, None, False),
@@ -71,17 +71,10 @@ RIGID = [
 
 
 @pytest.mark.parametrize(("delay", "rates", "feedforward", "encoder", "load_Nm", "limits"), RIGID)
-def test_rigid(
-    delay: float,
-    rates: tuple[int, int],
-    feedforward: float,
-    encoder: dict[str, object],
-    load_Nm: float | None,
-    limits: bool,
-) -> None:
+def test_rigid(delay, rates, feedforward, encoder, load_Nm, limits) -> None:
     """The shipped rigid drive on a ramp with a sine upon it; with a load also its constant friction."""
     design = timed(load_design("ilr33-amber"), delay, rates, feedforward)
-    design = replace(design, encoder=replace(design.encoder, counts_per_rev=None, **encoder))
+    design = changed(design, encoder={"counts_per_rev": None, **encoder})
     start, T_v = -SPEED / design.controller.position.gain, design.controller.velocity.every * 1e-4
     friction, load = load_Nm is not None, load_Nm or 0.0
     run = simulate(
@@ -110,6 +103,14 @@ class Point:
     play_rad: float = 0.02
     load_coefficient: float = 0.02
     bends: tuple[tuple[float, float], ...] = ()  # torques at which the spring bends, stiffnesses beyond
+
+    @property
+    def coupling(self) -> dict[str, float]:
+        """Its play and bends as a design has them."""
+        found = {"play_rad": self.play_rad}
+        for k, (bend, beyond) in enumerate(self.bends, 1):
+            found |= {f"torque_{k}_Nm": bend, f"stiffness_{k + 1}_Nm_rad": beyond}
+        return found
 
     def twist(self, torque: float, k: float) -> tuple[float, float]:
         """Twist under a torque, and the stiffness there."""
@@ -147,23 +148,13 @@ def cruise(design: Design, point: Point) -> tuple[State, dict[str, float], float
     return state, linear | {"hold_w_ref": w, "hold_i_ref": i, "u1": u, "u2": u}, bent, twist
 
 
-@every_rate
-@every_delay
+@pytest.mark.parametrize("rates", RATES)
+@pytest.mark.parametrize("delay", DELAYS)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.name)
 def test_behind_a_coupling_between_its_events(point: Point, delay: float, rates: tuple[int, int]) -> None:
-    design = timed(drive_f(), delay, rates)
-    names = ("torque_1_Nm", "stiffness_2_Nm_rad"), ("torque_2_Nm", "stiffness_3_Nm_rad")
-    bends = {
-        key: value
-        for keys, pair in zip(names, point.bends, strict=False)
-        for key, value in zip(keys, pair, strict=True)
-    }
-    design = replace(
-        design,
-        friction=Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient),
-        load=replace(design.load, friction=LoadFriction(dry_torque_Nm=LOAD_DRY, viscous_Nms_rad=1e-3)),
-        coupling=replace(design.coupling, play_rad=point.play_rad, **bends),
-    )
+    friction = Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient)
+    load = {"friction": LoadFriction(dry_torque_Nm=LOAD_DRY, viscous_Nms_rad=1e-3)}
+    design = changed(timed(drive_f(), delay, rates), friction=friction, load=load, coupling=point.coupling)
     initial, known, bent, twist = cruise(design, point)
     bias = commands.ramp(SPRUNG_SPEED / design.total_ratio)
     duration = TICKS * design.controller.period_s
@@ -185,19 +176,16 @@ def linear_drive(case: int) -> Design:
     design = some_drive(rng)
     delay = float(rng.choice([0.0, 0.5, 1.0, 1.5, 2.7])) * design.controller.period_s
     slope, damping = float(rng.choice([0.0, -200.0])), float(rng.choice([0.0, 3.0]))
-    c, command = replace(design.controller, computing_delay_s=delay), design.command
-    if c.position is not None:
-        c = replace(c, position=replace(c.position, friction_feedforward=0.0))
-    return replace(
+    plain = {"friction_feedforward": 0.0} if design.controller.position is not None else None
+    command, sharp = design.command, {"counts_per_rev": None}
+    return changed(
         design,
-        controller=c,
+        controller={"computing_delay_s": delay, "position": plain},
         friction=Friction(viscous_Nms_rad=2e-6),
         limits=Limits(voltage_V=1e12),
-        load=replace(
-            design.load, path="back-drivable", moment_slope_Nm_rad=slope, moment_damping_Nms_rad=damping
-        ),
-        encoder=replace(design.encoder, counts_per_rev=None),
-        output_encoder=replace(design.output_encoder, counts_per_rev=None),
+        load={"path": "back-drivable", "moment_slope_Nm_rad": slope, "moment_damping_Nms_rad": damping},
+        encoder=sharp,
+        output_encoder=sharp,
         command=Command(filter_time_s=command.filter_time_s, filter_order=command.filter_order),
     )
 

@@ -6,7 +6,6 @@ import math
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -17,22 +16,21 @@ from actuator_lti import load_design
 from actuator_lti.compiled import emit_c
 from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
-from nonlinear import Probe, Rows, Trajectory, commands, loads, simulate
+from nonlinear import Probe, Rows, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh
 from nonlinear.export.program import single
+from tests.changed import changed
+
+AMBER = load_design("ilr33-amber")
 
 
 def smooth(width: float = 1.0, **friction: float) -> Design:
-    design = load_design("ilr33-amber")
-    return replace(
-        design, friction=replace(design.friction, law="tanh", smoothing_speed_rad_s=width, **friction)
-    )
+    return changed(AMBER, friction={"law": "tanh", "smoothing_speed_rad_s": width, **friction})
 
 
 @pytest.mark.parametrize("law", ["coulomb", "tanh"])
 def test_odd_symmetry(law: str) -> None:
-    design = load_design("ilr33-amber")
-    design = replace(design, friction=replace(design.friction, law=law))
+    design = changed(AMBER, friction={"law": law})
     runs = [simulate(design, commands.sine(a, 2.0), 0.7, 5.0) for a in (0.03, -0.03)]
     for name in ("output_angle_rad", "motor_speed_rad_s", "current_A", "voltage_V"):
         assert np.array_equal(getattr(runs[0], name), -getattr(runs[1], name)), name
@@ -41,7 +39,7 @@ def test_odd_symmetry(law: str) -> None:
 
 def test_scaling_of_torque_current_and_voltage() -> None:
     """Twice R and L, half of every inertia and torque: the same motion with half the current."""
-    base, c = load_design("ilr33-amber"), 2.0  # currents and torques become 1/c, voltages and speeds stay
+    base, c = AMBER, 2.0  # currents and torques become 1/c, voltages and speeds stay
     gears = [f"gear.{gear.name}.{side}_inertia" for gear in base.gears for side in ("input", "output")]
     friction = [f"friction.{name}" for name in ("dry_torque", "viscous", "load_coefficient")]
     less = ["motor.rotor_inertia", *gears, "load.inertia", *friction, "control.velocity.gain"]
@@ -57,28 +55,21 @@ def test_scaling_of_torque_current_and_voltage() -> None:
 
 
 def test_a_narrow_tanh_tends_to_coulomb() -> None:
-    command = commands.sine(0.01, 2.0)
-    exact = simulate(load_design("ilr33-amber"), command, 0.5, 8.0)
-    errors = []
-    for width in (4.0, 0.4, 0.04):
-        run = simulate(smooth(width), command, 0.5, 8.0)
-        errors.append(np.abs(run.output_angle_rad - exact.output_angle_rad).max())
+    drives = (AMBER, *map(smooth, (4.0, 0.4, 0.04)))
+    exact, *runs = (simulate(one, commands.sine(0.01, 2.0), 0.5, 8.0).output_angle_rad for one in drives)
+    errors = [np.abs(run - exact).max() for run in runs]
     assert errors[1] < errors[0] / 5.0
     assert errors[2] < errors[1] / 5.0
     assert errors[2] < 2e-7
 
 
-def fixed_level(level: int) -> Trajectory:
-    """A run with 2**level sub-steps in every tick."""
-    rows = Rows.of(smooth(2.0))
-    rows["ticks"], rows["tanh_level"] = 120, level
-    rows.sine("command", 0.002, 100.0)
-    return rows.trajectory()
-
-
 def test_fourth_order() -> None:
-    exact = fixed_level(7).motor_speed_rad_s
-    errors = [np.sqrt(np.mean((fixed_level(k).motor_speed_rad_s - exact) ** 2)) for k in (2, 3, 4)]
+    """Of runs with 2**level sub-steps in every tick."""
+    rows = Rows.of(smooth(2.0), 4)
+    rows["ticks"], rows["tanh_level"] = 120, [7, 2, 3, 4]
+    rows.sine("command", 0.002, 100.0)
+    exact, *speeds = (rows.trajectory(k).motor_speed_rad_s for k in range(4))
+    errors = [np.sqrt(np.mean((speed - exact) ** 2)) for speed in speeds]
     assert errors[-1] > 1e-9  # far from rounding
     orders = np.log2(np.array(errors[:-1]) / np.array(errors[1:]))
     np.testing.assert_allclose(orders, 4.0, atol=0.15)
@@ -112,21 +103,14 @@ def test_tanh_against_an_integrator(tolerance: float) -> None:
 def test_the_smoothed_law_knows_no_rest() -> None:
     run = simulate(smooth(), commands.hold(), 0.01)
     assert run.stick_fraction == 0.0
-    assert simulate(load_design("ilr33-amber"), commands.hold(), 0.01).stick_fraction == 1.0
-
-
-FRICTION = {
-    "breakaway_ratio": 1.3,
-    "dry_torque_reverse_Nm": 4e-3,
-    "viscous_reverse_Nms_rad": 1e-5,
-    "offset_torque_Nm": 5e-4,
-}
+    assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
 
 
 BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, seconds, load, what happens in it
     ("ilr33-amber", 0.0002, 3.0, 1.0, 8.0, "stick"),
     ("ilr33-amber", 0.0873, 1.0, 1.0, 4.0, "speed"),
     ("ilr33-amber", 0.1, 20.0, 1.0, 0.0, "current"),
+    ("ilr33-amber-tanh", 0.01, 2.0, 0.5, 8.0, ""),  # to its steps
     *((name, None, 1.0, 1.5, 0.0, "") for name in ("emps", "ctms-motor-position", "ilr33-amber-multirate")),
 ]
 
@@ -135,54 +119,41 @@ BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, secon
 def test_balance(
     name: str, size: float | None, frequency: float, seconds: float, load: float, what: str
 ) -> None:
+    """And what is asked of the energies does not change the motion."""
     design = load_design(name)
     size = size or design.validation.full_deflection_rad / 4
-    run = simulate(design, commands.sine(size, frequency), seconds, load, energy=True)
-    assert run.energy.relative_error < 1e-9
+    asked = (design, commands.sine(size, frequency), seconds, load)
+    run, plain = (simulate(*asked, energy=energy) for energy in (True, False))
+    assert run.energy.relative_error < (1e-6 if design.friction.law == "tanh" else 1e-9)
+    assert plain.energy is None
+    assert np.array_equal(run.motor_angle_rad, plain.motor_angle_rad)
+    assert np.array_equal(run.current_A, plain.current_A)
     if what:
         assert run.energy.electrical_input_J > 0.0
         assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
 
 
 def test_asymmetric_back_drivable_with_fractional_delay() -> None:
-    design = load_design("ilr33-amber")
-    design = replace(
-        design,
-        motor=replace(design.motor, back_emf_constant_Vs_rad=6.5e-3),
-        load=replace(design.load, path="back-drivable"),
-        friction=replace(design.friction, **FRICTION),
-        controller=replace(design.controller, computing_delay_s=1.3e-4),
+    friction = {
+        "breakaway_ratio": 1.3, "dry_torque_reverse_Nm": 4e-3, "viscous_reverse_Nms_rad": 1e-5,
+        "offset_torque_Nm": 5e-4,
+    }  # fmt: skip
+    motor, control = {"back_emf_constant_Vs_rad": 6.5e-3}, {"computing_delay_s": 1.3e-4}
+    design = changed(
+        AMBER, motor=motor, load={"path": "back-drivable"}, friction=friction, controller=control
     )
     run = simulate(design, commands.sine(0.01, 2.0), 1.0, loads.proportional(-40.0, 5.0), energy=True)
-    energy = run.energy
-    assert energy.relative_error < 1e-9
-    assert abs(energy.conversion_J) > 1e-3
-    assert abs(energy.output_work_J) > 1e-6
+    assert run.energy.relative_error < 1e-9
+    assert abs(run.energy.conversion_J) > 1e-3
+    assert abs(run.energy.output_work_J) > 1e-6
     assert run.events > 5
 
 
 def test_every_loss_of_a_steady_speed() -> None:
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.ramp(600.0 / design.total_ratio), 2.0, 8.0, energy=True)
+    run = simulate(AMBER, commands.ramp(600.0 / AMBER.total_ratio), 2.0, 8.0, energy=True)
     energy, turned = run.energy, run.final.motor_angle_rad
     assert energy.dry_friction_J == pytest.approx((2.25e-3 + 8 * 1.34e-3) * turned, rel=1e-9)
-    assert energy.kinetic_J == pytest.approx(0.5 * design.inertia_kgm2 * run.final.motor_speed_rad_s**2)
-
-
-def test_tanh_law_balances_to_its_steps() -> None:
-    design = load_design("ilr33-amber")
-    design = replace(design, friction=replace(design.friction, law="tanh"))
-    run = simulate(design, commands.sine(0.01, 2.0), 0.5, 8.0, energy=True)
-    assert run.energy.relative_error < 1e-6
-
-
-def test_energies_do_not_change_the_motion() -> None:
-    design = load_design("ilr33-amber")
-    with_energy = simulate(design, commands.sine(0.0005, 3.0), 0.6, 8.0, energy=True)
-    without = simulate(design, commands.sine(0.0005, 3.0), 0.6, 8.0)
-    assert without.energy is None
-    assert np.array_equal(with_energy.motor_angle_rad, without.motor_angle_rad)
-    assert np.array_equal(with_energy.current_A, without.current_A)
+    assert energy.kinetic_J == pytest.approx(0.5 * AMBER.inertia_kgm2 * run.final.motor_speed_rad_s**2)
 
 
 def points() -> list[float]:

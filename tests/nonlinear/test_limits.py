@@ -1,6 +1,5 @@
 """Limits alone: H1, H2, the sawtooth of the paper, anti-windup; any valid drive keeps its own."""
 
-from dataclasses import replace
 from math import acos, asin, degrees, inf, pi, radians
 
 import numpy as np
@@ -14,22 +13,22 @@ from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from nonlinear import Drive, Reducers, Run, State, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
+from tests.changed import changed
 from tests.validation.random_drives import full_drive
+
+AMBER = load_design("ilr33-amber")
 
 
 def ideal_drive(period_s: float, limits: model.Limits) -> model.Design:
     """Inner loops without lag: a torque source whose velocity loop reaches its command in one tick."""
-    inertia = 1e-6
+    inertia, place = 1e-6, model.PositionLoop(gain=0.5 / period_s)
+    velocity = model.VelocityLoop(gain=inertia / period_s)
+    control = {"period_s": period_s, "computing_delay_s": 0.0, "position": place, "velocity": velocity}
     return model.Design(
         name="ideal",
         title="ideal inner loops",
         motor=model.Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
-        controller=model.Controller(
-            period_s=period_s,
-            computing_delay_s=0.0,
-            position=model.PositionLoop(gain=0.5 / period_s),
-            velocity=model.VelocityLoop(gain=inertia / period_s),
-        ),
+        controller=model.Controller(**control),
         limits=limits,
         validation=model.Validation(full_deflection_rad=1.0),
     )
@@ -88,26 +87,21 @@ def test_h2_pure_acceleration_limit() -> None:
 
 
 def test_h3_an_unsteady_point_shows() -> None:
-    design = load_design("ilr33-amber")
-    window = Reducers(window_ticks=1000)
-    runs = [
-        Run(design=design, command=commands.sine(0.002, 10.0), duration_s=t, reducers=window)
-        for t in (0.2, 2.0)
-    ]
-    unsteady = simulate_many(runs).unsteadiness("output_angle_rad")
-    assert unsteady[0] > 1e-3
-    assert unsteady[1] < 1e-6
+    asked = {"design": AMBER, "command": commands.sine(0.002, 10.0), "reducers": Reducers(window_ticks=1000)}
+    runs = [Run(**asked, duration_s=duration_s) for duration_s in (0.2, 2.0)]
+    early, late = simulate_many(runs).unsteadiness("output_angle_rad")
+    assert early > 1e-3
+    assert late < 1e-6
 
 
 def test_sawtooth_of_the_paper() -> None:
     """5 deg at 1 Hz asks for 31 deg/s, the drive gives 22.7: straight flanks at the speed limit."""
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.sine(radians(5.0), 1.0), 3.0)
+    run = simulate(AMBER, commands.sine(radians(5.0), 1.0), 3.0)
     flank = run.limit_active("speed")
     assert 0.5 < run.limits["speed"].fraction < 0.9
     speed = np.abs(run.motor_speed_rad_s[flank])
     assert np.median(speed) == pytest.approx(942.5, rel=2e-3)
-    rate = degrees(np.median(speed)) / design.total_ratio
+    rate = degrees(np.median(speed)) / AMBER.total_ratio
     assert rate == pytest.approx(22.7, abs=0.05)
 
 
@@ -133,10 +127,9 @@ def test_multirate_limit_holds_between_updates() -> None:
 )
 def test_conditional_integration(e: float, integral: float, output: float, kept: float, acts: bool) -> None:
     """Kp = 2, Kp T/Tn = 0.5, limit 5 (model.md section 2)."""
-    design = load_design("ilr33-amber")
-    current = model.CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * design.controller.period_s)
-    control = replace(design.controller, position=None, velocity=None, current=current)
-    design = replace(design, controller=control, limits=model.Limits(voltage_V=5.0))
+    current = model.CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * AMBER.controller.period_s)
+    control = {"position": None, "velocity": None, "current": current}
+    design = changed(AMBER, controller=control, limits=model.Limits(voltage_V=5.0))
     drive = Drive(design, State(current_integral_V=integral))
     assert drive.control(e, 0.0, 0.0, 0.0) == output
     assert drive.value("current_integrator") == kept
@@ -145,8 +138,7 @@ def test_conditional_integration(e: float, integral: float, output: float, kept:
 
 def test_voltage_saturation_leaves_no_windup() -> None:
     """A step on 3 V of supply: saturated half of the way, no more overshoot than the braking costs."""
-    design = load_design("ilr33-amber")
-    run = simulate(replace(design, limits=replace(design.limits, voltage_V=3.0)), commands.step(0.1), 1.0)
+    run = simulate(changed(AMBER, limits={"voltage_V": 3.0}), commands.step(0.1), 1.0)
     assert run.limits["voltage"].fraction > 0.2
     assert np.abs(run.voltage_V).max() <= 3.0
     assert run.output_angle_rad.max() < 0.1 * 1.01
@@ -164,16 +156,17 @@ def test_flag_bits_are_those_of_the_limiters() -> None:
 def drive(seed: int) -> Design:
     """Any stages and features over decades; one in four on an ideal torque source, which has no current."""
     design = full_drive(seed)
-    motor, supply = design.motor, design.supply
-    if seed % 4 == 0 and supply is None and design.controller.outermost != "current":
-        source = Motor(
-            rotor_inertia_kgm2=motor.rotor_inertia_kgm2,
-            source_gain_Nm_V=motor.torque_constant_Nm_A / motor.resistance_ohm,
-        )
-        limits = replace(design.limits, peak_current_A=inf, continuous_current_A=inf, peak_time_s=None)
-        control = replace(design.controller, current=None)
-        return replace(design, motor=source, limits=limits, controller=control)
-    return design
+    if seed % 4 or design.supply is not None or design.controller.outermost == "current":
+        return design
+    limits = {"peak_current_A": inf, "continuous_current_A": inf, "peak_time_s": None}
+    source = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=per_volt(design))
+    return changed(design, motor=source, limits=limits, controller={"current": None})
+
+
+def per_volt(design: Design) -> float:
+    """Torque at standstill, N m/V."""
+    motor = design.motor
+    return motor.source_gain_Nm_V or motor.torque_constant_Nm_A / motor.resistance_ohm
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -191,10 +184,7 @@ def test_any_drive(part: int) -> None:
         updates = outer.every if outer else 1
         frequency = min(10.0 ** rng.uniform(-0.3, 2.3), 0.2 / (updates * c.period_s))
         command = commands.triangle(0.1 * full * 10.0 ** rng.uniform(-2.0, 2.0), frequency)
-        gain = (
-            design.motor.source_gain_Nm_V or design.motor.torque_constant_Nm_A / design.motor.resistance_ohm
-        )
-        load = rng.uniform(-0.3, 0.3) * gain * limits.voltage_V * design.total_ratio
+        load = rng.uniform(-0.3, 0.3) * per_volt(design) * limits.voltage_V * design.total_ratio
         moment = loads.proportional(rng.uniform(-0.3, 0.3) * load / full, load)
         run = simulate(design, command, 800 * c.period_s, moment, energy=True, raise_on_failure=False)
         assert run.status == "ok", (seed, run.advice)

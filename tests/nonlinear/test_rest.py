@@ -1,6 +1,5 @@
 """The judge of rest, against closed forms, plain long runs, and drives described in words."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,29 +15,28 @@ from nonlinear.bench.operating_motion import quiet
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
+from tests.changed import changed
 from tests.nonlinear.rest_agreement import contradictions
 from tests.validation.random_drives import full_drive, is_stable
 
 HERE = Path(__file__).parent
-AMBER = load_design("ilr33-amber")
+AMBER, JOINT = load_design("ilr33-amber"), load_design("joint")
+QUIET, FULL = quiet(JOINT), JOINT.validation.full_deflection_rad
 DEG = 180.0 / np.pi
 
 
-def plain_run(
-    design: Design, step: float, seconds: float, window_s: float, load_Nm: float = 0.0
-) -> BatchResult:
-    """A run with no leap and no judge, and its last window."""
-    rows, period_s = Rows.of(design), design.controller.period_s
-    rows["load"], rows["ticks"] = load_Nm, seconds / period_s
+def plain_run(design: Design, step: float, ticks: float, window: float, load_Nm: float = 0.0) -> BatchResult:
+    """A run with no leap and no judge, and its last windows."""
+    rows = Rows.of(design)
+    rows["load"], rows["ticks"] = load_Nm, ticks
     rows.step("command", step)
-    rows.window(round(window_s / period_s), 1, 0)
+    rows.window(round(window), 1, 0)
     return rows.run()
 
 
 def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
-    design = load_design("joint")
-    whole = simulate(design, commands.step(0.02), 0.1)
-    rows = Rows.of(design)
+    whole = simulate(JOINT, commands.step(0.02), 0.1)
+    rows = Rows.of(JOINT)
     rows.step("command", 0.02)
     drive = rows.running()
     pieces = [drive.advance(n) for n in (8, 1000, whole.time_s.size - 1008)]
@@ -58,9 +56,7 @@ def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
     ],
 )
 def test_only_what_stays_is_judged(command: commands.Command, held: bool) -> None:
-    run = simulate(AMBER, command, 0.1)
-    assert run.running is not None
-    rest = judge(run.running)
+    rest = judge(simulate(AMBER, command, 0.1).running)
     assert (rest is not None) == held
     if rest is not None:
         assert rest.verdict == "at rest"
@@ -91,10 +87,16 @@ def test_waiting_is_that_of_the_closed_form() -> None:
     assert 600.0 * 9.0 < rest.after_s < 600.0 * 9.0 + 10.0
 
 
-def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
+def protected(current_A: float, memory: float, overloaded: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """Row and state of a protection alone: a rate of 3e-4 a tick, 5 A for ever, released at 0.9."""
     p, s = np.zeros(at.SIZE + 400), np.zeros(at.S_QUEUE)
-    p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT] = 3e-4, 5.0
-    s[at.S_CURRENT], s[at.S_OVERLOAD] = -1.0, 0.3
+    p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT], p[at.OVERLOAD_RELEASE] = 3e-4, 5.0, 0.9
+    s[at.S_CURRENT], s[at.S_OVERLOAD], s[at.S_OVERLOADED] = current_A, memory, overloaded
+    return p, s
+
+
+def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
+    p, s = protected(-1.0, 0.3)
     x, n = 0.3, 5000
     for k in range(n):
         x += 3e-4 * (((-1.0 + 3.5 * k / n) / 5.0) ** 2 - x)
@@ -111,9 +113,7 @@ def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
 )  # fmt: skip
 def test_overload_acts_when_its_own_recursion_does(current_A: float, start: float, overloaded: float) -> None:
     """Trips at 1, lets go below 0.9; one tick before it has not."""
-    p, s = np.zeros(at.SIZE + 400), np.zeros(at.S_QUEUE)
-    p[at.OVERLOAD_RATE], p[at.CONTINUOUS_CURRENT], p[at.OVERLOAD_RELEASE] = 3e-4, 5.0, 0.9
-    s[at.S_CURRENT], s[at.S_OVERLOAD], s[at.S_OVERLOADED] = current_A, start, overloaded
+    p, s = protected(current_A, start, overloaded)
     x, last, ticks = start, (current_A / 5.0) ** 2, 0
     acts = last < 0.9 if overloaded else last > 1.0
     while acts and (x >= 0.9 if overloaded else x < 1.0):
@@ -123,13 +123,11 @@ def test_overload_acts_when_its_own_recursion_does(current_A: float, start: floa
 
 def test_overload_on_its_way_is_leapt_over() -> None:
     """The joint holds 60 N m for half a minute before the protection trips: the plain run says when."""
-    joint = quiet(load_design("joint"))
-    rest = settle(joint, 60.0, 0.1309).rest
+    rest, Ts = settle(QUIET, 60.0, 0.1309).rest, QUIET.controller.period_s
     assert rest.verdict == "at rest"
     assert "overload" in rest.limited
-    run = plain_run(joint, 0.1309, rest.after_s, joint.controller.period_s, 60.0)
-    tripped = run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")]
-    trips_s = joint.controller.period_s * float(tripped)
+    run = plain_run(QUIET, 0.1309, rest.after_s / Ts, 1, 60.0)
+    trips_s = Ts * float(run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")])
     assert trips_s < rest.after_s < 1.1 * trips_s
     assert rest.work < 200_000
 
@@ -137,16 +135,13 @@ def test_overload_on_its_way_is_leapt_over() -> None:
 def test_without_limits_an_unstable_drive_diverges() -> None:
     loud = with_values(AMBER, {"control.position.gain": 4000.0})
     run = simulate(loud, commands.step(0.01), 0.001, limits_on=False)
-    assert run.running is not None
-    rest = judge(run.running)
-    assert rest.verdict == "diverging"
+    assert judge(run.running).verdict == "diverging"
 
 
 def test_a_drive_that_its_load_carries_off_diverges() -> None:
     """Twice the peak torque of a back-drivable drive."""
-    joint = load_design("joint")
-    most = 2.0 * joint.limits.peak_current_A * (joint.motor.torque_constant_Nm_A or 0.0) * joint.total_ratio
-    rest = settle(joint, -most, 0.01).rest
+    most = 2.0 * JOINT.limits.peak_current_A * JOINT.motor.torque_constant_Nm_A * JOINT.total_ratio
+    rest = settle(JOINT, -most, 0.01).rest
     assert rest.verdict == "diverging"
     assert "current" in rest.limited
 
@@ -168,19 +163,16 @@ def test_a_gimbal_with_a_spring_and_a_steering_motor_with_play_hunt() -> None:
 def test_a_coarse_encoder_read_by_difference_never_settles(counts: int | None, share: float) -> None:
     """586 counts at 35 us: one count is 306 rad/s; without counts the same drive comes to rest."""
     values = {"control.period": 35e-6, "control.position.gain": 250.0, "control.velocity.integral_time": 3e-3}
-    design = with_values(AMBER, values)
-    encoder = replace(design.encoder, speed="difference", counts_per_rev=counts)
-    rest = settle(replace(design, encoder=encoder), 0.0, share * design.validation.full_deflection_rad).rest
+    design = changed(with_values(AMBER, values), encoder={"speed": "difference", "counts_per_rev": counts})
+    rest = settle(design, 0.0, share * design.validation.full_deflection_rad).rest
     assert rest.verdict == ("at rest" if counts is None else "limit cycle")
 
 
 def test_the_joint_crosses_its_friction_every_209_s() -> None:
     """A plain run of 15 min, looked at by its extremes: no leap, no judge."""
-    joint = load_design("joint")
-    step = 0.1 * joint.validation.full_deflection_rad
-    rest = settle(joint, 0.0, step).rest
+    rest, Ts = settle(JOINT, 0.0, 0.1 * FULL).rest, JOINT.controller.period_s
     assert rest.verdict == "limit cycle"
-    low, high = plain_run(joint, step, 440.0, 215.0).span("output_angle_rad")
+    low, high = plain_run(JOINT, 0.1 * FULL, 440.0 / Ts, 215.0 / Ts).span("output_angle_rad")
     assert rest.amplitude == pytest.approx(0.5 * float(high[0] - low[0]), rel=0.02)
     assert rest.frequency_hz == pytest.approx(1.0 / 209.3, rel=0.01)
 
@@ -190,20 +182,18 @@ PLAIN_TICKS = 300_000
 
 def test_a_filter_s_rounding_ends_no_leap() -> None:
     """A notch at 37 Hz sums up rounding at 8 kHz; errors are integrated for minutes between slips."""
-    joint = quiet(load_design("joint"))
-    rest = settle(joint, 0.0, 1e-3 * joint.validation.full_deflection_rad).rest
+    rest = settle(QUIET, 0.0, 1e-3 * FULL).rest
     assert rest.verdict == "limit cycle"
     assert rest.work < 1_800_000
 
 
 def test_overload_that_stays_is_not_waited_for() -> None:
     """60 N m ask for more than the continuous current: the protection trips and never releases."""
-    joint = quiet(load_design("joint"))
-    rest = settle(joint, 60.0, 1e-3 * joint.validation.full_deflection_rad).rest
+    rest = settle(QUIET, 60.0, 1e-3 * FULL).rest
     assert rest.verdict == "at rest"
     assert "overload" in rest.limited
-    step = 1e-3 * joint.validation.full_deflection_rad
-    run = plain_run(joint, step, 2.0 * rest.after_s, 1.2 * rest.after_s, 60.0)
+    after = rest.after_s / QUIET.controller.period_s
+    run = plain_run(QUIET, 1e-3 * FULL, 2.0 * after, 1.2 * after, 60.0)
     assert np.ptp(run.span("output_angle_rad")) < 1e-12
     assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
 
@@ -214,51 +204,42 @@ def test_hops_of_a_billionth_of_the_step_are_rest() -> None:
     step = design.validation.full_deflection_rad
     assert settle(design, 0.0, step).rest.verdict == "at rest"
     assert conduct(simulate(design, commands.step(step), 1.0)).status == "comes to rest"
-    rows = Rows.of(design)
-    rows.step("command", step)
-    rows["ticks"] = 1_000_000
-    rows.window(500_000, 1, 0)
-    assert np.ptp(rows.run().span("output_angle_rad")) < 1e-9 * step
+    assert np.ptp(plain_run(design, step, 1_000_000, 500_000).span("output_angle_rad")) < 1e-9 * step
+
+
+def stable_position_drive(seed: int) -> Design:
+    design = full_drive(seed)
+    if not is_stable(design) or design.controller.outermost != "position":
+        pytest.skip("no stable position loop")
+    return design
 
 
 @pytest.mark.parametrize("seed", range(1, 31))
 def test_random_drives_against_a_plain_run(seed: int) -> None:
     """What is said to be at rest by then has stopped; a cycle that it saw often enough has the same size."""
-    design = full_drive(seed)
-    if not is_stable(design) or design.controller.outermost != "position":
-        pytest.skip("no stable position loop")
+    design = stable_position_drive(seed)
     noises = ("current_noise_A", "angle_noise_rad", "output_angle_noise_rad", "jitter_s")
-    silent = replace(design, instruments=replace(design.instruments, **dict.fromkeys(noises, 0.0)))
+    silent = changed(design, instruments=dict.fromkeys(noises, 0.0))
     step = 0.01 * design.validation.full_deflection_rad
     rest = settle(design, 0.0, step).rest
-    rows = Rows.of(silent)
-    rows.step("command", step)
-    rows["ticks"] = PLAIN_TICKS
-    rows.window(PLAIN_TICKS // 5, 1, 0)
-    plain = rows.run()
-    spans = [float(np.subtract(*plain.span("output_angle_rad", last)[::-1])[0]) for last in (0, 1)]
+    span = np.ptp(plain_run(silent, step, PLAIN_TICKS, PLAIN_TICKS // 5).span("output_angle_rad"))
     waited = PLAIN_TICKS * design.controller.period_s
     if rest.verdict == "at rest" and rest.after_s < 0.6 * waited:
-        assert spans[0] < 1e-8 * step
+        assert span < 1e-8 * step
     if rest.verdict == "limit cycle" and rest.frequency_hz is not None and rest.frequency_hz * waited > 20.0:
-        assert spans[0] == pytest.approx(2.0 * rest.amplitude, rel=0.25)
+        assert span == pytest.approx(2.0 * rest.amplitude, rel=0.25)
 
 
 @pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
 def test_all_who_ask_get_one_answer(seed: int) -> None:
     """`cycles`, `validate`, `failures`, `simulate` after two lengths; three hundred: rest_agreement.py."""
-    design = full_drive(seed)
-    if not is_stable(design) or design.controller.outermost != "position":
-        pytest.skip("no stable position loop")
-    assert not list(contradictions(design))
+    assert not list(contradictions(stable_position_drive(seed)))
 
 
 def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
     """A run that starts where another one is at rest is at rest."""
     start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
-    run = simulate(AMBER, commands.hold(0.01), 0.01, initial=start)
-    assert run.running is not None
-    rest = judge(run.running)
+    rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
     assert rest.comes_to_rest
     assert rest.error == pytest.approx(0.0, abs=1e-12)
 
@@ -266,8 +247,7 @@ def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
 @pytest.mark.parametrize(("part", "period_s", "amplitude_deg"), [(0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)])
 def test_a_joint_that_hunts_for_minutes(part: float, period_s: float, amplitude_deg: float) -> None:
     """Slips minutes apart, several a cycle, one cycle for each start: figures of plain runs over 900 s."""
-    design = load_design("joint")
-    rest = settle(design, 0.0, part * design.validation.full_deflection_rad).rest
+    rest = settle(JOINT, 0.0, part * FULL).rest
     assert rest.verdict == "limit cycle"
     assert 1.0 / rest.frequency_hz == pytest.approx(period_s, rel=2e-3)
     assert DEG * rest.amplitude == pytest.approx(amplitude_deg, rel=5e-3)

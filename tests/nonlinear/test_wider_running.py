@@ -11,41 +11,34 @@ from actuator_lti import load_design
 from actuator_lti.design import model
 from actuator_lti.errors import InputError
 from nonlinear import Drive, Probe, Rows, State, commands, loads, simulate
+from tests.changed import changed
 
 AMBER = load_design("ilr33-amber")
 FREE = model.Friction(viscous_Nms_rad=1e-6)
 GAIN = 0.05  # V/A, of a current loop that hardly acts
 
 
-def changed(design: model.Design = AMBER, **control: object) -> model.Design:
-    return replace(design, controller=replace(design.controller, **control))
+TORQUE = changed(AMBER, controller={"position": None, "velocity": None})
 
 
 def torque_drive(gain: float, integral_time_s: float | None, **limits: float) -> model.Design:
     """A current loop alone."""
     current = model.CurrentLoop(gain_V_A=gain, integral_time_s=integral_time_s)
-    return replace(changed(position=None, velocity=None, current=current), limits=model.Limits(**limits))
+    return changed(TORQUE, controller={"current": current}, limits=model.Limits(**limits))
 
 
 def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
     """Every tick integrated afresh with the moment of its beginning."""
     ticks, Ts = 200, AMBER.controller.period_s
-    load = replace(
-        AMBER.load,
-        path="back-drivable",
-        moment_slope_Nm_rad=-300.0,
-        gravity=model.Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7),
-    )
-    design = changed(
-        replace(AMBER, load=load, friction=FREE, limits=model.Limits(voltage_V=1e9)), computing_delay_s=0.0
-    )
+    gravity = model.Gravity(mass_kg=3.0, arm_m=0.4, offset_rad=0.7)
+    load = {"path": "back-drivable", "moment_slope_Nm_rad": -300.0, "gravity": gravity}
+    unlimited, at_once = model.Limits(voltage_V=1e9), {"computing_delay_s": 0.0}
+    design = changed(AMBER, load=load, friction=FREE, limits=unlimited, controller=at_once)
     u, t = 6.0 * np.sin(0.02 * np.arange(ticks)), np.arange(ticks) * Ts
     series = 20.0 * np.sin(300.0 * t)
     given = replace(loads.series(t, series), constant_Nm=5.0, slope_Nm_rad=100.0)
-    probe = Probe(point="u", gain=0.0, injection=u)
-    run = simulate(
-        design, commands.hold(), ticks * Ts, given, probes=[probe], initial=State(motor_speed_rad_s=50.0)
-    )
+    probe, begin = Probe(point="u", gain=0.0, injection=u), State(motor_speed_rad_s=50.0)
+    run = simulate(design, commands.hold(), ticks * Ts, given, probes=[probe], initial=begin)
     m, N, J = design.motor, design.total_ratio, design.inertia_kgm2
     x, result = np.array([0.0, 50.0, 0.0]), np.empty((ticks, 3))
     for k in range(ticks):
@@ -64,10 +57,11 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
 
 def test_j9_the_slope_of_the_design_acts_without_being_told() -> None:
     """Without integrals a slope leaves th/(N ref) = g/(g - slope/N^2), g the torque per position error."""
-    load = replace(AMBER.load, path="back-drivable", moment_slope_Nm_rad=-6000.0)
-    velocity = replace(AMBER.controller.velocity, integral_time_s=None)
-    design = changed(replace(AMBER, load=load, friction=FREE), velocity=velocity)
-    g = design.motor.torque_constant_Nm_A * velocity.gain * design.controller.position.gain
+    load = {"path": "back-drivable", "moment_slope_Nm_rad": -6000.0}
+    control = {"velocity": {"integral_time_s": None}}
+    design = changed(AMBER, load=load, friction=FREE, controller=control)
+    c = design.controller
+    g = design.motor.torque_constant_Nm_A * c.velocity.gain * c.position.gain
     expected = g / (g + 6000.0 / design.total_ratio**2)
     run = simulate(design, commands.step(0.001), 2.0)
     assert run.output_angle_rad[-1] / 0.001 == pytest.approx(expected, rel=1e-6)
@@ -137,7 +131,7 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
     """
     protected = {"peak_current_A": 6.0, "continuous_current_A": 2.0, "peak_time_s": 1.0}
     design = torque_drive(GAIN, 1e-3, voltage_V=inf, **protected)
-    design = replace(design, friction=replace(design.friction, dry_torque_Nm=10.0))  # the rotor stays
+    design = changed(design, friction={"dry_torque_Nm": 10.0})  # the rotor stays
     tau = 1.0 / np.log(9.0 / 8.0)
     ratio2 = (min(amperes, 6.0) / 2.0) ** 2
     until = tau * np.log(ratio2 / (ratio2 - 1.0))
@@ -152,10 +146,8 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
 def test_noise_resolution_and_their_seeds() -> None:
     """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
     design = torque_drive(GAIN, None, voltage_V=inf)
-    noisy = replace(design, instruments=model.Instruments(current_noise_A=0.1, seed=3))
-    ticks = 20_000
-    seeded = [replace(noisy, instruments=replace(noisy.instruments, seed=s)) for s in (3, 3, 4)]
-    runs = [simulate(each, commands.hold(), ticks * 1e-4) for each in seeded]
+    ticks, noises = 20_000, [model.Instruments(current_noise_A=0.1, seed=s) for s in (3, 3, 4)]
+    runs = [simulate(replace(design, instruments=one), commands.hold(), ticks * 1e-4) for one in noises]
     assert np.array_equal(runs[0].current_A, runs[1].current_A)
     assert not np.array_equal(runs[0].current_A, runs[2].current_A)
     noise = (-runs[0].voltage_V / GAIN - runs[0].current_A) / 0.1
@@ -175,12 +167,11 @@ def test_noise_resolution_and_their_seeds() -> None:
 def test_jitter_and_angle_noise() -> None:
     """A source that cannot be felt, at constant speed: the position loop shows what it reads."""
     Ts, w, ticks = 1e-3, 40.0, 4000
+    place = model.PositionLoop(gain=1.0)
     design = model.Design(
         name="coasting", title="", limits=model.Limits(voltage_V=inf), validation=AMBER.validation,
         motor=model.Motor(rotor_inertia_kgm2=1.0, source_gain_Nm_V=1e-15),
-        controller=model.Controller(
-            period_s=Ts, computing_delay_s=0.0, position=model.PositionLoop(gain=1.0)
-        ),
+        controller=model.Controller(period_s=Ts, computing_delay_s=0.0, position=place),
     )  # fmt: skip
     start = State(motor_speed_rad_s=w)
     for instruments, rms in (
@@ -196,16 +187,15 @@ def test_jitter_and_angle_noise() -> None:
 
 def everything() -> model.Design:
     """A drive with every rare feature on."""
-    control = AMBER.controller
     notch = model.Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0)
     smooth = model.Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0)
-    velocity = replace(control.velocity, every=2, filters=(notch, smooth))
     fed = {"acceleration_feedforward": 0.7, "friction_feedforward": 0.05}
-    pid = {"integral_time_s": 0.05, "derivative_time_s": 1e-3}
-    position = replace(control.position, every=4, sensor="output", **pid, **fed)
-    return replace(
-        changed(velocity=velocity, position=position, computing_delay_s=1.3e-4),
-        encoder=replace(AMBER.encoder, speed="tracking", bandwidth_rad_s=1500.0, counts_per_rev=4096),
+    pid = {"integral_time_s": 0.05, "derivative_time_s": 1e-3, "every": 4, "sensor": "output"}
+    velocity = {"every": 2, "filters": (notch, smooth)}
+    return changed(
+        AMBER,
+        controller={"velocity": velocity, "position": pid | fed, "computing_delay_s": 1.3e-4},
+        encoder={"speed": "tracking", "bandwidth_rad_s": 1500.0, "counts_per_rev": 4096},
         command=model.Command(
             filter_time_s=2e-3, filter_order=2, rate_rad_s=0.3, acceleration_rad_s2=20.0, jerk_rad_s3=5000.0
         ),
@@ -213,8 +203,8 @@ def everything() -> model.Design:
         instruments=model.Instruments(
             current_noise_A=0.01, angle_noise_rad=1e-4, output_angle_noise_rad=1e-6, jitter_s=1e-6, seed=5
         ),
-        load=replace(AMBER.load, moment_slope_Nm_rad=-20.0, gravity=model.Gravity(mass_kg=1.0, arm_m=0.1)),
-        limits=replace(AMBER.limits, peak_time_s=0.02),
+        load={"moment_slope_Nm_rad": -20.0, "gravity": model.Gravity(mass_kg=1.0, arm_m=0.1)},
+        limits={"peak_time_s": 0.02},
     )
 
 
@@ -254,69 +244,62 @@ def test_profile_keeps_its_limits_and_arrives() -> None:
         for k in range(1, 6):  # each step is reached, without overshoot
             assert seen[k * n] == pytest.approx(wanted[k * n - 1], rel=1e-9)
             part = np.array(seen[(k - 1) * n : k * n + 1])
-            assert (
-                min(part[0], part[-1]) - 1e-12 <= part.min() <= part.max() <= max(part[0], part[-1]) + 1e-12
-            )
+            low, high = sorted((part[0], part[-1]))
+            assert low - 1e-12 <= part.min() <= part.max() <= high + 1e-12
         if jerk < inf:
             assert np.abs(third).max() < 200.0 * (1 + 1e-4)
 
 
 def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
-    command = model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0)
-    wave = commands.sine(0.005, 4.0, phase_rad=pi / 2)
-    # slowly into the cosine, so that the start keeps the limits as well
-    run = [
-        simulate(replace(AMBER, command=c), commands.ramp(0.05, 0.0, 0.2), 0.3)
-        for c in (command, model.Command(rate_rad_s=0.06))
-    ]
-    plain = simulate(AMBER, commands.ramp(0.05, 0.0, 0.2), 0.3)
-    assert np.array_equal(run[1].output_angle_rad, plain.output_angle_rad)
-    shaped = simulate(
-        replace(AMBER, command=command), wave, 1.0, initial=State(motor_angle_rad=0.005 * AMBER.total_ratio)
-    )
-    free = simulate(AMBER, wave, 1.0, initial=State(motor_angle_rad=0.005 * AMBER.total_ratio))
-    assert np.array_equal(shaped.output_angle_rad, free.output_angle_rad)
-    assert shaped.limits["profile"].fraction == 0.0
-    assert simulate(replace(AMBER, command=command), commands.step(0.1), 0.3).limits["profile"].active
+    """A cosine from its crest, where the start keeps the limits as well."""
+    slow = replace(AMBER, command=model.Command(rate_rad_s=0.06))
+    shaped = replace(AMBER, command=model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0))
+    ramp, wave = commands.ramp(0.05, 0.0, 0.2), commands.sine(0.005, 4.0, phase_rad=pi / 2)
+    crest = State(motor_angle_rad=0.005 * AMBER.total_ratio)
+    for design, command, begin in ((slow, ramp, State()), (shaped, wave, crest)):
+        run, free = (simulate(one, command, 1.0, initial=begin) for one in (design, AMBER))
+        assert np.array_equal(run.output_angle_rad, free.output_angle_rad)
+        assert run.limits["profile"].fraction == 0.0
+    assert simulate(shaped, commands.step(0.1), 0.3).limits["profile"].active
 
 
 def test_any_stage_may_be_the_outermost() -> None:
     m, friction = AMBER.motor, replace(FREE, dry_torque_Nm=1e-3)
-    design = replace(AMBER, friction=friction, limits=model.Limits(voltage_V=48.0))
-    voltage = simulate(changed(design, position=None, velocity=None, current=None), commands.step(10.0), 2.0)
-    lost = (friction.dry_torque_Nm + 1e-6 * voltage.motor_speed_rad_s[-1]) / m.torque_constant_Nm_A
-    assert voltage.motor_speed_rad_s[-1] == pytest.approx(
-        (10.0 - m.resistance_ohm * lost) / m.back_emf_constant_Vs_rad, rel=1e-9
+    design = changed(
+        AMBER, friction=friction, limits=model.Limits(voltage_V=48.0), controller={"position": None}
     )
+    torque_drive = changed(design, controller={"velocity": None})
+    voltage = simulate(changed(torque_drive, controller={"current": None}), commands.step(10.0), 2.0)
+    lost = (friction.dry_torque_Nm + 1e-6 * voltage.motor_speed_rad_s[-1]) / m.torque_constant_Nm_A
+    expected = (10.0 - m.resistance_ohm * lost) / m.back_emf_constant_Vs_rad
+    assert voltage.motor_speed_rad_s[-1] == pytest.approx(expected, rel=1e-9)
     assert voltage.voltage_V[-1] == 10.0
-    held = replace(design, friction=replace(friction, dry_torque_Nm=1.0))
-    torque = simulate(changed(held, position=None, velocity=None), commands.step(1.5), 0.1)
+    torque = simulate(changed(torque_drive, friction={"dry_torque_Nm": 1.0}), commands.step(1.5), 0.1)
     assert torque.current_A[-1] == pytest.approx(1.5, rel=1e-9)
-    speed = simulate(changed(design, position=None), commands.step(0.2), 1.0)
+    speed = simulate(design, commands.step(0.2), 1.0)
     assert speed.motor_speed_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-6)
     assert speed.speed_command_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-12)
-    slow = replace(changed(design, position=None), command=model.Command(acceleration_rad_s2=2.0))
+    slow = replace(design, command=model.Command(acceleration_rad_s2=2.0))
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio
     assert np.diff(ramped).max() == pytest.approx(2.0 * AMBER.controller.period_s, rel=1e-9)
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
 
 
 def filtered(count: int = 1, **item: object) -> model.Design:
-    return changed(velocity=replace(AMBER.controller.velocity, filters=(model.Filter(**item),) * count))
+    return changed(AMBER, controller={"velocity": {"filters": (model.Filter(**item),) * count}})
 
 
-TORQUE = changed(position=None, velocity=None)
 REFUSED = {
     "need a position or a velocity loop": replace(TORQUE, command=model.Command(rate_rad_s=1.0)),
     "needs command.acceleration": replace(AMBER, command=model.Command(jerk_rad_s3=1.0)),
     "a mean over": replace(AMBER, command=model.Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
     "supply.capacitance: missing": replace(AMBER, supply=model.Supply(regenerative=False)),
-    "encoder.bandwidth: missing": replace(AMBER, encoder=replace(AMBER.encoder, speed="tracking")),
+    "encoder.bandwidth: missing": changed(AMBER, encoder={"speed": "tracking"}),
     "below pi/T": filtered(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),
     "width = None": filtered(kind="notch", frequency_rad_s=400.0),
     "at most 8": filtered(9, kind="lowpass", frequency_rad_s=400.0),
     "unit circle": filtered(kind="biquad", b=(1.0,), a=(-1.0,)),
-    "needs a current loop": replace(changed(current=None), limits=replace(AMBER.limits, peak_time_s=1.0)),
+    "needs a current loop": changed(AMBER, controller={"current": None}, limits={"peak_time_s": 1.0}),
 }
 
 

@@ -10,6 +10,7 @@ as a script it writes docs/validation_keys.md::
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 
 from actuator_lti import load_design
@@ -51,11 +52,11 @@ class Seen:
 
 def chosen(design: Design) -> dict[str, object]:
     """What a design has of the keys whose choice another of `CHOICES` can take."""
-    control = design.controller
-    there: dict[str, object] = {"motor.constants": design.motor.constants, "load.path": design.load.path}
-    there |= {"friction.law": design.friction.law, "encoder.speed": design.encoder.speed}
-    for name, loop in (("velocity", control.velocity), ("position", control.position)):
-        there |= {f"control.{name}.sensor": loop.sensor} if loop is not None else {}
+    there: dict[str, object] = {}
+    for key in CHOICES:
+        part, _, name = key.replace("control.", "controller.").rpartition(".")
+        owner = attrgetter(part)(design)
+        there |= {key: getattr(owner, name)} if owner is not None else {}
     return there
 
 
@@ -66,8 +67,8 @@ def keys_of(design: Design) -> tuple[str, ...]:
 
 def seen(design: Design, key: str) -> Seen:
     """The smallest change of a key that a row sees."""
-    if key in NO_RUN or why_idle(design, key):
-        return Seen(key, "", None, NO_RUN.get(key) or why_idle(design, key))
+    if why := NO_RUN.get(key) or why_idle(design, key):
+        return Seen(key, "", None, why)
     refused = ""
     for words, model in changed(design, key):
         if isinstance(model, str):

@@ -16,8 +16,8 @@ import traceback
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, pi
-from typing import Any, TypeVar
+from math import inf, pi, prod
+from typing import TypeVar
 
 import numpy as np
 
@@ -29,6 +29,7 @@ from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import stability_margins
 from analyses.isolation import isolated
 from analyses.validation.settings import CHECKS, Settings
+from tests.changed import changed
 
 DAMPED = 80_000  # seeds from here on have damping of the load as well
 T = TypeVar("T")
@@ -47,52 +48,38 @@ class Dice:
     def chance(self, share: float) -> bool:
         return bool(self.rng.random() < share)
 
-    def one_of(self, values: tuple[T, ...]) -> T:
+    def one_of(self, *values: T) -> T:
         """One of some values."""
         return values[int(self.rng.integers(len(values)))]
 
 
-def _full_torque(motor: model.Motor, limits: model.Limits) -> float:
+def _full_torque(design: model.Design) -> float:
     """What the motor reaches at its limits, at standstill."""
-    short = limits.voltage_V / (motor.resistance_ohm or 1.0)
-    return (motor.torque_constant_Nm_A or 1.0) * min(limits.peak_current_A, short)
-
-
-def _with(design: model.Design, part: str, **values: Any) -> model.Design:
-    """A design with some numbers of one of its parts changed."""
-    return replace(design, **{part: replace(getattr(design, part), **values)})
+    motor, limits = design.motor, design.limits
+    return motor.torque_constant_Nm_A * min(limits.peak_current_A, limits.voltage_V / motor.resistance_ohm)
 
 
 def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     """A rigid cascade."""
     period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
-    delay = period * dice.one_of((0.0, 0.5, 1.0, 1.0, 2.0, 3.0))
-    axis = dice.one_of(("rotary", "rotary", "rotary", "linear"))
+    delay = period * dice.one_of(0.0, 0.5, 1.0, 1.0, 2.0, 3.0)
+    axis = dice.one_of("rotary", "rotary", "rotary", "linear")
     motor, inertia, gears, load = _plant(dice, period + delay, axis)
-    with_current, with_velocity = dice.chance(0.7), dice.chance(0.85)
-    control = _controller(dice, motor, inertia, period, delay, with_current, with_velocity)
-    limits = _limits(dice, motor, control)
-    ratio = float(np.prod([gear.ratio for gear in gears]))
-    speed = min(limits.speed_rad_s, limits.voltage_V / (motor.back_emf_constant_Vs_rad or 1.0))
-    slower = 1.0 if with_velocity else 3.0
+    control = _controller(dice, motor, inertia, period, delay, dice.chance(0.7), dice.chance(0.85))
+    limits, ratio = _limits(dice, motor, control), prod(gear.ratio for gear in gears)
+    speed = min(limits.speed_rad_s, limits.voltage_V / motor.back_emf_constant_Vs_rad)
+    slower = 1.0 if control.velocity else 3.0
     full = dice.decades(0.03, 3.0) * speed / (ratio * control.position_loop.gain * slower)
-    torque = _full_torque(motor, limits)
     design = model.Design(
-        name=f"random-{seed}",
-        title=f"Random drive {seed}",
-        motor=motor,
-        gears=gears,
-        load=load,
-        axis=axis,
-        controller=control,
-        limits=limits,
-        friction=_friction(dice, torque, speed),
-        encoder=_encoder(dice, control, axis),
+        name=f"random-{seed}", title=f"Random drive {seed}", motor=motor, gears=gears, load=load, axis=axis,
+        controller=control, limits=limits,
         validation=model.Validation(full_deflection_rad=full if full > 0.0 else 0.1),
-    )
+    )  # fmt: skip
+    torque = _full_torque(design)
+    design = replace(design, friction=_friction(dice, torque, speed), encoder=_encoder(dice, control, axis))
     if dice.chance(0.2):
         slope = -dice.decades(0.01, 1.0) * torque * ratio / design.validation.full_deflection_rad
-        return _with(design, "load", path="back-drivable", moment_slope_Nm_rad=slope)
+        return changed(design, load={"path": "back-drivable", "moment_slope_Nm_rad": slope})
     return design
 
 
@@ -100,55 +87,50 @@ def _plant(
     dice: Dice, delay: float, axis: str
 ) -> tuple[model.Motor, float, tuple[model.Gear, ...], model.Load]:
     """Motor, inertia at its shaft, gears and load."""
-    resistance, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
-    inductance = resistance * delay * dice.decades(2.0, 60.0)
-    inertia = dice.decades(1.0, 300.0) * (inductance / resistance) * k**2 / resistance
+    R, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
+    L = R * delay * dice.decades(2.0, 60.0)
+    inertia = dice.decades(1.0, 300.0) * (L / R) * k**2 / R
     if axis == "linear" and dice.chance(0.3):
         inertia = dice.decades(1.0, 150.0)
     share = dice.rng.uniform(0.05, 0.9)
     gears = tuple(
-        model.Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of((0, 0, 1, 2, 3)))
+        model.Gear(name=f"g{n}", ratio=dice.decades(2.0, 15.0)) for n in range(dice.one_of(0, 0, 1, 2, 3))
     )
-    ratio = float(np.prod([gear.ratio for gear in gears]))
     motor = model.Motor(
-        rotor_inertia_kgm2=inertia * (1.0 - share),
-        resistance_ohm=resistance,
-        inductance_H=inductance,
-        torque_constant_Nm_A=k,
-        back_emf_constant_Vs_rad=k,
-    )
-    return motor, inertia, gears, model.Load(inertia_kgm2=inertia * share * ratio**2)
+        rotor_inertia_kgm2=inertia * (1.0 - share), resistance_ohm=R, inductance_H=L,
+        torque_constant_Nm_A=k, back_emf_constant_Vs_rad=k,
+    )  # fmt: skip
+    load = model.Load(inertia_kgm2=inertia * share * prod(gear.ratio for gear in gears) ** 2)
+    return motor, inertia, gears, load
 
 
 def _controller(
     dice: Dice, motor: model.Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
 ) -> model.Controller:
     """A cascade whose crossovers are fractions of each other."""
-    R, L, k = (motor.resistance_ohm or 1.0), (motor.inductance_H or 1.0), (motor.torque_constant_Nm_A or 1.0)
+    R, L, k = motor.resistance_ohm, motor.inductance_H, motor.torque_constant_Nm_A
     inner = dice.rng.uniform(0.1, 0.5) / (period + delay)
-    currents = None
+    currents = velocities = None
     if current:
         integral = None if dice.chance(0.1) else (L / R) * dice.decades(0.5, 3.0)
         currents = model.CurrentLoop(gain_V_A=L * inner, integral_time_s=integral)
     else:
         inner = min(inner, R / L)
     per_unit = inertia / k * (1.0 if current else R)
-    n_v = dice.one_of((1, 1, 2, 5, 10))
+    n_v = dice.one_of(1, 1, 2, 5, 10)
     wv = min(inner / dice.decades(2.0, 20.0), dice.rng.uniform(0.1, 0.5) / (n_v * period))
-    velocities = None
     if velocity:
         integral = None if dice.chance(0.2) else dice.decades(2.0, 30.0) / wv
         velocities = model.VelocityLoop(gain=per_unit * wv, integral_time_s=integral, every=n_v)
-        n_p = n_v * dice.one_of((1, 1, 2, 5))
+        n_p = n_v * dice.one_of(1, 1, 2, 5)
         gain = min(wv / dice.decades(2.5, 20.0), 0.4 / (n_p * period))
-        position = model.PositionLoop(gain=gain, every=n_p, feedforward=dice.one_of((0.0, 0.0, 1.0, 0.5)))
+        position = model.PositionLoop(gain=gain, every=n_p, feedforward=dice.one_of(0.0, 0.0, 1.0, 0.5))
     elif current:
         wp = wv / dice.decades(3.0, 10.0)
         position = model.PositionLoop(gain=per_unit * wp**2 / 2.0, every=n_v, derivative_time_s=2.0 / wp)
     else:
         slow = min(k**2 / (R * inertia), R / L)
-        gain = k * slow / dice.decades(2.5, 20.0)
-        position = model.PositionLoop(gain=gain, every=n_v)
+        position = model.PositionLoop(gain=k * slow / dice.decades(2.5, 20.0), every=n_v)
     return model.Controller(
         period_s=period, computing_delay_s=delay, position=position, velocity=velocities, current=currents
     )
@@ -157,8 +139,7 @@ def _controller(
 def _limits(dice: Dice, motor: model.Motor, control: model.Controller) -> model.Limits:
     """Tight, loose, or hardly any."""
     volts = dice.decades(3.0, 600.0)
-    short = volts / (motor.resistance_ohm or 1.0)
-    fastest = volts / (motor.back_emf_constant_Vs_rad or 1.0)
+    short, fastest = volts / motor.resistance_ohm, volts / motor.back_emf_constant_Vs_rad
     speed = fastest * dice.rng.uniform(0.2, 1.0) if control.velocity and dice.chance(0.7) else inf
     acceleration = inf
     if control.velocity is not None and dice.chance(0.3):
@@ -175,17 +156,17 @@ def _friction(dice: Dice, torque: float, speed: float) -> model.Friction:
         return model.Friction()
     dry = 0.0 if dice.chance(0.2) else torque * dice.decades(1e-3, 0.2)
     return model.Friction(
-        law=dice.one_of(("coulomb", "coulomb", "coulomb", "tanh")),
+        law=dice.one_of("coulomb", "coulomb", "coulomb", "tanh"),
         dry_torque_Nm=dry,
         viscous_Nms_rad=0.0 if dice.chance(0.2) else torque / speed * dice.decades(1e-4, 0.3),
-        breakaway_ratio=dice.one_of((1.0, 1.0, 1.3)),
+        breakaway_ratio=dice.one_of(1.0, 1.0, 1.3),
         smoothing_speed_rad_s=1e-2 * speed,
     )
 
 
 def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
     """Ideal, or a real one."""
-    source = dice.one_of(("ideal", "ideal", "difference", "tracking"))
+    source = dice.one_of("ideal", "ideal", "difference", "tracking")
     counts = None
     if source != "ideal" and dice.chance(0.7):
         counts = int(dice.decades(1e3, 1e6)) * (100 if axis == "linear" else 1)
@@ -195,7 +176,7 @@ def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
         counts_per_rev=counts,
         speed=source,
         bandwidth_rad_s=band,
-        filter_time_s=inner * control.period_s * dice.one_of((0.0, 0.0, 0.5)),
+        filter_time_s=inner * control.period_s * dice.one_of(0.0, 0.0, 0.5),
     )
 
 
@@ -218,7 +199,7 @@ def _damped(dice: Dice, design: model.Design) -> model.Design:
     own = design.inertia_kgm2 * design.total_ratio**2  # refused above J/Ts
     damping = dice.decades(1e-5, 1e-2) * own / design.controller.period_s
     path = "back-drivable" if dice.chance(0.7) else design.load.path
-    return _with(design, "load", moment_damping_Nms_rad=damping, path=path)
+    return changed(design, load={"moment_damping_Nms_rad": damping, "path": path})
 
 
 def _elastic(dice: Dice, design: model.Design) -> model.Design:
@@ -231,66 +212,61 @@ def _elastic(dice: Dice, design: model.Design) -> model.Design:
     stiffness = omega**2 * design.inertia_kgm2 * 0.2 * design.total_ratio**2
     friction = None
     if dice.chance(0.3):
-        torque = _full_torque(design.motor, design.limits)
+        torque = _full_torque(design)
         friction = model.LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
-    coupling = model.Coupling(
-        stiffness_Nm_rad=stiffness,
-        damping_Nms_rad=dice.decades(0.01, 0.2) * stiffness / omega,
-        play_rad=design.validation.full_deflection_rad * dice.one_of((0.0, 0.0, 1e-3, 0.01)),
-    )
+    damping = dice.decades(0.01, 0.2) * stiffness / omega
+    play = design.validation.full_deflection_rad * dice.one_of(0.0, 0.0, 1e-3, 0.01)
     path, coefficient = design.load.path, design.friction.load_coefficient
     if path == "self-locking" and dice.chance(0.5):
         coefficient = 1.3 / design.total_ratio
     elif path == "self-locking":
         path = "back-drivable"
-    design = _with(design, "load", friction=friction, path=path)
-    return replace(_with(design, "friction", load_coefficient=coefficient), coupling=coupling)
+    coupling = model.Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping, play_rad=play)
+    load, own = {"friction": friction, "path": path}, {"load_coefficient": coefficient}
+    return changed(design, load=load, friction=own, coupling=coupling)
 
 
 def _frictions(dice: Dice, design: model.Design) -> model.Design:
     """Asymmetric, with an offset, or as a map."""
-    friction, kind = design.friction, dice.one_of(("", "", "", "asymmetric", "offset", "map", "load"))
+    friction, kind = design.friction, dice.one_of("", "", "", "asymmetric", "offset", "map", "load")
     dry = friction.dry_torque_Nm
+    change: dict[str, object] = {}
     if kind == "asymmetric":
         viscous = 0.6 * friction.viscous_Nms_rad
-        return _with(design, "friction", dry_torque_reverse_Nm=1.4 * dry, viscous_reverse_Nms_rad=viscous)
-    if kind == "offset":
-        return _with(design, "friction", offset_torque_Nm=0.3 * dry)
-    if kind == "map" and dry > 0.0 and friction.law == "coulomb":
-        free = design.limits.voltage_V / (design.motor.back_emf_constant_Vs_rad or 1.0)
+        change = {"dry_torque_reverse_Nm": 1.4 * dry, "viscous_reverse_Nms_rad": viscous}
+    elif kind == "offset":
+        change = {"offset_torque_Nm": 0.3 * dry}
+    elif kind == "map" and dry > 0.0 and friction.law == "coulomb":
+        free = design.limits.voltage_V / design.motor.back_emf_constant_Vs_rad
         fast = 0.3 * min(design.limits.speed_rad_s, free)
         points = tuple(
             model.FrictionPoint(speed_rad_s=speed * fast, torque_Nm=dry * torque)
             for speed, torque in ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
         )
-        return _with(design, "friction", dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
-    if kind == "load":
-        return _with(design, "friction", load_coefficient=2.0 / design.total_ratio)
-    return design
+        change = {"dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0, "points": points}
+    elif kind == "load":
+        change = {"load_coefficient": 2.0 / design.total_ratio}
+    return changed(design, friction=change)
 
 
 def _loads(dice: Dice, design: model.Design) -> model.Design:
     """Gravity on a rotary output."""
     if not dice.chance(0.15) or design.axis == "linear":
         return design
-    peak = dice.decades(0.01, 0.2) * _full_torque(design.motor, design.limits) * design.total_ratio
-    gravity = model.Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of((0.0, 0.5, pi)))
-    return _with(design, "load", gravity=gravity, path="back-drivable", moment_slope_Nm_rad=0.0)
+    peak = dice.decades(0.01, 0.2) * _full_torque(design) * design.total_ratio
+    gravity = model.Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of(0.0, 0.5, pi))
+    return changed(design, load={"gravity": gravity, "path": "back-drivable", "moment_slope_Nm_rad": 0.0})
 
 
 def _motor_data(dice: Dice, design: model.Design) -> model.Design:
     """The same motor from the data sheet of an AC servo motor, or a warm one."""
-    motor, kind = design.motor, dice.one_of(("", "", "ac", "warm"))
+    motor, kind = design.motor, dice.one_of("", "", "ac", "warm")
     if kind == "ac":
-        constants = dice.one_of(("rms-line", "peak-phase"))
-        ac = replace(motor, constants=constants)
-        same = replace(design, motor=ac).effective_motor
-        factors = {
-            name: getattr(motor, name) / getattr(same, name)
-            for name in ("resistance_ohm", "inductance_H", "torque_constant_Nm_A", "back_emf_constant_Vs_rad")
-        }
-        return _with(design, "motor", constants=constants,
-                     **{name: getattr(motor, name) * x for name, x in factors.items()})  # fmt: skip
+        constants = dice.one_of("rms-line", "peak-phase")
+        same = changed(design, motor={"constants": constants}).effective_motor
+        names = ("resistance_ohm", "inductance_H", "torque_constant_Nm_A", "back_emf_constant_Vs_rad")
+        sheet = {name: getattr(motor, name) * (getattr(motor, name) / getattr(same, name)) for name in names}
+        return changed(design, motor={"constants": constants, **sheet})
     if kind == "warm":
         return replace(design, temperature=model.Temperature(winding_degC=90.0, magnet_degC=70.0))
     return design
@@ -298,10 +274,10 @@ def _motor_data(dice: Dice, design: model.Design) -> model.Design:
 
 def _filtered(dice: Dice, design: model.Design) -> model.Design:
     """Filters of the torque command and of the speed."""
-    control, velocity = design.controller, design.controller.velocity
+    velocity = design.controller.velocity
     if velocity is None:
         return design
-    at = 2.0 * pi * 0.05 / (control.period_s * velocity.every)
+    at = 2.0 * pi * 0.05 / (design.controller.period_s * velocity.every)
     shelf = (
         model.Filter(kind="lowpass", on="torque", frequency_rad_s=2.0 * at, order=2),
         model.Filter(kind="lowpass", on="speed", frequency_rad_s=3.0 * at),
@@ -310,19 +286,18 @@ def _filtered(dice: Dice, design: model.Design) -> model.Design:
         model.Filter(kind="biquad", on="torque", b=(0.5, 0.3, 0.0), a=(-0.2, 0.0)),
     )
     chosen = tuple(item for item in shelf if dice.chance(0.12))
-    return replace(design, controller=replace(control, velocity=replace(velocity, filters=chosen)))
+    return changed(design, controller={"velocity": {"filters": chosen}})
 
 
 def _regulators(dice: Dice, design: model.Design) -> model.Design:
     """Other kinds of anti-windup, and feed-forward in the current loop."""
     control, kinds = design.controller, ("conditional", "conditional", "clamped", "back-calculation")
     if control.velocity is not None and control.velocity.integral_time_s is not None:
-        control = replace(control, velocity=replace(control.velocity, anti_windup=dice.one_of(kinds)))
+        control = changed(control, velocity={"anti_windup": dice.one_of(*kinds)})
     if control.current is not None:
-        current = replace(control.current, back_emf_feedforward=dice.one_of((0.0, 0.0, 0.8)))
-        if current.integral_time_s is not None:
-            current = replace(current, anti_windup=dice.one_of(kinds))
-        control = replace(control, current=current)
+        control = changed(control, current={"back_emf_feedforward": dice.one_of(0.0, 0.0, 0.8)})
+        if control.current.integral_time_s is not None:
+            control = changed(control, current={"anti_windup": dice.one_of(*kinds)})
     return replace(design, controller=control)
 
 
@@ -334,84 +309,83 @@ def _outer(dice: Dice, design: model.Design) -> model.Design:
     if control.velocity is not None and dice.chance(0.15):
         place = replace(place, derivative_time_s=0.1 / place.gain, derivative_filter_s=0.02 / place.gain)
     if control.velocity is not None and dice.chance(0.2):
-        place = replace(place, acceleration_feedforward=dice.one_of((0.5, 1.0)))
+        place = replace(place, acceleration_feedforward=dice.one_of(0.5, 1.0))
     if dice.chance(0.15):
-        torque = design.friction.dry_torque_Nm
-        share = torque / (design.motor.torque_constant_Nm_A or 1.0)
-        share *= 1.0 if control.current else (design.motor.resistance_ohm or 1.0)
+        share = design.friction.dry_torque_Nm / design.motor.torque_constant_Nm_A
+        share *= 1.0 if control.current else design.motor.resistance_ohm
         place = replace(place, friction_feedforward=share)
-    return replace(design, controller=replace(control, position=place))
+    return changed(design, controller={"position": place})
 
 
 def _sensors(dice: Dice, design: model.Design) -> model.Design:
     """Position, speed or both from the output's encoder, with counts or without."""
-    control, kind = design.controller, dice.one_of(("", "", "", "", "position", "both"))
+    kind = dice.one_of("", "", "", "", "position", "both")
     if not kind:
         return design
-    counts = dice.one_of((None, int(dice.decades(1e4, 1e6)) * (100 if design.axis == "linear" else 1)))
-    control = replace(control, position=replace(control.position_loop, sensor="output"))
-    if kind == "both" and control.velocity is not None:
-        control = replace(control, velocity=replace(control.velocity, sensor="output"))
-    return replace(design, controller=control, output_encoder=model.OutputEncoder(counts_per_rev=counts))
+    counts = dice.one_of(None, int(dice.decades(1e4, 1e6)) * (100 if design.axis == "linear" else 1))
+    design = changed(design, controller={"position": {"sensor": "output"}})
+    if kind == "both" and design.controller.velocity is not None:
+        design = changed(design, controller={"velocity": {"sensor": "output"}})
+    return replace(design, output_encoder=model.OutputEncoder(counts_per_rev=counts))
 
 
 def _commanded(dice: Dice, design: model.Design) -> model.Design:
     """A filter, a profile."""
-    kind = dice.one_of(("", "", "", "filter", "profile"))
+    kind = dice.one_of("", "", "", "filter", "profile")
     gain, full = design.controller.position_loop.gain, design.validation.full_deflection_rad
     if kind == "filter":
-        return _with(design, "command", filter_time_s=0.2 / gain, filter_order=dice.one_of((1, 2)))
+        order = dice.one_of(1, 2)
+        return changed(design, command={"filter_time_s": 0.2 / gain, "filter_order": order})
     if kind == "profile" and design.controller.velocity is not None:
         rate = 0.2 * full * gain
-        jerk = dice.one_of((inf, rate * gain**2))
-        return _with(design, "command", rate_rad_s=rate, acceleration_rad_s2=rate * gain, jerk_rad_s3=jerk)
+        jerk = dice.one_of(inf, rate * gain**2)
+        profile = {"rate_rad_s": rate, "acceleration_rad_s2": rate * gain, "jerk_rad_s3": jerk}
+        return changed(design, command=profile)
     return design
 
 
 def _supplied(dice: Dice, design: model.Design) -> model.Design:
     """A supply with resistance, one that takes nothing back."""
-    R, volts = design.motor.resistance_ohm or 1.0, design.limits.voltage_V
-    kind = dice.one_of(("", "", "", "resistance", "capacitor"))
+    R, kind = design.motor.resistance_ohm, dice.one_of("", "", "", "resistance", "capacitor")
     if kind == "resistance":
         return replace(design, supply=model.Supply(resistance_ohm=0.1 * R))
     if kind == "capacitor":
-        farad = 200.0 * design.controller.period_s / R
-        taken = {"regenerative": False, "capacitance_F": farad, "brake_voltage_V": 1.2 * volts}
+        farad, brake = 200.0 * design.controller.period_s / R, 1.2 * design.limits.voltage_V
+        taken = {"regenerative": False, "capacitance_F": farad, "brake_voltage_V": brake}
         return replace(design, supply=model.Supply(resistance_ohm=0.05 * R, **taken))
     return design
 
 
 def _protected(dice: Dice, design: model.Design) -> model.Design:
     """Overload protection."""
-    limits = design.limits
-    if limits.peak_current_A == inf or not dice.chance(0.3):
+    peak = design.limits.peak_current_A
+    if peak == inf or not dice.chance(0.3):
         return design
-    lasting, kind = 0.4 * limits.peak_current_A, dice.one_of(("thermal", "excess"))
-    return _with(design, "limits", continuous_current_A=lasting, peak_time_s=1.0, overload=kind)
+    kind = dice.one_of("thermal", "excess")
+    return changed(design, limits={"continuous_current_A": 0.4 * peak, "peak_time_s": 1.0, "overload": kind})
 
 
 def _instrumented(dice: Dice, design: model.Design) -> model.Design:
     """Noise, resolution, jitter."""
     if not dice.chance(0.15):
         return design
-    quantum = 1e-4 * design.validation.full_deflection_rad
-    return _with(
-        design, "instruments", seed=1, angle_noise_rad=quantum * design.total_ratio,
-        current_resolution_A=1e-3 * design.limits.voltage_V / (design.motor.resistance_ohm or 1.0),
-        jitter_s=0.01 * design.controller.period_s,
-    )  # fmt: skip
+    noise = 1e-4 * design.validation.full_deflection_rad * design.total_ratio
+    finest = 1e-3 * design.limits.voltage_V / design.motor.resistance_ohm
+    jitter = 0.01 * design.controller.period_s
+    own = {"seed": 1, "angle_noise_rad": noise, "current_resolution_A": finest, "jitter_s": jitter}
+    return changed(design, instruments=own)
 
 
 def _outermost(dice: Dice, design: model.Design) -> model.Design:
     """Now and then the drive ends at its speed, its current or its voltage."""
-    control, kind = design.controller, dice.one_of(("", "", "", "", "", "", "speed", "torque"))
-    plain = replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+    control, kind = design.controller, dice.one_of("", "", "", "", "", "", "speed", "torque")
+    plain = {"rate_rad_s": inf, "acceleration_rad_s2": inf, "jerk_rad_s3": inf}
     if kind == "speed" and control.velocity is not None:
-        return replace(design, controller=replace(control, position=None), command=plain)
+        return changed(design, controller={"position": None}, command=plain)
     if kind == "torque" and control.current is not None:
-        control = replace(control, position=None, velocity=None)
-        encoder = replace(design.encoder, speed="ideal", counts_per_rev=None, bandwidth_rad_s=None)
-        return replace(design, controller=control, command=plain, encoder=encoder)
+        encoder = {"speed": "ideal", "counts_per_rev": None, "bandwidth_rad_s": None}
+        bare = {"position": None, "velocity": None}
+        return changed(design, controller=bare, command=plain, encoder=encoder)
     return design
 
 

@@ -27,20 +27,14 @@ T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 def drive(law: str, feedforward: float = 3.0) -> model.Design:
     """The drive of the docstring."""
     velocity = model.VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
+    place = model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward)
     return model.Design(
         name="clamped",
         title="Clamped integral",
         motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
         load=model.Load(path="back-drivable"),
-        controller=model.Controller(
-            period_s=T,
-            computing_delay_s=0.0,
-            position=model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward),
-            velocity=velocity,
-            current=None,
-        ),
+        controller=model.Controller(period_s=T, computing_delay_s=0.0, position=place, velocity=velocity),
         limits=model.Limits(voltage_V=LIMIT),
-        friction=model.Friction(),
         validation=model.Validation(full_deflection_rad=1.0),
     )
 

@@ -1,6 +1,5 @@
 """A design of healthy margins that diverges behind a limit is found, as plain integration confirms."""
 
-from dataclasses import replace
 from math import degrees, inf, pi, sqrt
 from pathlib import Path
 
@@ -10,7 +9,6 @@ from plain_drive import output_of_step
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.design import model
-from actuator_lti.design.model import Design
 from analyses.large_signal.conditional import (
     Conditional,
     conditional_stability,
@@ -24,41 +22,40 @@ from analyses.motion.settling import settle
 from analyses.validation import QUICK, validate
 from nonlinear import commands, simulate
 from reports.sections.beyond import large_commands as section
+from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
-FILE = Path(__file__).with_name("conditional.toml")
+DESIGN = load_design(Path(__file__).with_name("conditional.toml"))
 
 
-def looked(design: Design) -> tuple[Conditional, int]:
-    """What is found, and the ticks in which the linear drive settles."""
+def looked(design: model.Design) -> tuple[Conditional, int]:
     loops, every = assemble_loops(design), design.controller.position_loop.every
-    settle = settling_ticks_of(loops.present["position"].closed_loop, every, design.name)
+    settle = settling_ticks_of(loops.present["position"].closed_loop, every, design.name, 400_000)
     return conditional_stability(design, loops, settle), settle
 
 
 @pytest.fixture(scope="module")
 def conditional() -> Conditional:
-    return looked(load_design(str(FILE)))[0]
+    return looked(DESIGN)[0]
 
 
-def test_the_margins_are_healthy() -> None:
-    for loop in assemble_loops(load_design(str(FILE))).present.values():
+def test_the_margins_are_healthy_and_it_is_found(conditional: Conditional) -> None:
+    for loop in assemble_loops(DESIGN).present.values():
         margins = stability_margins(loop.open_loop)
         assert margins.stable
         assert margins.gain_margin_db > 6.0
         assert margins.phase_margin_deg > 45.0
-
-
-def test_it_is_found_where_steps_stop_settling(conditional: Conditional) -> None:
-    """By the simulator itself, outside the validator: below the threshold it settles, above it runs away."""
     assert conditional.diverges
     assert conditional.hidden
     assert conditional.limiter == "voltage"
     assert conditional.threshold_rad < conditional.full_deflection_rad
-    design = load_design(str(FILE))
+
+
+def test_the_threshold_is_where_steps_stop_settling(conditional: Conditional) -> None:
+    """By the simulator itself, outside the validator: below it settles, above it runs away."""
     for factor, settles in ((0.99, True), (1.01, False)):
         size = factor * conditional.threshold_rad
-        run = simulate(design, commands.step(size), 20.0)
+        run = simulate(DESIGN, commands.step(size), 20.0)
         left = np.abs(run.output_angle_rad[-2000:] - size).max() / size
         assert bool(left < 0.05) is settles
         assert bool(left > 1.0) is not settles
@@ -86,20 +83,16 @@ def test_the_describing_function_predicts_the_limit_cycle(conditional: Condition
 
 def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
     """More voltage: the border moves away. The current limited where the velocity controller knows: none."""
-    design = load_design(str(FILE))
-    more = replace(design, limits=replace(design.limits, voltage_V=48.0))
-    assert not looked(more)[0].diverges
-    known = replace(design, limits=replace(design.limits, peak_current_A=12.0, voltage_V=200.0))
-    kept, _ = looked(known)
+    assert not looked(changed(DESIGN, limits={"voltage_V": 48.0}))[0].diverges
+    kept, _ = looked(changed(DESIGN, limits={"peak_current_A": 12.0, "voltage_V": 200.0}))
     assert not kept.diverges
     assert all(one.antiwindup for one in kept.predictions)
 
 
 def test_the_threshold_grows_with_the_limit(conditional: Conditional) -> None:
     """A scaling truth: frictionless, all amplitudes go with the limit."""
-    design = load_design(str(FILE))
-    smooth = replace(design, friction=replace(design.friction, dry_torque_Nm=0.0))
-    half = replace(smooth, limits=replace(smooth.limits, voltage_V=6.0))
+    smooth = changed(DESIGN, friction={"dry_torque_Nm": 0.0})
+    half = changed(smooth, limits={"voltage_V": 6.0})
     whole = step_threshold(smooth, 1822)[0]
     assert step_threshold(half, 1822)[0] == pytest.approx(0.5 * whole, rel=3e-3)
 
@@ -112,7 +105,7 @@ def test_shipped_designs_settle_from_every_step(name: str) -> None:
 
 
 def test_the_validator_says_so() -> None:
-    result = validate(load_design(str(FILE)), QUICK)
+    result = validate(DESIGN, QUICK)
     assert not result.not_met  # every small-signal prediction holds
     assert not result.passed  # and yet
     assert "makes the drive diverge" in str(result)
@@ -134,8 +127,7 @@ def test_saturation_gain() -> None:
 
 
 def test_without_limits_there_is_nothing_to_find() -> None:
-    design = load_design(str(FILE))
-    free = replace(design, limits=replace(design.limits, voltage_V=1e9, peak_current_A=inf))
+    free = changed(DESIGN, limits={"voltage_V": 1e9, "peak_current_A": inf})
     assert step_threshold(free, 1822) == (None, None)
 
 
@@ -151,15 +143,14 @@ def test_a_finding_on_a_random_drive_is_that_of_plain_integration(
     seed: int, ending: str, limiter: str
 ) -> None:
     """2 % below the threshold the error dies out, 2 % above it grows beyond the step itself."""
-    design = full_drive(seed)
-    design = replace(design, encoder=replace(design.encoder, counts_per_rev=None), supply=None)
+    design = changed(full_drive(seed), encoder={"counts_per_rev": None}, supply=None)
     found, settle = looked(design)
     assert (found.ending, found.limiter) == (ending, limiter)
     assert found.limiter_share > 0.9
     for factor, settles in ((0.98, True), (1.02, False)):
         size = factor * found.threshold_rad
         ticks = int(step_rows(design, np.array([size]), settle).value("ticks"))
-        error = np.abs(output_of_step(design, size, ticks, parts=1) / size - 1.0)
+        error = np.abs(output_of_step(design, size, ticks) / size - 1.0)
         left = error[-ticks // 8 :].max()
         assert left < 1e-3 if settles else left > 2.0
 
@@ -172,7 +163,6 @@ def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) ->
         motor=model.Motor(rotor_inertia_kgm2=1e-3, source_gain_Nm_V=0.5),
         gears=(model.Gear(name="g", ratio=10.0),),
         load=model.Load(inertia_kgm2=0.1, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad),
-        axis="rotary",
         controller=model.Controller(
             period_s=2e-4,
             computing_delay_s=0.0,
@@ -205,9 +195,9 @@ def test_largest_deflection_that_an_unstable_load_lets_come_back(slope: float) -
 def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
     """A spring: P controllers end at r K/(K + c), no divergence; the limit holds beyond tau_max/c."""
     damped = model.Friction(viscous_Nms_rad=0.02)
-    settled, _ = looked(replace(unstable(-40.0, full_rad=1.2), friction=damped))
+    settled, _ = looked(changed(unstable(-40.0, full_rad=1.2), friction=damped))
     assert not settled.diverges
-    found, _ = looked(replace(unstable(-40.0), friction=damped))
+    found, _ = looked(changed(unstable(-40.0), friction=damped))
     stiffness = 0.5 * 1.6 * 30.0 * 10.0**2
     assert found.ending == "is held by a limit"
     assert found.limiter == "voltage"

@@ -8,7 +8,6 @@ import pytest
 
 from actuator_lti.batch import Population
 from actuator_lti.design import load_design, with_overrides
-from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Requirement
 from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
@@ -16,15 +15,16 @@ from analyses.corners.run import worst_ends
 from analyses.specification.sensitivity import population_figures
 from reports.sections.corners import chart, section
 
+FIN, EMPS = load_design("fin"), load_design("emps")
+
 
 def test_a_hot_motor_has_more_resistance_and_less_torque() -> None:
     """R (1 + 0.00393 * 95), k (1 - 0.0011 * 95) at 120 degC, of copper and NdFeB from 25 degC."""
-    design = load_design("fin")
-    hot = next(one for one in corners(design, Asked.of(design, hot_degC=120.0)).corners if one.name == "hot")
-    motor = hot.design.effective_motor
+    hot = next(one for one in corners(FIN, Asked.of(FIN, hot_degC=120.0)).corners if one.name == "hot")
+    motor, k = hot.design.effective_motor, 0.03 * (1 - 0.0011 * 95)
     assert motor.resistance_ohm == pytest.approx(1.0 * (1 + 0.00393 * 95), rel=1e-12)
-    assert motor.torque_constant_Nm_A == pytest.approx(0.03 * (1 - 0.0011 * 95), rel=1e-12)
-    assert motor.back_emf_constant_Vs_rad == pytest.approx(0.03 * (1 - 0.0011 * 95), rel=1e-12)
+    found = [motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad]
+    assert found == pytest.approx([k, k], rel=1e-12)
 
 
 def test_a_low_supply_lowers_the_rate_and_no_margin() -> None:
@@ -44,9 +44,10 @@ def test_a_low_supply_lowers_the_rate_and_no_margin() -> None:
 def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -> None:
     """Four toleranced numbers of the fin: all sixteen corners looked at (the figures are monotone there)."""
     kept = ("motor.rotor_inertia", "motor.resistance", "load.inertia", "friction.viscous")
-    design = load_design("fin")
-    bare = {path: replace(one, tolerance=None) for path, one in design.parameters.items() if path not in kept}
-    design = replace(design, parameters=FrozenMap({**design.parameters, **bare}))
+    parameters = {
+        path: one if path in kept else replace(one, tolerance=None) for path, one in FIN.parameters.items()
+    }
+    design = replace(FIN, parameters=type(FIN.parameters)(parameters))
     chosen = worst_ends(design, quantity)
     nominal = {path: design.parameters[path].value for path in kept}
     width = {path: design.parameters[path].tolerance.half_width for path in kept}
@@ -60,17 +61,16 @@ def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -
 
 def test_torque_and_back_emf_constant_go_together() -> None:
     chosen = worst_ends(load_design("joint"), "gain_margin")
-    assert chosen["motor.torque_constant"] == pytest.approx(0.126, rel=1e-12)
-    assert chosen["motor.back_emf_constant"] == pytest.approx(0.126, rel=1e-12)
+    pair = [chosen["motor.torque_constant"], chosen["motor.back_emf_constant"]]
+    assert pair == pytest.approx([0.126, 0.126], rel=1e-12)
 
 
 def test_command_and_section(cli) -> None:
     told = {one["name"]: one for one in cli.data("corners", "fin", status=1)["corners"]}
     assert told["nominal"]["passed"]
     assert not told["cold"]["passed"]
-    made = section(corners(load_design("emps")))
-    assert made["result"].startswith("Every loop is stable")
-    fin = corners(load_design("fin"))
+    assert section(corners(EMPS))["result"].startswith("Every loop is stable")
+    fin = corners(FIN)
     words = section(fin)["result"]
     fails = "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
     assert words.startswith(fails)
@@ -85,10 +85,10 @@ def test_command_and_section(cli) -> None:
 
 
 def test_a_source_has_no_temperature() -> None:
-    names = [one.name for one in corners(load_design("emps")).corners]
+    names = [one.name for one in corners(EMPS).corners]
     assert names == ["nominal", "low supply", "worst gain margin", "worst phase margin"]
     with pytest.raises(InputError, match="must be positive"):
-        Asked.of(load_design("emps"), supply_V=-1.0)
+        Asked.of(EMPS, supply_V=-1.0)
 
 
 def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:

@@ -15,10 +15,13 @@ from actuator_lti.loops import assemble_loops
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _followed_most_hz, cases_of
 from nonlinear import commands, simulate
-from reports.cli.main import main
 from reports.drawing import draw_svg
 from reports.sections.failures import section, summary
+from tests.changed import changed
 from tests.loops.two_mass import drive_d
+
+AMBER = load_design("ilr33-amber")
+SLOW = "its output does not get half-way to the stop in 5 s"
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "fin", "joint", "ballscrew", "emps"])
@@ -36,8 +39,8 @@ def test_two_halves_without_a_failure_are_the_drive(name: str) -> None:
 
 def test_hard_over_is_the_motor_on_the_bus() -> None:
     """Rigid, dry friction constant while it moves: di, dw, dth linear in (i, w, th, 1), after the delay d."""
-    design = load_design("ilr33-amber")
-    m, U, d = design.motor, design.limits.voltage_V, design.controller.computing_delay_s
+    design, U = AMBER, AMBER.limits.voltage_V
+    m, d = design.motor, design.controller.computing_delay_s
     J, N = design.inertia_kgm2, design.total_ratio
     A = np.zeros((4, 4))
     A[0] = np.array([-m.resistance_ohm, -m.back_emf_constant_Vs_rad, 0.0, U]) / m.inductance_H
@@ -56,8 +59,8 @@ def test_hard_over_is_the_motor_on_the_bus() -> None:
 
 def test_an_open_phase_leaves_the_output_to_its_load() -> None:
     """Without current and viscous friction: a (t - 0)^2/2 with J dw/dt = M/N - Tc, the winding gone."""
-    changes = {"friction.viscous": "0 N*m*s/rad", "friction.load_coefficient": "0 mN*m/(N*m)"}
-    design = with_overrides(load_design("ilr33-amber"), {"load.path": "back-drivable", **changes})
+    none = {"friction.viscous": "0 N*m*s/rad", "friction.load_coefficient": "0 mN*m/(N*m)"}
+    design = with_overrides(AMBER, {"load.path": "back-drivable", **none})
     M, N = 20.0, design.total_ratio
     rate = (M / N - design.friction.dry_torque_Nm) / design.inertia_kgm2 / N
     result = failures(design, Asked.of(design, load_Nm=M)).case("open-phase")
@@ -67,9 +70,8 @@ def test_an_open_phase_leaves_the_output_to_its_load() -> None:
 
 def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     """The moment is N kM i; I2t from rest: tau ln(r^2/(r^2 - 1)) at the peak is the stated peak time."""
-    design = with_overrides(
-        load_design("joint"), {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
-    )
+    slow = {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
+    design = with_overrides(load_design("joint"), slow)
     result = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
     assert abs(result.deflection_rad).max() < 1e-6
     k = np.searchsorted(result.time_s, 0.15)
@@ -80,8 +82,7 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
 
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     """The motor's inertia runs into the coupling: W sqrt(k J_m) N_c, the motor's own push beside it."""
-    design = load_design("ballscrew")
-    design = replace(design, coupling=replace(design.coupling, damping_Nms_rad=0.0))
+    design = changed(load_design("ballscrew"), coupling={"damping_Nms_rad": 0.0})
     case = failures(design).case("jam")
     k, J, N = design.coupling.stiffness_Nm_rad, design.motor_side_inertia_kgm2, design.ratio_to_coupling
     half = 0.5 * design.validation.full_deflection_rad
@@ -107,9 +108,8 @@ def test_a_frozen_sensor_runs_away_at_the_speed_of_its_error() -> None:
 
 def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
     """No dry friction, no play, inside every limit: the amplitude is |T| times the command's."""
-    position = PositionLoop(gain=150.0, every=2)
-    control = replace(drive_d().controller, position=position, computing_delay_s=1e-4)
-    design = replace(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"), controller=control)
+    control = {"position": PositionLoop(gain=150.0, every=2), "computing_delay_s": 1e-4}
+    design = changed(drive_d(), load=Load(inertia_kgm2=2e-3, path="back-drivable"), controller=control)
     asked = Asked.of(design, stop_rad=0.1, deflection_rad=0.001, watched_s=3.0)
     case = failures(design, asked).case("oscillatory-command")
     response = assemble_loops(design).reference_to_output
@@ -121,8 +121,8 @@ def test_an_oscillating_command_is_followed_as_the_linear_drive_does() -> None:
 
 
 def test_section_figure_and_command(cli) -> None:
-    result = failures(load_design("emps"), Asked.of(load_design("emps"), watched_s=0.5))
-    made = section(result)
+    emps = load_design("emps")
+    made = section(failures(emps, Asked.of(emps, watched_s=0.5)))
     (figure,) = [block for block in made["blocks"] if block["kind"] == "figure"]
     assert "Lost sensor" in draw_svg(figure, page=False)
     assert "until it is detected" in made["result"]
@@ -133,18 +133,17 @@ def test_section_figure_and_command(cli) -> None:
 
 
 def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
-    design = load_design("ilr33-amber")
-    speed = replace(design, controller=replace(design.controller, position=None))
+    speed = changed(AMBER, controller={"position": None})
     result = failures(speed, Asked.of(speed, watched_s=0.1))
     assert [case.name for case in result.cases] == ["hard-over", "open-phase"]
     assert result.left_out["jam"] == "the drive has no position loop"
     with pytest.raises(InputError, match="beyond the stop"):
-        Asked.of(design, stop_rad=0.1, deflection_rad=0.2)
+        Asked.of(AMBER, stop_rad=0.1, deflection_rad=0.2)
 
 
 def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
     """A follower that falls from zero frequency on would be asked to creep at 0.1 Hz, which moves nothing."""
-    slow = with_overrides(load_design("ilr33-amber"), {"control.position.gain": "40 1/s"})
+    slow = changed(AMBER, controller={"position": {"gain": 40.0}})
     frequency, words = _followed_most_hz(slow)
     response = assemble_loops(slow).reference_to_output
     size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))
@@ -153,15 +152,16 @@ def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
 
 
 def test_an_open_phase_of_three_says_what_one_winding_leaves_out() -> None:
-    result = failures(load_design("ballscrew"), Asked.of(load_design("ballscrew"), watched_s=0.1))
-    assert "two phases left" in result.case("open-phase").words
-    assert "two phases" not in cases_of(load_design("fin"), Asked.of(load_design("fin")))[0][1].words
+    three, one = load_design("ballscrew"), load_design("fin")
+    assert "two phases left" in failures(three, Asked.of(three, watched_s=0.1)).case("open-phase").words
+    assert "two phases" not in cases_of(one, Asked.of(one))[0][1].words
 
 
 @pytest.mark.parametrize("command", ["stiffness", "failures"])
-def test_an_unstable_drive_is_a_verdict_and_no_bad_input(command: str, capsys) -> None:
-    assert main([command, "fin", "--set", "control.velocity.gain=5 V*s/rad"]) == 1
-    assert "not stable" in capsys.readouterr().err
+def test_an_unstable_drive_is_a_verdict_and_no_bad_input(command: str, cli) -> None:
+    ran = cli(command, "fin", "--set", "control.velocity.gain=5 V*s/rad")
+    assert ran.status == 1
+    assert "not stable" in ran.err
 
 
 def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
@@ -170,13 +170,12 @@ def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
         design = with_overrides(load_design("emps"), {"control.position.gain": f"{gain} 1/s"})
         result = failures(design)
         assert ("jam" in {case.name for case in result.cases}) is there
-        slow = {"jam": "its output does not get half-way to the stop in 5 s"}
-        assert result.left_out == ({} if there else slow)
+        assert result.left_out == ({} if there else {"jam": SLOW})
 
 
 def test_the_headline_names_what_reaches_the_stop_first() -> None:
     """Three at the stop before detection, one of them a little into it: the quickest is the worst."""
-    found = failures(load_design("ilr33-amber"))
+    found = failures(AMBER)
     stop, detection = found.asked.stop_rad, found.asked.detection_s
 
     def case(name: str, reached: float | None, by: float):

@@ -1,7 +1,6 @@
 """Large signals: the sawtooth and its formulas, bandwidth against amplitude, margins by amplitude."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +8,6 @@ import pytest
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.bandwidth import closed_loop_bandwidth
 from actuator_lti.design import with_values
-from actuator_lti.design.model import FrictionPoint
 from actuator_lti.drive.operating import rubs
 from analyses.large_signal import large_signals
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
@@ -26,8 +24,12 @@ from analyses.large_signal.sawtooth import sawtooth
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from reports.sections.large_signal import _result
+from reports.sections.names import output_unit
+from tests.changed import changed
+from tests.nonlinear.elastic_drive import stribeck
 from tests.validation.random_drives import full_drive
 
+AMBER = load_design("ilr33-amber")
 TRIANGLE_CREST, TRIANGLE_DISTORTION = math.sqrt(3.0), 0.1212  # model.md section 5
 
 
@@ -57,7 +59,7 @@ def test_the_regimes_join() -> None:
 @pytest.mark.parametrize("x", [2.2, 3.0, 6.0])
 def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
     """A tenth of the speed limit, so that a tenth of the frequency gives the same x: gain 1 %, lag 1 deg."""
-    design = with_values(load_design("ilr33-amber"), {"limits.speed": 94.25})
+    design = with_values(AMBER, {"limits.speed": 94.25})
     rate = 94.25 / design.total_ratio
     hz = x * rate / (2.0 * math.pi * design.validation.full_deflection_rad)
     result = sawtooth(design, frequency_hz=hz)
@@ -75,7 +77,7 @@ def test_the_formulas_hold_where_loops_and_torque_are_fast(x: float) -> None:
 
 def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
     """At 10 deg the gain is met, the lag comes 8 deg later: 27 ms of reversal, said and not judged."""
-    result = sawtooth(load_design("ilr33-amber"))
+    result = sawtooth(AMBER)
     assert not result.applicable
     assert result.passed is None
     assert result.reversal_deg > 10.0
@@ -101,35 +103,34 @@ def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, wor
     assert word in result.reason
 
 
-@pytest.mark.parametrize("name", ["ilr33-amber", "emps"])
-def test_small_amplitudes_without_friction_have_the_linear_bandwidth(name: str) -> None:
-    """Between the map's frequencies as the linear response goes: to 5e-6."""
-    design = load_design(name)
-    loops = assemble_loops(design)
-    small = replace(design.validation, full_deflection_rad=design.validation.full_deflection_rad / 1e5)
-    tiny = replace(design, validation=small)
-    result = amplitude_bode(tiny, loops, amplitude_map(tiny, loops, friction_on=False, counts=(6, 40)))
-    exact = closed_loop_bandwidth(loops.reference_to_output)
-    np.testing.assert_allclose(result.minus3db_hz, exact.minus3db_hz, rtol=5e-6)
-    np.testing.assert_allclose(result.minus90deg_hz, exact.minus90deg_hz, rtol=5e-6)
-    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=5e-6)
-
-
-@pytest.mark.parametrize("name", ["fin", "ballscrew"])
-def test_the_linear_bandwidth_is_that_of_the_margins_however_coarse_the_map(name: str) -> None:
-    """A moment over the angle (the gain at zero frequency is no 1), a limited jerk."""
-    design = load_design(name)
-    loops = assemble_loops(design)
-    result = amplitude_bode(design, loops, amplitude_map(design, loops, counts=(2, 14)))
-    exact = all_loop_figures(loops)["position"].bandwidth
-    assert exact is not None
-    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=1e-4)
-    assert result.linear_minus90deg_hz == pytest.approx(exact.minus90deg_hz, rel=1e-4)
+@pytest.mark.parametrize(
+    ("name", "share", "friction_on", "counts", "within"),
+    [
+        # small amplitudes without friction: between the map's frequencies as the linear response goes
+        ("ilr33-amber", 1e-5, False, (6, 40), 5e-6),
+        ("emps", 1e-5, False, (6, 40), 5e-6),
+        # a moment over the angle (the gain at zero frequency is no 1), a limited jerk, a coarse map
+        ("fin", 1.0, True, (2, 14), 1e-4),
+        ("ballscrew", 1.0, True, (2, 14), 1e-4),
+    ],
+)
+def test_the_linear_bandwidth_is_that_of_the_margins(
+    name: str, share: float, friction_on: bool, counts: tuple[int, int], within: float
+) -> None:
+    design, loops = load_design(name), assemble_loops(name)
+    small = changed(design, validation={"full_deflection_rad": share * design.validation.full_deflection_rad})
+    shown = amplitude_map(small, loops, friction_on=friction_on, counts=counts)
+    result, exact = amplitude_bode(small, loops, shown), all_loop_figures(loops)["position"].bandwidth
+    assert result.linear_minus3db_hz == pytest.approx(exact.minus3db_hz, rel=within)
+    assert result.linear_minus90deg_hz == pytest.approx(exact.minus90deg_hz, rel=within)
+    if not friction_on:
+        assert exact == closed_loop_bandwidth(loops.reference_to_output)
+        np.testing.assert_allclose(result.minus3db_hz, exact.minus3db_hz, rtol=within)
+        np.testing.assert_allclose(result.minus90deg_hz, exact.minus90deg_hz, rtol=within)
 
 
 def test_limits_take_bandwidth_away_as_the_amplitude_grows() -> None:
-    design = load_design("ilr33-amber")
-    loops = assemble_loops(design)
+    design, loops = AMBER, assemble_loops(AMBER)
     result = amplitude_bode(design, loops, amplitude_map(design, loops, counts=(16, 30)))
     full = design.validation.full_deflection_rad
     np.testing.assert_allclose(result.amplitude_rad, np.array(result.fractions) * full)
@@ -173,7 +174,7 @@ def _words(gain_db: list[float]) -> str:
         0.0, HZ, (1.0,), size, gain, nothing, gain[0], nothing[0], size, found, nothing[:, 0], low_high,
         below, 5.0, None,
     )  # fmt: skip
-    return _result(result, 180.0 / np.pi, "deg")
+    return _result(result, output_unit("rotary"))
 
 
 @pytest.mark.parametrize(
@@ -204,16 +205,10 @@ def test_a_way_back_of_hours_is_not_simulated() -> None:
 
 def test_a_flat_friction_map_is_dry_friction() -> None:
     """The same torque at every speed: a limit acts from the same amplitudes on."""
-    drive = load_design("ilr33-amber")
-    dry = drive.friction.dry_torque_Nm
-    points = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=dry) for speed in (0.0, 2000.0))
-    plain = replace(drive.friction, viscous_Nms_rad=0.0)
-    flat = replace(plain, dry_torque_Nm=0.0, points=points)
-    found = []
-    for friction in (plain, flat):
-        one = replace(drive, friction=friction)
-        assert rubs(one)
-        found.append(large_signals(one, counts=(2, 2)).shift.simulated_rad)
+    dry, none = AMBER.friction.dry_torque_Nm, {"dry_torque_Nm": 0.0}
+    plain = changed(AMBER, friction={"viscous_Nms_rad": 0.0})
+    flat = changed(plain, friction={**none, "points": stribeck((0.0, dry), (2000.0, dry))})
+    found = [large_signals(one, counts=(2, 2)).shift.simulated_rad for one in (plain, flat)]
     assert np.isfinite(found[0]).any()
     np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
-    assert not rubs(replace(drive, friction=replace(plain, dry_torque_Nm=0.0)))
+    assert [rubs(one) for one in (plain, flat, changed(plain, friction=none))] == [True, True, False]

@@ -1,6 +1,5 @@
 """Limit cycles of play and counts: describing functions by quadrature, cycles by poles and by simulation."""
 
-from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from math import asin, pi
@@ -22,17 +21,19 @@ from analyses.limit_cycles.run import confirm
 from nonlinear import commands, simulate
 from reports.sections.beyond import counts as counts_section
 from reports.sections.cycles import section
+from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
-AMBER = load_design("ilr33-amber")
+AMBER, FIN = load_design("ilr33-amber"), load_design("fin")
 
 
 def counting(per_rev: int, **encoder: object) -> Design:
-    return replace(AMBER, encoder=replace(AMBER.encoder, counts_per_rev=per_rev, **encoder))
+    return changed(AMBER, encoder={"counts_per_rev": per_rev, **encoder})
 
 
 FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
 TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
+every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 @cache
@@ -67,7 +68,7 @@ def test_beyond_the_linear_amplitude_the_gain_is_one_within_5_percent() -> None:
     assert max(abs(counted_gain(r, d) - 1.0) for r in below for d in offsets) > 0.045
 
 
-@pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
+@every_estimate
 def test_a_counted_speed_has_its_cycle_at_the_border(encoder: dict[str, object]) -> None:
     """The gain 2 q/(pi A) on the speed alone brings a pole of the closed loop to the unit circle."""
     design = counting(4000, **encoder)
@@ -75,20 +76,20 @@ def test_a_counted_speed_has_its_cycle_at_the_border(encoder: dict[str, object])
     gain = 2.0 * design.angle_quantum_rad / (pi * cycle.inner_rad)
     free = without_nonlinearities(design)
     louder = Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,))
-    velocity = replace(free.controller.velocity, filters=(louder,))
-    loop = assemble_loops(replace(free, controller=replace(free.controller, velocity=velocity))).position
+    loop = assemble_loops(changed(free, controller={"velocity": {"filters": (louder,)}})).position
     poles = loop.closed_loop.poles()
     pole = poles[np.argmin(np.abs(poles - np.exp(2j * pi * cycle.frequency_hz * loop.period_s)))]
     assert abs(pole) == pytest.approx(1.0, abs=1e-6)
     assert np.abs(poles).max() < 1.0 + 1e-6
 
 
-@pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
+@every_estimate
 def test_the_cycle_of_a_counted_speed_is_there_from_rest(encoder: dict[str, object]) -> None:
     """Without friction, pushed off the edge a little; size and frequency within a fifth (first harmonic)."""
     design = counting(4000, **encoder)
     (cycle,) = cycles_of_quantisation(design)
-    q, free = design.angle_quantum_rad, without_nonlinearities(design)
+    q = design.angle_quantum_rad
+    free = without_nonlinearities(design)
     run = simulate(free, commands.hold(-1e-3 * q / design.total_ratio), 2.0, limits_on=False)
     tail = run.motor_angle_rad[-6000:]
     tail = tail - tail.mean()
@@ -96,11 +97,6 @@ def test_the_cycle_of_a_counted_speed_is_there_from_rest(encoder: dict[str, obje
     hertz = (crossings.size - 1) / ((crossings[-1] - crossings[0]) * design.controller.period_s)
     assert 0.5 * np.ptp(tail) == pytest.approx(cycle.inner_rad, rel=0.2)
     assert hertz == pytest.approx(cycle.frequency_hz, rel=0.2)
-
-
-def test_an_angle_that_is_not_made_into_a_speed_has_no_cycle() -> None:
-    """The motor's counts are seen in the speed alone (model.md section 2)."""
-    assert cycles_of_quantisation(counting(4000, speed="ideal")) == ()
 
 
 def test_steps_of_the_speed_and_scale() -> None:
@@ -116,12 +112,14 @@ def test_steps_of_the_speed_and_scale() -> None:
 
 
 def test_below_the_linear_amplitude_the_simulator_is_off_and_beyond_it_is_not() -> None:
-    """And the report says what counts do in a sentence."""
     found = of_difference(1024)
     assert found.off[0] > 0.3
     assert (found.off[2:] < 0.05).all()
     assert found.linear_seen_rad == pytest.approx(found.linear_rad)
-    made = counts_section([found])
+
+
+def test_the_report_says_it_in_a_sentence() -> None:
+    made = counts_section([of_difference(1024)])
     assert "steps of 61.4 rad/s in the speed estimate" in made["result"]
     assert made["status"] == "info"
 
@@ -145,25 +143,25 @@ def test_spring_and_damper_in_contact_lose_the_same_share(x: float) -> None:
 
 def test_cycles_of_the_fin_s_play_are_found_by_the_simulator() -> None:
     """Without friction: a border, and outside it a cycle that attracts; within 10 % in size and frequency."""
-    border, attracting = cycles_of_play(load_design("fin"), friction=False)
+    border, attracting = cycles_of_play(FIN, friction=False)
     assert (border.stable, attracting.stable) == (False, True)
     for cycle in (border, attracting):
-        seen = confirm(load_design("fin"), cycle)
+        seen = confirm(FIN, cycle)
         assert seen.ratio == pytest.approx(1.0, abs=0.1)
     assert seen.frequency_hz == pytest.approx(attracting.frequency_hz, rel=0.1)
 
 
-def test_with_friction_or_without_play_the_fin_is_quiet() -> None:
-    design = load_design("fin")
-    assert cycles_of_play(design, friction=True) == ()
-    tight = replace(design, coupling=replace(design.coupling, play_rad=0.0))
-    assert cycles_of_play(tight, friction=False) == ()
+def test_no_cycle_is_found_where_there_is_none() -> None:
+    """Friction quiets the fin; no play; the motor's counts are in the speed alone (model.md section 2)."""
+    assert cycles_of_play(FIN, friction=True) == ()
+    assert cycles_of_play(changed(FIN, coupling={"play_rad": 0.0}), friction=False) == ()
+    assert cycles_of_quantisation(counting(4000, speed="ideal")) == ()
 
 
 def test_amplitudes_go_with_the_play() -> None:
     """Without friction a drive with twice the play has twice the cycle, at the same frequency."""
-    wide = with_overrides(load_design("fin"), {"coupling.play": "3 mrad"})
-    cycles = [cycles_of_play(each, friction=False) for each in (load_design("fin"), wide)]
+    wide = with_overrides(FIN, {"coupling.play": "3 mrad"})
+    cycles = [cycles_of_play(each, friction=False) for each in (FIN, wide)]
     for one, two in zip(*cycles, strict=True):
         assert two.output_rad == pytest.approx(2.0 * one.output_rad, rel=1e-6)
         assert two.frequency_hz == pytest.approx(one.frequency_hz, rel=1e-6)
@@ -171,8 +169,7 @@ def test_amplitudes_go_with_the_play() -> None:
 
 def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     """A relay of one count has the gain 2 q/(pi A); in a clean drive without friction the cycle is there."""
-    design = load_design("fin")
-    (cycle,), free = cycles_of_quantisation(design), without_nonlinearities(design)
+    (cycle,), free = cycles_of_quantisation(FIN), without_nonlinearities(FIN)
     margins = assemble_loops(free).break_points["output"]
     omega = 2 * pi * cycle.frequency_hz
     L = margins.open_loop(np.exp(1j * omega * margins.period_s))
@@ -180,7 +177,7 @@ def test_a_count_makes_a_cycle_at_the_gain_border_of_the_loop() -> None:
     q = 2 * pi / 65536
     assert cycle.output_rad == pytest.approx(2 * q / pi * abs(L), rel=1e-6)  # 1/g = |L| there
     run = simulate(free, commands.hold(-0.5 * q), 4.0, limits_on=False)
-    assert 0.5 * np.ptp(run.output_angle_rad[-5000:]) == pytest.approx(cycle.output_rad, rel=0.15)
+    assert 0.5 * float(np.ptp(run.output_angle_rad[-5000:])) == pytest.approx(cycle.output_rad, rel=0.15)
 
 
 def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
@@ -197,4 +194,4 @@ def test_section_and_refusal() -> None:
     words = "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
     assert made["result"] == words
     with pytest.raises(InputError, match="position loop"):
-        limit_cycles(replace(AMBER, controller=replace(AMBER.controller, position=None)))
+        limit_cycles(changed(FIN, controller={"position": None}))

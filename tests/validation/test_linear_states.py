@@ -12,6 +12,7 @@ from actuator_lti.design.model import Filter
 from actuator_lti.errors import NumericalError
 from analyses.large_signal.tones import LEFT_AT_REST, PLACES, linear_steady_state, without_value
 from analyses.limit_cycles.stick_slip import _slip
+from tests.changed import changed
 
 
 @pytest.mark.parametrize("name", shipped_designs())
@@ -22,12 +23,8 @@ def test_every_state_of_a_shipped_drive_is_known(name: str) -> None:
 def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
     loops = assemble_loops("ilr33-amber")
     system = loops.tick_system
-    strange = SimpleNamespace(
-        states=("flux", *system.states[1:]),
-        outputs=system.outputs,
-        ticks=system.ticks,
-        matrices=system.matrices,
-    )
+    kept = {name: getattr(system, name) for name in ("outputs", "ticks", "matrices")}
+    strange = SimpleNamespace(states=("flux", *system.states[1:]), **kept)
     with pytest.raises(NumericalError, match="state flux of the linear drive"):
         linear_steady_state(replace(loops, tick_system=strange), np.array([10.0]))
 
@@ -35,10 +32,8 @@ def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
 def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:
     """A torque filter holds the breakaway torque before the slip, not zero, as it was taken."""
     design = load_design("ilr33-amber")
-    plain = _slip(design, 1.0, assemble_loops(design))
-    assert plain is not None
+    assert _slip(design, 1.0, assemble_loops(design)) is not None
     low_pass = Filter(on="torque", kind="lowpass", frequency_rad_s=2000.0)
-    velocity = replace(design.controller.velocity, filters=(low_pass,))
-    filtered = replace(design, controller=replace(design.controller, velocity=velocity))
+    filtered = changed(design, controller={"velocity": {"filters": (low_pass,)}})
     assert any(name.startswith("torque1") for name in assemble_loops(filtered).tick_system.states)
     assert _slip(filtered, 1.0, assemble_loops(filtered)) is None

@@ -1,8 +1,6 @@
 """The map of large signals: its border against A_k(w), what acts, what the output looks like."""
 
 import math
-from dataclasses import replace
-from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -24,17 +22,19 @@ from analyses.large_signal.tones import (
     tone,
     work_ticks,
 )
+from tests.changed import changed
 from tests.nonlinear.elastic_drive import drive_f
 
+AMBER = load_design("ilr33-amber")
+
+
+def mapped(design: Design, counts: tuple[int, int] = (2, 9)) -> AmplitudeMap:
+    return amplitude_map(design, assemble_loops(design), counts=counts)
+
 
 @pytest.fixture(scope="module")
-def amber() -> Design:
-    return load_design("ilr33-amber")
-
-
-@pytest.fixture(scope="module")
-def amber_map(amber: Design) -> AmplitudeMap:
-    return amplitude_map(amber, assemble_loops(amber), counts=(17, 16))
+def amber_map() -> AmplitudeMap:
+    return mapped(AMBER, (17, 16))
 
 
 @pytest.mark.parametrize("hz", [0.3, 7.77, 100.0, 389.0])
@@ -45,22 +45,22 @@ def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
     assert result.ticks == updates * every
     assert math.gcd(result.cycles, updates) == 1
     assert updates >= LEAST_UPDATES
-    hertz = result.cycles / (result.ticks * design.controller.period_s)
-    assert hertz == pytest.approx(result.frequency_hz, rel=1e-12)
+    span_s = result.ticks * design.controller.period_s
+    assert result.cycles / span_s == pytest.approx(result.frequency_hz, rel=1e-12)
     assert result.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
 
 
-def test_amplitudes_hold_those_that_the_design_asks_for(amber: Design) -> None:
-    values = amplitudes(amber, 25, 1e-5)
-    full = amber.validation.full_deflection_rad
+def test_amplitudes_hold_those_that_the_design_asks_for() -> None:
+    values = amplitudes(AMBER, 25, 1e-5)
+    full = AMBER.validation.full_deflection_rad
     assert len(values) == 25
     assert np.all(np.diff(values) > 0.0)
-    for fraction in amber.validation.amplitude_fractions:
+    for fraction in AMBER.validation.amplitude_fractions:
         assert np.min(np.abs(values - fraction * full)) == 0.0
 
 
-def test_friction_shifts_the_border(amber: Design) -> None:
-    shift = limit_shift(amber, assemble_loops(amber))
+def test_friction_shifts_the_border() -> None:
+    shift = limit_shift(AMBER, assemble_loops(AMBER))
     assert len(shift.frequency_hz) >= 12
     assert 0.01 < np.max(np.abs(shift.ratio - 1.0)) < 0.1
     # at low frequency it is the speed command that limits, which friction hardly changes
@@ -68,44 +68,45 @@ def test_friction_shifts_the_border(amber: Design) -> None:
     assert shift.linear_limiter[0] == shift.simulated_limiter[0] == "speed"
 
 
-def test_friction_of_nothing_shifts_nothing(amber: Design) -> None:
+def test_friction_of_nothing_shifts_nothing() -> None:
     """Not by more than the bisection resolves; also in front of a filter of the command."""
-    slow = replace(amber, command=replace(amber.command, filter_time_s=5e-3))
-    for design in (amber, slow):
-        free = replace(design, friction=replace(design.friction, dry_torque_Nm=1e-12))
+    for design in (AMBER, changed(AMBER, command={"filter_time_s": 5e-3})):
+        free = changed(design, friction={"dry_torque_Nm": 1e-12})
         shift = limit_shift(free, assemble_loops(free), count=4)
         assert np.max(np.abs(shift.ratio - 1.0)) < shift.resolution
 
 
-def test_without_friction_the_linear_response_holds_below_the_border(amber: Design) -> None:
-    loops = assemble_loops(amber)
-    tones = tuple(tone(f, amber) for f in (1.0, 8.0, 30.0, 120.0))
+def test_without_friction_the_linear_response_holds_below_the_border() -> None:
+    loops = assemble_loops(AMBER)
+    tones = tuple(tone(f, AMBER) for f in (1.0, 8.0, 30.0, 120.0))
     omega = np.array([t.omega_rad_s for t in tones])
     start, border = linear_steady_state(loops, omega), onset(loops, omega)
     which = np.arange(4)
     for share, everything in ((0.95, True), (1.1, False)):
         amplitude = share * border.amplitude_rad
         begin = np.minimum(amplitude, 0.9 * border.amplitude_rad)
-        result = run_tones(amber, tones, which, amplitude, start, begin, friction_on=False)
+        result = run_tones(AMBER, tones, which, amplitude, start, begin, friction_on=False)
         linear = result.phasor("output_angle_rad") / amplitude / start.output
-        names = tuple(CAUSES[k] for k in causes(result, start.output, amplitude))
-        assert names == (("none",) * 4 if everything else border.active)
+        names = [CAUSES[k] for k in causes(result, start.output, amplitude)]
         if everything:
             np.testing.assert_allclose(linear, 1.0, atol=1e-7)
+            assert names == ["none"] * 4
+        else:
+            assert names == list(border.active)
 
 
-def test_the_linear_response_is_that_of_the_loops(amber: Design) -> None:
-    loops = assemble_loops(amber)
+def test_the_linear_response_is_that_of_the_loops() -> None:
+    loops = assemble_loops(AMBER)
     omega = 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
     system = loops.reference_to_output
     expected = system(np.exp(1j * omega * system.dt))
     np.testing.assert_allclose(linear_steady_state(loops, omega).output, expected, rtol=1e-9)
 
 
-def test_what_the_map_shows(amber: Design, amber_map: AmplitudeMap) -> None:
-    middle, waveform = len(amber_map.amplitude_rad) // 2, amber_map.waveform
-    seen = [(CAUSES[amber_map.cause[k, 0]], WAVEFORMS[waveform[k, 0]]) for k in (-1, 0, middle)]
-    assert seen == [("speed", "triangle"), ("stiction", "stick-slip"), ("none", "sine")]
+def test_what_the_map_shows(amber_map: AmplitudeMap) -> None:
+    cause, waveform, middle = amber_map.cause, amber_map.waveform, len(amber_map.amplitude_rad) // 2
+    shown = {row: (CAUSES[cause[row, 0]], WAVEFORMS[waveform[row, 0]]) for row in (-1, 0, middle)}
+    assert shown == {-1: ("speed", "triangle"), 0: ("stiction", "stick-slip"), middle: ("none", "sine")}
     changed = amber_map.response[middle, 0] / amber_map.linear[0]
     assert abs(20.0 * np.log10(abs(changed))) < 0.1
     assert abs(np.degrees(np.angle(changed))) < 2.0
@@ -131,39 +132,40 @@ def test_a_command_below_the_threshold_moves_nothing() -> None:
     assert CAUSES[causes(result, start.output, small)[0]] == "stiction"
 
 
-def test_without_limits_or_stability_there_is_no_border_and_still_a_map(amber: Design) -> None:
+def test_a_drive_without_limits_has_no_border_and_an_unstable_loop_has_a_map() -> None:
     names = ("voltage_V", "speed_rad_s", "acceleration_rad_s2", "peak_current_A")
-    unlimited = replace(amber, limits=replace(amber.limits, **dict.fromkeys(names, math.inf)))
-    unstable = with_values(amber, {"control.position.gain": 6000.0})
-    for design in (unlimited, unstable):
+    free = changed(AMBER, limits=dict.fromkeys(names, math.inf))
+    unstable = with_values(AMBER, {"control.position.gain": 6000.0})
+    for design in (free, unstable):
         assert limit_shift(design, assemble_loops(design), count=3) is None
-        map_ = mapped(design, (6, 4))
-        assert np.isfinite(map_.response).all()
-        assert design is unstable or map_.share("speed", "acceleration", "current", "voltage") == 0.0
+    assert mapped(free, (6, 4)).share("speed", "acceleration", "current", "voltage") == 0.0
+    assert np.isfinite(mapped(unstable, (6, 4)).response).all()
 
 
 def test_every_start_has_a_state_of_the_linear_drive() -> None:
     """A name that no drive has would be passed over, and the run would begin at rest."""
-    both = (assemble_loops(name).tick_system.states for name in ("ilr33-amber", "ilr33-amber-multirate"))
-    assert set(PLACES) <= {*chain(*both)}
+    names = {
+        state
+        for name in ("ilr33-amber", "ilr33-amber-multirate")
+        for state in assemble_loops(load_design(name)).tick_system.states
+    }
+    assert set(PLACES) <= names
 
 
-def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
-    amber: Design, amber_map: AmplitudeMap, monkeypatch
-) -> None:
+def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(amber_map, monkeypatch) -> None:
     """Work is counted in ticks, so the same drive has the same map on every machine."""
-    loops = assemble_loops(amber)
-    whole = limit_shift(amber, loops, count=6)
+    loops = assemble_loops(AMBER)
+    whole = limit_shift(AMBER, loops, count=6)
     assert not amber_map.coarser
     assert not whole.coarser
     monkeypatch.setattr("analyses.large_signal.map.MOST_TICKS", amber_map.ticks // 9)
-    two_thirds = (ROUNDS + 2) * work_ticks(amber, loops, 6) * 2 // 3 + 1
+    two_thirds = (ROUNDS + 2) * work_ticks(AMBER, loops, 6) * 2 // 3 + 1
     monkeypatch.setattr("analyses.large_signal.result.MOST_TICKS", two_thirds)
-    shift = limit_shift(amber, loops, count=6)
+    shift = limit_shift(AMBER, loops, count=6)
     assert shift.coarser
     assert shift.frequency_hz.size == 4
     assert shift.frequency_hz[[0, -1]] == pytest.approx(whole.frequency_hz[[0, -1]], rel=1e-12)
-    small = amplitude_map(amber, loops, counts=(17, 16))
+    small = mapped(AMBER, (17, 16))
     assert small.coarser
     assert small.cause.size < 0.2 * amber_map.cause.size
     assert small.ticks < amber_map.ticks / 4  # what is not steady is run again, longer
@@ -171,40 +173,26 @@ def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(
 
 def without_friction(design: Design) -> Design:
     """A drive with its spring, and nothing that is not linear but its limits."""
-    assert design.coupling is not None
-    sharp = replace(design.encoder, counts_per_rev=None), replace(design.output_encoder, counts_per_rev=None)
+    sharp = {"counts_per_rev": None}
     rubbing = {"dry_torque_Nm": 0.0, "points": (), "load_coefficient": 0.0, "offset_torque_Nm": 0.0}
-    return replace(
-        design,
-        friction=replace(design.friction, **rubbing),
-        load=replace(design.load, friction=None, gravity=None, path="back-drivable"),
-        coupling=replace(design.coupling, play_rad=0.0),
-        encoder=sharp[0],
-        output_encoder=sharp[1],
-    )
+    load, tight = {"friction": None, "gravity": None, "path": "back-drivable"}, {"play_rad": 0.0}
+    return changed(design, friction=rubbing, load=load, coupling=tight, encoder=sharp, output_encoder=sharp)
 
 
 def small(design: Design, size: float = 1e-7) -> Design:
-    asked = replace(design.validation, full_deflection_rad=size, amplitude_fractions=(1.0,))
-    return replace(design, validation=asked)
-
-
-def mapped(design: Design, counts: tuple[int, int] = (2, 9)) -> AmplitudeMap:
-    return amplitude_map(design, assemble_loops(design), counts=counts)
+    return changed(design, validation={"full_deflection_rad": size, "amplitude_fractions": (1.0,)})
 
 
 def jerky(design: Design) -> Design:
     """With a command whose jerk is limited: n = 2 a/(j T) = 25 samples."""
-    period = design.controller.position_loop.every * design.controller.period_s
-    jerk = 200.0 / (25.0 * period)
-    return replace(design, command=Command(acceleration_rad_s2=100.0, jerk_rad_s3=jerk, filter_time_s=2e-3))
+    jerk = 200.0 / (25.0 * design.controller.position_loop.every * design.controller.period_s)
+    return changed(design, command=Command(acceleration_rad_s2=100.0, jerk_rad_s3=jerk, filter_time_s=2e-3))
 
 
-ELASTIC = ("ballscrew", "joint", "fin", "ilr33-amber-compliant")
+SHIPPED = {name: load_design(name) for name in ("ballscrew", "joint", "fin", "ilr33-amber-compliant")}
 SPRINGS = {
-    **{name: without_friction(load_design(name)) for name in ELASTIC},
-    "drive F": without_friction(drive_f()),
-    "drive F behind a profile": jerky(without_friction(drive_f())),
+    name: without_friction(design)
+    for name, design in {**SHIPPED, "drive F": drive_f(), "behind a profile": jerky(drive_f())}.items()
 }
 
 
@@ -229,25 +217,19 @@ def test_small_sines_are_the_linear_curve_of_the_output(name: str) -> None:
 
 def test_the_bandwidth_of_the_map_is_that_of_the_output() -> None:
     """Behind a soft spring, where the motor's side has another."""
-    soft = replace(drive_f().coupling, stiffness_Nm_rad=3.0)  # type: ignore[type-var]
-    design = small(without_friction(replace(drive_f(), coupling=soft)))
+    design = small(without_friction(changed(drive_f(), coupling={"stiffness_Nm_rad": 3.0})))
     bode = amplitude_bode(design, assemble_loops(design), mapped(design, (2, 40)))
     np.testing.assert_allclose(bode.minus3db_hz, bode.linear_minus3db_hz, rtol=1e-5)
-
-
-PLAY, TIGHT = drive_f().coupling, replace(drive_f().coupling, play_rad=0.0)  # type: ignore[type-var]
 
 
 @pytest.mark.parametrize(
     ("change", "cause"),
     [
-        ({"coupling": PLAY}, "other"),
-        ({"coupling": TIGHT, "friction": Friction(dry_torque_Nm=5e-3)}, "friction"),
+        ({}, "other"),  # play
+        ({"coupling": {"play_rad": 0.0}, "friction": Friction(dry_torque_Nm=5e-3)}, "friction"),
     ],
-    ids=["play", "friction"],
 )
 def test_cells_are_named_after_friction_only_where_it_acts(change: dict[str, Any], cause: str) -> None:
-    design = small(replace(drive_f(), **change), 0.02)
-    causes = {CAUSES[k] for k in mapped(design, (6, 8)).cause.ravel()}
+    causes = {CAUSES[k] for k in mapped(small(changed(drive_f(), **change), 0.02), (6, 8)).cause.ravel()}
     assert cause in causes
     assert causes & {"friction", "other"} == {cause}

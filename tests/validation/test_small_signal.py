@@ -18,6 +18,7 @@ from analyses.validation.places import Bench
 from analyses.validation.row import Row
 from analyses.validation.small_signal import Place, small_signal
 from nonlinear import tangent
+from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
 
@@ -43,10 +44,7 @@ def test_every_limit_of_a_shipped_drive(name: str) -> None:
 def test_speed_drives_and_clamped_integrals(seed: int) -> None:
     found = rows(full_drive(seed))
     assert {row.verdict for row in found.values()} == {Verdict.MET}
-
-
-def test_the_clamped_integral_is_one_of_them() -> None:
-    assert "voltage_onset_integral" in rows(full_drive(730_037))
+    assert seed != 730_037 or "voltage_onset_integral" in found
 
 
 def one_per_cent_more(place: Place, z: np.ndarray) -> np.ndarray:
@@ -62,9 +60,8 @@ def test_one_per_cent_of_the_linear_side_is_not_met(name: str) -> None:
         (row,) = small_signal(replace(place, predicted=partial(one_per_cent_more, place)))
         assert row.verdict is Verdict.NOT_MET, row
         assert row.error == pytest.approx(0.01, rel=0.02)
-    control = design.controller
-    place = replace(control.position, gain=1.01 * control.position.gain)
-    seen = rows(design, replace(design, controller=replace(control, position=place)))
+    gain = 1.01 * design.controller.position.gain
+    seen = rows(design, changed(design, controller={"position": {"gain": gain}}))
     assert {row.verdict for row in seen.values()} == {Verdict.NOT_MET}
 
 
@@ -77,17 +74,17 @@ def test_they_are_rows_of_a_validation() -> None:
 
 
 def cogging(design: Design, share: float = 1.0) -> Design:
-    motor = replace(design.motor, cogging_Nm=4e-3 * share, cogging_periods=12.0, cogging_phase_rad=2.5)
-    return replace(design, motor=motor)
+    waves = {"cogging_Nm": 4e-3 * share, "cogging_periods": 12.0, "cogging_phase_rad": 2.5}
+    return changed(design, motor=waves)
 
 
 def gear_error(design: Design, share: float = 1.0) -> Design:
-    load = replace(design.load, gear_error_Nm=0.3 * share, gear_error_periods=3.0, gear_error_phase_rad=2.5)
-    return replace(design, load=load)
+    waves = {"gear_error_Nm": 0.3 * share, "gear_error_periods": 3.0, "gear_error_phase_rad": 2.5}
+    return changed(design, load=waves)
 
 
-def verdicts(design: Design, model: Design, place: str) -> list[Verdict]:
-    return [row.verdict for row in small_signal(Bench(design, model).place(place))]
+def verdicts(design: Design, model: Design, place: str) -> set[Verdict]:
+    return {row.verdict for row in small_signal(Bench(design, model).place(place))}
 
 
 @pytest.mark.parametrize(
@@ -99,19 +96,17 @@ def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
     name: str, effect: Callable[..., Design]
 ) -> None:
     plain = load_design(name)
-    design = effect(plain)
+    design, wrong = effect(plain), effect(plain, 1.01)
     for place in ("velocity", "u"):
-        assert set(verdicts(design, design, place)) == {Verdict.MET}
-        assert Verdict.NOT_MET in verdicts(design, effect(plain, 1.01), place)
-        assert Verdict.NOT_MET in verdicts(effect(plain, 1.01), design, place)
-        assert Verdict.NOT_MET in verdicts(design, plain, place)
+        assert verdicts(design, design, place) == {Verdict.MET}
+        for one, other in ((design, wrong), (wrong, design), (design, plain)):
+            assert Verdict.NOT_MET in verdicts(one, other, place)
 
 
 def test_cogging_in_front_of_a_coupling_with_play() -> None:
     """Every row of the whole drive, not of a place alone."""
     plain = load_design("ilr33-amber-compliant")
-    motor = replace(plain.motor, cogging_Nm=2e-3, cogging_periods=5.0)
-    result = validate(replace(plain, motor=motor), CHECKS)
+    result = validate(changed(plain, motor={"cogging_Nm": 2e-3, "cogging_periods": 5.0}), CHECKS)
     assert plain.coupling.play_rad > 0.0
     assert result.tally.met == result.tally.total > 100
     assert result.passed
@@ -135,11 +130,9 @@ FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
 
 def pendulum(falls_Nm_rad: float) -> Design:
     """A shipped drive without its position loop, on a load that falls over."""
-    design = load_design("ilr33-amber")
-    velocity = replace(design.controller.velocity, integral_time_s=INTEGRAL_TIME_S)
-    control = replace(design.controller, position=None, velocity=velocity)
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=falls_Nm_rad)
-    return replace(design, controller=control, load=load)
+    control = {"position": None, "velocity": {"integral_time_s": INTEGRAL_TIME_S}}
+    load = {"path": "back-drivable", "moment_slope_Nm_rad": falls_Nm_rad}
+    return changed(load_design("ilr33-amber"), controller=control, load=load)
 
 
 def least_gain(design: Design) -> float:

@@ -1,7 +1,6 @@
 """Actuator figures: closed form against the simulator, step times, duty, and the sections of the page."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,13 +20,15 @@ from reports.drawing import draw_svg
 from reports.sections import friction_effects as friction_section
 from reports.sections import large_signal as large_section
 from reports.sections import specification as specification_section
+from tests.changed import changed
 
+AMBER = load_design("ilr33-amber")
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
 
 
 @pytest.fixture(scope="module")
 def amber() -> Specification:
-    return specification(load_design("ilr33-amber"))
+    return specification(AMBER)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
@@ -49,16 +50,14 @@ def test_current_at_top_speed_and_8_Nm(amber: Specification) -> None:
 
 
 def test_thermal_duty() -> None:
-    design = load_design("ilr33-amber")
-    assert thermal_duty(design, 12.0) == pytest.approx(1.0 / 9.0)
-    assert thermal_duty(design, 2.0) == 1.0
+    assert thermal_duty(AMBER, 12.0) == pytest.approx(1.0 / 9.0)
+    assert thermal_duty(AMBER, 2.0) == 1.0
     assert thermal_duty(load_design("emps"), None) is None
 
 
-def test_a_sine_within_the_limits_needs_the_current_of_its_friction() -> None:
+def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Specification) -> None:
     """Slow sine: dry friction is a square wave, viscous a sine in phase: rms of their sum by hand."""
-    design = load_design("ilr33-amber")
-    move = next(m for m in specification(design).manoeuvres if m.load_Nm == 8.0 and "70 %" in m.name)
+    move = next(m for m in amber.manoeuvres if m.load_Nm == 8.0 and "70 %" in m.name)
     dry = (2.25e-3 + 8 * 1.34e-3) / 5.9e-3
     viscous = 5.25e-6 * 0.7 * 942.5 / 5.9e-3
     by_hand = math.sqrt(dry**2 + viscous**2 / 2.0 + 4.0 / math.pi * dry * viscous)
@@ -89,9 +88,7 @@ def test_the_plane_is_bounded_by_the_limits(amber: Specification) -> None:
 
 
 def test_a_drive_that_cannot_move_says_so() -> None:
-    weak = with_values(
-        load_design("ilr33-amber"), {"limits.peak_current": 2.0, "limits.continuous_current": 2.0}
-    )
+    weak = with_values(AMBER, {"limits.peak_current": 2.0, "limits.continuous_current": 2.0})
     result = specification(weak).capabilities
     assert result[1].figures.output_rate_rad_s == 0.0
     assert result[1].simulated_rate_rad_s is None
@@ -130,7 +127,7 @@ def test_a_note_speaks_of_no_column_and_no_controller_that_is_not_there(name: st
 def test_a_hunting_drive_fails_its_verdict() -> None:
     values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 3e-3}
     values["control.position.gain"] = 250.0
-    made = friction_section.section(friction_effects(with_values(load_design("ilr33-amber"), values)))
+    made = friction_section.section(friction_effects(with_values(AMBER, values)))
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
     assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
@@ -155,8 +152,7 @@ def test_the_demand_of_the_plane_is_what_steady_motion_takes(name: str, more: di
     """Friction behind the coupling and damping of the load too: the torque of a ramp, simulated."""
     design = with_overrides(load_design(name), {**more, "load.moment_slope": "0 N*m/rad"})
     top = 0.3 * drive_figures(design, 0.0).output_rate_rad_s * design.total_ratio
-    unloaded = replace(design, validation=replace(design.validation, loads_Nm=(0.0,)))
-    (curve,) = torque_speed_plane(unloaded, top).demands
+    (curve,) = torque_speed_plane(changed(design, validation={"loads_Nm": (0.0,)}), top).demands
     wanted = float(np.interp(top, curve.speed_rad_s, curve.torque_Nm))
     run = simulate(on_the_bench(design), commands.ramp(top / design.total_ratio), 1.5)
     torque = motor_torque_Nm(design, run.current_A, run.voltage_V)[-len(run.time_s) // 10 :]
