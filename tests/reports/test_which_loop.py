@@ -22,7 +22,7 @@ from analyses.large_signal.from_rest import free_amplitude, sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.responses import answer_curve, response_at
-from analyses.specification.requirements import RequirementVerdict
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
