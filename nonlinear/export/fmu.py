@@ -118,7 +118,7 @@ def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str
 def _source_values(design: Design, trace: KeyTrace) -> dict[str, str]:
     """What stands for the words of ``fmu_design.c``."""
     keys = [
-        f"    {{{c_float(key.value)}, {c_float(of.key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
+        f"    {{{c_float(key.value)}, {c_float(key.low)}, {c_float(key.high)}, {int(key.fixed)}, "
         f"{int(key.whole)}}}, /* {key.path} */"
         for key in trace.keys
     ]

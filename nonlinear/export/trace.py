@@ -186,7 +186,7 @@ class Key:
     """One numeric key of a design as a parameter.
 
     ``path``: dotted path.
-    ``value``, ``low``, ``high``: SI; ``low_open`` makes the lower bound exclusive.
+    ``value``, ``low``, ``high``: SI.
     ``unit``: SI unit; ``"1"``: none.
     ``whole``: a count.
     ``fixed``: only before the run begins, because the state's shape or clock depends on it.
@@ -198,7 +198,6 @@ class Key:
     description: str
     low: float
     high: float
-    low_open: bool
     whole: bool = False
     fixed: bool = False
 
@@ -268,5 +267,5 @@ def _key(design: Design, path: str, *, fixed: bool) -> Key:
         unit=known.unit(Structure.of(design)),
         whole=known.kind == "integer" and value <= LARGEST_INTEGER,
         fixed=fixed,
-        **{name: getattr(known, name) for name in ("description", "low", "high", "low_open")},
+        **{name: getattr(known, name) for name in ("description", "low", "high")},
     )
