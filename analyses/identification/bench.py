@@ -98,7 +98,7 @@ def identify_bench(
     right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     used, model = right.records, right.model
     if electrical is None:
-        model = with_given_constant(start, model, used, recipe)
+        model = with_given_constant(start, model, used)
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
     source, given = f"identified from {names}", given_constant(model)
     if given is not None:
@@ -178,7 +178,7 @@ def _fitted(
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         return design_with_fit(with_structure(start, model), values, "")
 
-    return without_bias(start, made, replace(model, records=tuple(parts)), records, recipe)
+    return without_bias(start, made, replace(model, records=tuple(parts)), records)
 
 
 def _items(

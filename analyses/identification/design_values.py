@@ -17,7 +17,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
-from analyses.identification.joint_model import JointModel, Recipe, default_value
+from analyses.identification.joint_model import JointModel, default_value
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, electrical_parts
 from analyses.records.factors import with_factor
@@ -174,9 +174,7 @@ def given_constant(model: JointModel) -> str | None:
     return next((name for name in CONSTANTS if name in model.fixed), None)
 
 
-def with_given_constant(
-    start: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
-) -> JointModel:
+def with_given_constant(start: Design, model: JointModel, records: Sequence[Record]) -> JointModel:
     """The model and, among what is kept, the design's constant that all its values hang on; none if told.
 
     A motion and a current tell ratios to kM alone: with another kM, or a current of another scale, the same
@@ -190,7 +188,7 @@ def with_given_constant(
     value = float(getattr(start.motor, CONSTANTS[name]))
     changed: dict[str, Any] = {CONSTANTS[name]: (1.0 + STEP) * value}
     more = replace(start, motor=replace(start.motor, **changed))
-    share = _shares(start, more, model, records, recipe)
+    share = _shares(start, more, model, records)
     each = [f"{100.0 * STEP * part:+.2g} %" for part in share]
     words = f"{each[0]} of every value"
     if len(set(each)) > 1:
@@ -216,13 +214,11 @@ def _constant(design: Design, record: Record) -> str | None:
     return None if closely else "torque_constant"
 
 
-def _shares(
-    start: Design, more: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
-) -> FloatArray:
+def _shares(start: Design, more: Design, model: JointModel, records: Sequence[Record]) -> FloatArray:
     """Relative change of each fitted value over that of the constant; exact, as the fit is linear in it."""
     tables, targets = [], []
     for weight, record in zip(model.weights, records, strict=True):
-        one, other = (rows_under(design, record, model, recipe) for design in (start, more))
+        one, other = (rows_under(design, record, model) for design in (start, more))
         tables.append(weight * one.columns(model.names))
         targets.append(weight * np.column_stack([one.y - model.kept(one), (other.y - one.y) / STEP]))
     table = np.concatenate(tables)

@@ -19,10 +19,10 @@ def _run(noise: float) -> tuple[np.ndarray, np.ndarray]:
     return time, speed + noise * np.random.default_rng(0).standard_normal(len(time))
 
 
-@pytest.mark.parametrize("noise", [0.0, 3.0])
-def test_the_window_lies_on_the_plateau(noise: float) -> None:
+@pytest.mark.parametrize(("noise", "side"), [(0.0, 1.0), (3.0, 1.0), (1.0, -1.0)])
+def test_the_window_lies_on_the_plateau(noise: float, side: float) -> None:
     time, speed = _run(noise)
-    window = find_steady_window(time, speed)
+    window = find_steady_window(time, side * speed)
     assert 2.0 < window.start_s < 2.5
     assert 7.5 < window.stop_s < 8.0
     assert window.largest_acceleration_rad_s2 <= window.limit_rad_s2
@@ -38,11 +38,6 @@ def test_a_run_that_never_settles_is_refused_with_its_acceleration() -> None:
     time = np.arange(0.0, 10.0, 1e-3)
     with pytest.raises(InputError, match=r"no steady part .* the limit"):
         find_steady_window(time, 300.0 + 40.0 * time)
-
-
-def test_reverse_motion_is_steady_too() -> None:
-    time, speed = _run(1.0)
-    assert find_steady_window(time, -speed).stop_s > 7.0
 
 
 def test_correlation_time_of_an_autoregressive_series() -> None:
