@@ -20,7 +20,7 @@ METHODS = {"tustin": "bilinear", "zoh": "zoh"}
 
 
 def _columns(system: Any) -> tuple[Any, ...]:
-    """A, B, C, D of a transfer function of python-control with one output, its columns side by side."""
+    """Of a transfer function of python-control: one output, its columns side by side."""
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss
 

@@ -22,10 +22,6 @@ from nonlinear.export.statement import Statement, used
 from nonlinear.row.parameters import design_row
 
 
-class NotTraceable(TypeError):
-    """A value went into a function that the trace does not know."""
-
-
 @dataclass
 class Tape:
     """Statements in the order in which they were made.
@@ -156,7 +152,7 @@ class Traced:
 
     def _remainder(self, of: Any, by: Any) -> Traced:
         if not self.tape.loose:
-            raise NotTraceable("a remainder")
+            raise TypeError("a remainder")
         return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
 
     def __format__(self, form: str) -> str:
@@ -175,10 +171,10 @@ class Traced:
     def __float__(self) -> float:
         if self.tape.loose:
             return self.number
-        raise NotTraceable("a function of a floating-point number")
+        raise TypeError("a function of a floating-point number")
 
     def __int__(self) -> int:
-        raise NotTraceable("a whole number of a floating-point number")
+        raise TypeError("a whole number of a floating-point number")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +182,7 @@ class Key:
     """One numeric key of a design as a parameter.
 
     ``path``: dotted path.
-    ``value``, ``low``, ``high``: SI; ``low_open`` makes the lower bound exclusive.
+    ``value``, ``low``, ``high``: SI.
     ``unit``: SI unit; ``"1"``: none.
     ``whole``: a count.
     ``fixed``: only before the run begins, because the state's shape or clock depends on it.
@@ -198,7 +194,6 @@ class Key:
     description: str
     low: float
     high: float
-    low_open: bool
     whole: bool = False
     fixed: bool = False
 
@@ -268,5 +263,5 @@ def _key(design: Design, path: str, *, fixed: bool) -> Key:
         unit=known.unit(Structure.of(design)),
         whole=known.kind == "integer" and value <= LARGEST_INTEGER,
         fixed=fixed,
-        **{name: getattr(known, name) for name in ("description", "low", "high", "low_open")},
+        **{name: getattr(known, name) for name in ("description", "low", "high")},
     )
