@@ -24,8 +24,9 @@ from nonlinear._kernels.blocks import counted, measured_speed
 from nonlinear._kernels.control import control
 from nonlinear._kernels.state_kinds import COUNTER, state_kinds
 from nonlinear._kernels.tick import init_command, init_controller, init_estimate
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.controller_names import SIGNAL_AT, member_name
+from nonlinear.native import parameters
 
 Floats = npt.NDArray[np.float64]
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
@@ -82,7 +83,7 @@ class Controller:
 
 def controller_of(design: Design, prefix: str, *, single_precision: bool = False) -> Controller:
     """Cut the controller out of the tick."""
-    p = exported(design).p
+    p = parameters(exported_row(design))[0]
     functions = _followed(p, single_precision)
     structs = _structs(design, p, prefix, functions.values())
     rows = Rows(structs, float(p[layout.COUNTS_PER_RAD]))

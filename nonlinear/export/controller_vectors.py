@@ -11,7 +11,7 @@ from actuator_lti.compiled.kinds import Kind, c_float
 from actuator_lti.compiled.structs import Member, Struct
 from actuator_lti.design.field import BIG
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.controller_cut import MOTOR_COUNTS, Controller
 from nonlinear.export.variables import sizes
 from nonlinear.native import control_tick, parameters, tick
@@ -37,8 +37,7 @@ def vectors_of(ours: Controller, *, single_precision: bool) -> list[Vector]:
     Ticks are left out where rounding decides whether a limit acts, and those of an unstable drive from
     where its numbers are no counts any more.
     """
-    rng, row = np.random.default_rng(SEED), exported(ours.design).row
-    p, s = parameters(row)
+    rng, (p, s) = np.random.default_rng(SEED), parameters(exported_row(ours.design))
     io, every = np.zeros(at.IO_SIZE), int(p[at.OUTER_EVERY])
     numbers = sum(max(each.length, 1) for each in ours.state.members)
     steps, apart = int(np.clip(MOST_NUMBERS // numbers, 2, STEPS)), APART * every

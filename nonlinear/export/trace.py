@@ -22,10 +22,6 @@ from nonlinear.export.statement import Statement, used
 from nonlinear.row.parameters import design_row
 
 
-class NotTraceable(TypeError):
-    """A value went into a function that the trace does not know."""
-
-
 @dataclass
 class Tape:
     """Statements in the order in which they were made.
@@ -156,7 +152,7 @@ class Traced:
 
     def _remainder(self, of: Any, by: Any) -> Traced:
         if not self.tape.loose:
-            raise NotTraceable("a remainder")
+            raise TypeError("a remainder")
         return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
 
     def __format__(self, form: str) -> str:
@@ -175,10 +171,10 @@ class Traced:
     def __float__(self) -> float:
         if self.tape.loose:
             return self.number
-        raise NotTraceable("a function of a floating-point number")
+        raise TypeError("a function of a floating-point number")
 
     def __int__(self) -> int:
-        raise NotTraceable("a whole number of a floating-point number")
+        raise TypeError("a whole number of a floating-point number")
 
 
 @dataclass(frozen=True, kw_only=True)
