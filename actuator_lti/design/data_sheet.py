@@ -155,12 +155,12 @@ class DataSheet:
         sources = dict.fromkeys(item.source for item in stated if item.source)
         words = ", ".join(f"{item.path} = {item.text}" for item in stated)
         source = "; ".join((FROM + words, *sources))
-        made, structure = {}, Structure.of(design)
+        made, attributes = dict(design.parameters), dict[str, Any]()
         for path, value in values.items():
-            unit = FIELDS[path].unit(structure)
+            field, unit = FIELDS[path], FIELDS[path].unit(Structure.of(design))
             made[path] = model.Parameter(
-                path=path, text=si_text(value, unit), value=value, unit=unit, symbol=FIELDS[path].symbol,
+                path=path, text=si_text(value, unit), value=value, unit=unit, symbol=field.symbol,
                 source=source, grade=stated[0].grade)  # fmt: skip
-        attributes: dict[str, Any] = {FIELDS[path].attribute: value for path, value in values.items()}
+            attributes[field.attribute] = value
         friction = replace(design.friction, **attributes)
-        return replace(design, friction=friction, parameters=model.FrozenMap({**design.parameters, **made}))
+        return replace(design, friction=friction, parameters=model.FrozenMap(made))

@@ -11,6 +11,7 @@ from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.design.sections import RECORDS
+from actuator_lti.files.tree import Tree
 
 
 @dataclass(frozen=True)
@@ -51,7 +52,7 @@ def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
     unit = "of its quantity" if field.kind == "limit" else unit
-    same = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
+    same: Tree = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
 

@@ -100,10 +100,9 @@ def _unused(design: Design) -> Iterator[str]:
     limits, control = design.limits, design.controller
     if isfinite(limits.peak_current_A) and control.current is None:
         yield "limits.peak_current: clamps nothing, the design has no current loop"
-    if control.velocity is None:
-        for key, value in (("speed", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
-            if isfinite(value):
-                yield f"limits.{key}: clamps nothing, the design has no velocity loop"
+    for key, value in (("speed", limits.speed_rad_s), ("acceleration", limits.acceleration_rad_s2)):
+        if control.velocity is None and isfinite(value):
+            yield f"limits.{key}: clamps nothing, the design has no velocity loop"
     if design.friction.law == "tanh" and design.friction.breakaway_ratio != 1.0:
         yield "friction.breakaway_ratio: not used by the tanh law"
 

@@ -83,17 +83,6 @@ class AskedFigures:
         return max(case.peak_moment_Nm for case in self.failures.cases)
 
     @property
-    def duty_current_A(self) -> float:
-        """Of the duty, rms."""
-        return self.duty.rms_A
-
-    @property
-    def winding_degC(self) -> float | None:
-        """Of the winding under the duty, in the long run."""
-        heat = self.duty.heating
-        return None if heat is None else heat.final_degC
-
-    @property
     def limit_cycle_rad(self) -> float | None:
         """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
         swing = self.cycles.hunting

@@ -110,15 +110,13 @@ def specification(design: Design, loops: Loops | None = None) -> Specification:
     settling_s = linear_steady_state(loops, np.array([1.0])).settling_ticks * design.controller.period_s
     loads = design.validation.loads_Nm
     result = tuple(capability(design, load, settling_s) for load in loads)
-    rate = min(one.figures.output_rate_rad_s for one in result)
-    push = min(one.figures.acceleration_rad_s2 for one in result)
-    times = step_times(design, rate, push, settling_s)
+    rates = [one.figures.output_rate_rad_s for one in result]
+    pushes = [one.figures.acceleration_rad_s2 for one in result]
+    times = step_times(design, min(rates), min(pushes), settling_s)
     moves = tuple(
         move
-        for load, one in zip(loads, result, strict=True)
-        for move in manoeuvres(
-            design, load, one.figures.output_rate_rad_s, one.figures.acceleration_rad_s2, settling_s
-        )
+        for load, rate, push in zip(loads, rates, pushes, strict=True)
+        for move in manoeuvres(design, load, rate, push, settling_s)
     )
-    top = max(one.figures.output_rate_rad_s for one in result) * design.total_ratio
+    top = max(rates) * design.total_ratio
     return Specification(design, result, times, torque_speed_plane(design, top), moves)

@@ -246,15 +246,6 @@ def test_a_magnet_pitch_is_the_order_of_the_cogging() -> None:
         with_overrides(load_design("ilr33-amber"), {"motor.cogging_periods": "24 mm"})
 
 
-def test_gear_sheets_state_arc_minutes_and_torque_per_arc_minute() -> None:
-    """One arc minute is 1/60 deg: 10.3 kN m/rad are 3 N m/arcmin; 60 arcsec are an arcmin."""
-    spring = with_overrides(read_design_text(FLAT, "flat"), {"coupling.stiffness": "3 N*m/arcmin"})
-    assert spring.coupling.stiffness_Nm_rad == pytest.approx(3 * 60 * 180 / pi, rel=1e-14)
-    for text in ("1 arcmin", "60 arcsec"):
-        play = with_overrides(spring, {"coupling.play": text}).coupling
-        assert play.play_rad == pytest.approx(pi / 180 / 60, rel=1e-14)
-
-
 # --- no-load current and efficiency (model.md section 11); figures of a 24 V motor with a planetary gear ---
 SHEET = """
 [design]

@@ -99,6 +99,8 @@ WRITTEN = [
     ("5 millivolts", "V", 5e-3),
     *[(f"3 {unit}", "rad", pi / 3600) for unit in ("arc-min", "arc min", "arcmin")],
     ("2 arc-sec", "rad", pi / 324000),
+    ("60 arcsec", "rad", pi / 180 / 60),
+    ("3 N*m/arcmin", "N*m/rad", 3 * 60 * 180 / pi),
     ("1.2 kgf·m/arc-min", "N*m/rad", 1.2 * 9.80665 * 10800 / pi),
     ("1.2 kgfm/arcmin", "N*m/rad", 1.2 * 9.80665 * 10800 / pi),
     ("3 V/KRPM", "V*s/rad", 0.09 / pi),
