@@ -32,19 +32,13 @@ def doubled(number: int) -> int:
     return 2 * number
 
 
-def listening() -> set[tuple[str, int]]:
+def listening() -> list[tuple[str, int]]:
     """Addresses on which this process and its children listen (Linux)."""
     import psutil
 
     family = [psutil.Process(), *psutil.Process().children(recursive=True)]
-    found = [c for process in family for c in process.net_connections() if c.status == psutil.CONN_LISTEN]
-    return {(c.laddr.ip, c.laddr.port) for c in found}
-
-
-def shut(doors: set[tuple[str, int]]) -> bool:
-    """Whether there are doors, of this machine alone and without a page."""
-    assert {ip for ip, _ in doors} == {"127.0.0.1"}
-    return [page for _, port in doors for page in pages(port)] == []
+    result = [c for process in family for c in process.net_connections() if c.status == psutil.CONN_LISTEN]
+    return [(c.laddr.ip, c.laddr.port) for c in result]
 
 
 def pages(port: int) -> list[str]:
@@ -67,9 +61,11 @@ def answers(address: str) -> bool:
     host, port = address.removeprefix("tls://").split(":")
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname, context.verify_mode = False, ssl.CERT_NONE
-    link = socket.create_connection((host, int(port)), timeout=5)
     try:
-        with link, context.wrap_socket(link) as talk:
+        with (
+            socket.create_connection((host, int(port)), timeout=5) as link,
+            context.wrap_socket(link) as talk,
+        ):
             talk.sendall(b"x" * 64)
             return talk.recv(1) != b""
     except OSError:
@@ -79,9 +75,12 @@ def answers(address: str) -> bool:
 def test_the_local_cluster_opens_no_door() -> None:
     import distributed
 
-    before = listening()
+    before = set(listening())
     with clusters.local_cluster(1) as cluster:
-        assert shut(listening() - before)
+        doors = set(listening()) - before
+        assert doors
+        assert {ip for ip, _ in doors} == {"127.0.0.1"}
+        assert [page for _, port in doors for page in pages(port)] == []
         address = cluster.scheduler_address
         assert address.startswith("tls://")
         plain = address.replace("tls://", "tcp://")
@@ -97,18 +96,22 @@ def test_two_local_clusters_do_not_ask_for_the_same_port() -> None:
             taken.listen()
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            before = listening()
+            before = set(listening())
             with clusters.local_cluster(1), clusters.local_cluster(1):
-                assert shut(listening() - before)
+                doors = set(listening()) - before
+                assert {ip for ip, _ in doors} == {"127.0.0.1"}
+                assert [page for _, port in doors for page in pages(port)] == []
 
 
 def test_items_come_back_whole_and_an_error_goes_its_way() -> None:
-    for one in (Engine(threads=2), Engine(workers=1)):
-        got: dict[int, int] = {}
-        steps = {}
-        one.map(doubled, range(9), got.__setitem__, steps.__setitem__)
+    got: dict[int, int] = {}
+    steps: list[tuple[int, int]] = []
+    both = (Engine(threads=2), Engine(workers=1))
+    for one in both:
+        got.clear()
+        one.map(doubled, range(9), got.__setitem__, lambda *step: steps.append(step))
         assert got == {k: 2 * k for k in range(9)}
-        assert list(steps.items())[-1] == (9, 9)
+        assert steps[-1] == (9, 9)
         with pytest.raises(ValueError, match="no 13"):
             one.map(doubled, [13], got.__setitem__)
 
@@ -130,16 +133,11 @@ def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> No
 
 
 @pytest.fixture
-def importable(monkeypatch) -> None:
-    """The tasks of these tests, in the workers that are started."""
+def bare(tmp_path, monkeypatch) -> Iterator[Cluster]:
+    """A scheduler alone, which can be killed, and to which workers can be added."""
     tests = Path(__file__).parents[1]
     paths = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
     monkeypatch.setenv("PYTHONPATH", paths)
-
-
-@pytest.fixture
-def bare(tmp_path, importable) -> Iterator[Cluster]:
-    """A scheduler alone, which can be killed, and to which workers can be added."""
     cluster = Cluster(tmp_path)
     try:
         cluster.start(workers=0)
@@ -199,12 +197,6 @@ def test_a_worker_that_is_lost_over_its_proof_is_no_refusal(bare) -> None:
     assert got == {1: 2, 2: 4}
 
 
-def fails(engine: Engine, words: str, work=doubled, items=(1,), kind=NumericalError) -> None:
-    """A study on such an engine is a failure, or with another kind a refusal, in these words."""
-    with pytest.raises(kind, match=words):
-        engine.map(work, items, lambda *_: None)
-
-
 def deadly(number: int) -> int:
     os._exit(number)
 
@@ -213,8 +205,11 @@ def test_a_part_that_kills_its_workers_is_one_line(monkeypatch) -> None:
     import dask
 
     monkeypatch.setattr(clusters, "_RETRIES", 0)
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}):
-        fails(Engine(workers=1), "workers keep dying over one part", deadly, [3])
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        pytest.raises(NumericalError, match="workers keep dying over one part"),
+    ):
+        Engine(workers=1).map(deadly, [3], lambda *_: None)
 
 
 def slowly(number: int) -> int:
@@ -295,12 +290,10 @@ def test_an_engine_that_cannot_be_is_refused(options, words) -> None:
         Engine(**options).map(doubled, [1], lambda *_: None)
 
 
-NOWHERE = "127.0.0.1:9"
-
-
 def test_a_scheduler_that_is_not_there_is_a_clear_failure(monkeypatch):
     monkeypatch.setattr("analyses.studies.engine.CONNECT_S", 0.5)
-    fails(Engine(scheduler=f"tcp://{NOWHERE}"), "127")
+    with pytest.raises(NumericalError, match="127"):
+        Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
 
 
 def test_a_cluster_that_is_slow_to_close_takes_no_result_back(monkeypatch):
@@ -340,15 +333,17 @@ def test_a_scheduler_that_dies_before_the_first_part_is_the_same_line(monkeypatc
             raise ClosedClientError("Client is closed. Can't send update-graph message.")
 
     monkeypatch.setattr(Engine, "_client", lambda _self: contextlib.nullcontext(Left()))
-    fails(Engine(scheduler=f"tcp://{NOWHERE}"), r"the connection is lost; .* the same command goes on")
+    with pytest.raises(NumericalError, match=r"the connection is lost; .* the same command goes on"):
+        Engine(scheduler="tcp://127.0.0.1:9").map(doubled, [1], lambda *_: None)
 
 
 def test_certificates_that_are_none_are_named(tmp_path) -> None:
-    engine = Engine(scheduler=f"tls://{NOWHERE}", tls=tmp_path)
-    for made in clusters.TLS_FILES.values():
-        fails(engine, r"\.pem", kind=InputError)
-        (tmp_path / made).write_text("no certificate")
-    fails(engine, "", kind=(InputError, NumericalError))
+    for made in range(3):
+        with pytest.raises(InputError, match=r"\.pem"):
+            Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
+        (tmp_path / list(clusters.TLS_FILES.values())[made]).write_text("no certificate")
+    with pytest.raises((InputError, NumericalError)):
+        Engine(scheduler="tls://127.0.0.1:9", tls=tmp_path).map(doubled, [1], lambda *_: None)
 
 
 HUNGRY = 1_500_000_000
@@ -356,11 +351,13 @@ LEAN = 1_000  # MB
 
 
 @pytest.fixture
-def cluster(tmp_path, importable):
+def cluster(tmp_path, monkeypatch):
     """A scheduler with TLS and two workers, known by its address and a folder of certificates."""
     import distributed
     from distributed.security import Security
 
+    tests = Path(__file__).parents[1]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "nightly", tests.parent))))
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()
@@ -383,15 +380,18 @@ def test_a_night_on_a_cluster_ends_like_one_here(cluster, tmp_path) -> None:
         job("is killed", mode="die"),
         job("eats", mode="eat", bytes=HUNGRY),
     ]
-    nights = {}
-    for place, where in (("here", {}), ("there", remote)):
-        asked = Fakes(time_limit_s=8.0, memory_limit=LEAN, **where)
-        nights[place] = run_night(study(*jobs), tmp_path / place, asked, code=CODE)
-        assert {d.name: d.result.status for d in nights[place].designs} == {
-            "good": "pass", "fails": "fail", "raises": "error", "never ends": "timeout", "is killed": "crash",
-            "eats": "error",
-        }  # fmt: skip
-    there = nights["there"]
+    here, there = (
+        run_night(
+            study(*jobs), tmp_path / place, Fakes(time_limit_s=8.0, memory_limit=LEAN, **where), code=CODE
+        )
+        for place, where in (("here", {}), ("there", remote))
+    )
+    ends = {d.name: d.result.status for d in there.designs}
+    assert ends == {d.name: d.result.status for d in here.designs}
+    assert ends == {
+        "good": "pass", "fails": "fail", "raises": "error", "never ends": "timeout", "is killed": "crash",
+        "eats": "error",
+    }  # fmt: skip
     messages = {d.name: d.result.message for d in there.designs}
     assert "--memory-limit" in messages["eats"]
     assert "signal 9" in messages["is killed"]
