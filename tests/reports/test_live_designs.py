@@ -136,7 +136,8 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     design = load_design(name)
     page = opens(design)
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
-    page.wait_for_function("JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length")
+    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    page.wait_for_function(drawn)
     page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert len(cells) == 18 * 12

@@ -134,7 +134,8 @@ def test_a_slider_let_go_after_an_undo_holds_where_it_stands(page: Page) -> None
 
 def test_the_map_is_drawn_though_it_is_seen_before_the_page_is_ready(opens) -> None:
     page = opens(AMBER, first=WATCHED + EARLY)
-    page.wait_for_function("JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length")
+    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    page.wait_for_function(drawn)
 
 
 def test_of_several_sights_told_at_once_the_last_counts(opens) -> None:
