@@ -10,7 +10,7 @@ from typing import Any
 
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import MotorConstants, no_load_speed
+from actuator_lti.design.plant import MotorConstants, Temperature, no_load_speed
 from actuator_lti.design.sections import part_at
 from actuator_lti.design.spellings import split_quantity
 from actuator_lti.files.reading import shown
@@ -154,13 +154,12 @@ def _without(key: str, design: Design) -> str:
 
 def check_temperature(design: Design) -> Iterator[Refusal]:
     """What heat leaves of R, kM and kE."""
-    for key in ("winding", "magnet") if design.temperature is not None else ():
-        yield from readable(_hot(design.temperature, key))
+    if (heat := design.temperature) is not None:
+        yield from readable(_hot(heat, "winding", heat.winding_degC, heat.resistance_per_K))
+        yield from readable(_hot(heat, "magnet", heat.magnet_degC, heat.magnet_per_K))
 
 
-def _hot(heat: Any, key: str) -> Iterator[Refusal]:
-    value = getattr(heat, f"{key}_degC")
-    per_K = heat.resistance_per_K if key == "winding" else heat.magnet_per_K
+def _hot(heat: Temperature, key: str, value: float, per_K: float) -> Iterator[Refusal]:
     if 1.0 + per_K * (value - heat.reference_degC) < 0.05:
         yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
 
@@ -209,14 +208,12 @@ def _bends(design: Design) -> Iterator[Refusal]:
     coupling = design.coupling
     if coupling is None:
         return
-    bends = [(coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad)]
-    bends.append((coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad))
-    for number, (torque, stiffness) in enumerate(bends, 1):
+    for number, (torque, stiffness) in enumerate(coupling.bends, 1):
         key, beside = f"coupling.torque_{number}", f"coupling.stiffness_{number + 1}"
         if (torque is None) != (stiffness is None):
             given, missing = (key, beside) if stiffness is None else (beside, key)
             yield given, f"{torque or stiffness:g}", f"allowed with {missing} beside it"
-    first, second = bends[0][0], bends[1][0]
+    first, second = coupling.torque_1_Nm, coupling.torque_2_Nm
     if second is not None and (first is None or first >= second):
         allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
         yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"

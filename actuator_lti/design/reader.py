@@ -117,31 +117,25 @@ class Reader:
 
     def refuse(self, path: str, value: object, reason: str) -> Any:
         """Note the mistake of one key, which is unread."""
-        self.findings.note(path, shown(value), reason)
-        return UNREAD
+        return self.unread(path, reason, shown(value))
 
-    def unread(self, path: str, reason: str) -> Any:
+    def unread(self, path: str, reason: str, value: str = "") -> Any:
         """The same of a key without a value to show."""
-        self.findings.note(path, "", reason)
+        self.findings.note(path, value, reason)
         return UNREAD
 
-    def missing(self, path: str, field: Field | None = None) -> Any:
-        """Note that a key is missing, which is unread."""
-        return self.unread(path, f"missing{_example(field)}")
-
-    def known(self, table: Tree, known: Iterable[str], path: str) -> dict[str, str]:
+    def known(self, table: Tree, known: Collection[str], path: str) -> dict[str, str]:
         """Note unknown keys; gives those that they are near to, with what only renames one."""
-        known, meant = list(known), dict[str, str]()
-        for key in table:
-            if key not in known:
-                word = key_for(path, key, known)
-                word += _time_said(word, table, key)
-                said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
-                hint = said if word else nearest(key, known)
-                where = f"{path}.{key}" if path else key
-                self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
-                named = [] if word.startswith("not needed") else known  # what is not needed stands for no key
-                for one in (one for one in named if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint)):
+        meant: dict[str, str] = {}
+        for key in (key for key in table if key not in known):
+            word = key_for(path, key, known)
+            word += _time_said(word, table, key)
+            said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
+            hint = said if word else nearest(key, known)
+            where = f"{path}.{key}" if path else key
+            self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
+            for one in () if word.startswith("not needed") else known:  # that stands for no key
+                if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint):
                     renamed = key if word.partition(", which takes")[0] == one else ""
                     meant[one] = meant.get(one) or renamed
         return meant
@@ -157,7 +151,7 @@ class Reader:
             word = key_for(path.rpartition(".")[0], path.rpartition(".")[2])
             number = f"; a number of that name is {word}" if word else ""
             allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}{number}"
-            self.missing(path) if table is None else self.refuse(path, table, allowed)
+            self.unread(path, "missing") if table is None else self.refuse(path, table, allowed)
             return {}, ()
         fields, stated = fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
@@ -177,7 +171,7 @@ class Reader:
             elif field.key in meant:
                 values[field.attribute] = self.parameters[where] = UNREAD
             elif field.required and not (field.key == "gain" and "law" in table):
-                values[field.attribute] = self.missing(where, field)
+                values[field.attribute] = self.unread(where, f"missing{_example(field)}")
         return values, meant
 
     def value(self, field: Field, table: Tree, path: str) -> Any:
@@ -196,20 +190,19 @@ class Reader:
         raw = raw.isoformat() if field.kind == "day" and isinstance(raw, date) else raw
         if _fits(field, raw):
             return raw
-        hint = nearest(raw, field.choices).strip() if field.choices and isinstance(raw, str) else ""
+        hint = nearest(raw, field.choices).strip() if isinstance(raw, str) else ""
         return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {field.allowed('1')}")
 
     def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
         """Some of the words that a key may have, each once."""
-        known = raw if isinstance(raw, list) and all(isinstance(word, str) for word in raw) else []
-        if not known or len({*known}) != len(known):
-            return self.refuse(path, raw, f"allowed: a list of {', '.join(field.choices)}, each at most once")
-        read = tuple(known)
-        for word in known:
-            if word not in field.choices:
-                hint = nearest(word, field.choices)
-                read = self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
-        return read
+        known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
+        texts = all(isinstance(word, str) for word in known)
+        if not known or not texts or len({*known}) != len(known):
+            return self.refuse(path, raw, f"allowed: a list of {allowed}, each at most once")
+        strange = [word for word in known if word not in field.choices]
+        for word in strange:
+            self.refuse(path, word, f"unknown{nearest(word, field.choices)}; allowed: {allowed}")
+        return UNREAD if strange else tuple(known)
 
     def entry(self, field: Field, raw: Any, path: str, into: dict[str, model.Parameter]) -> Any:
         """A value with its pedigree, which is kept."""
@@ -217,7 +210,7 @@ class Reader:
         table = raw if isinstance(raw, dict) else {"value": raw}
         self.known(table, _ENTRY, path)
         if "value" not in table:
-            return self.missing(f"{path}.value", field)
+            return self.unread(f"{path}.value", f"missing{_example(field)}")
         for key in ("source", "grade"):
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
@@ -394,9 +387,9 @@ class Reader:
         raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
         values, meant = self.values(section.template, raw, path, names)
-        values |= self.tables(section.path, raw, meant)
         if not isinstance(raw, dict):
             return UNREAD
+        values |= self.tables(section.path, raw, meant)
         if section.many == "named":
             values["name"] = raw["name"] if path == f"{section.path}.{raw.get('name')}" else UNREAD
         if section.kind is model.Requirement:
@@ -411,19 +404,18 @@ class Reader:
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
         held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
         twice = [key for key in held if key in rest]
-        if not isinstance(file, str) or twice:
-            self.refuse(f"{path}.file", file, f"allowed: a file's name, without {', '.join(twice) or 'more'}")
-            return {**held, **rest}
         try:
+            if not isinstance(file, str) or twice:
+                raise InputError(f"allowed: a file's name, without {', '.join(twice) or 'more'}")
             held = read_law(self.findings.folder / file)
         except InputError as error:
             self.refuse(f"{path}.file", file, error.message)
         return {**held, **rest}
 
-    def tables(self, path: str, table: Any, meant: Iterable[str] = ()) -> Tree:
+    def tables(self, path: str, table: Tree, meant: Iterable[str]) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
         result: Tree = {}
-        for section in children(path) if isinstance(table, dict) else ():
+        for section in children(path):
             if section.key in meant and section.key not in table:
                 result[section.attribute] = UNREAD
             elif section.many:
@@ -472,7 +464,7 @@ class Reader:
     def objects(self, raw: Any) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         try:
-            return objects_from({} if raw is None else raw, self.findings.where)
+            return objects_from({} if raw is None else raw)
         except InputError as error:
             self.unread("objects", error.message)
         return model.ControllerObjects()
@@ -494,8 +486,7 @@ class Reader:
 def _meant(table: Tree, path: str) -> Any:
     """The word of a key on which the reading of others depends: where it is none, the nearest."""
     field = FIELDS[path]
-    default = field.choices[0]
-    return meant_of(f"{table.get(field.key, default)}", field.choices) or default
+    return meant_of(f"{table.get(field.key, field.default)}", field.choices) or field.default
 
 
 def _rows_flat(raw: Any) -> Any:
@@ -533,9 +524,7 @@ def _time_said(word: str, table: Tree, key: str) -> str:
     return ""
 
 
-def _example(field: Field | None) -> str:
-    if field is None:
-        return ""
+def _example(field: Field) -> str:
     example = f'example: {field.key} = "{field.example}" ({field.description})'
     return f"; {example if field.example else field.description}"
 

@@ -45,9 +45,8 @@ _COLUMNS = [
 
 
 def asked_words(result: Duty) -> str:
-    scale, unit = output_unit(result.design.axis)
     asked = result.asked
-    words = f"±{scale * asked.amplitude_rad:.3g} {unit} at {asked.frequency_hz:.3g} Hz"
+    words = f"±{output_unit(result.design.axis).of(asked.amplitude_rad)} at {asked.frequency_hz:.3g} Hz"
     words += f" under {asked.load_Nm:.3g} {load_unit(result.design)}"
     if asked.share < 1.0:
         words += f", {100.0 * asked.share:.3g} % of every {asked.cycle_s:.3g} s"

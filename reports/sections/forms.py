@@ -109,13 +109,13 @@ EXACT_COLUMNS = [
 def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigures]) -> doc.Section:
     """Make the section; ``stages`` are the loops with the outer ones open."""
     rows: list[doc.Row] = []
-    reasons: list[str] = []
     for name, point in points.items():
-        own = [result for result in stages.values() if result.loop.break_point == name]
-        rows += [_break_point(name, "outer ones open", result) for result in own]
-        rows.append(_break_point(name, "all closed", point.figures))
-        reasons += [f"{POINTS.get(name, name)}: {point.reason}."] if point.reason else []
+        own = [("outer ones open", one) for one in stages.values() if one.loop.break_point == name]
+        for others, one in (*own, ("all closed", point.figures)):
+            found = margin_row(one) if one else {"stable": "see below"}
+            rows.append({"point": POINTS.get(name, name), "others": others, **found})
     note = "The outermost loop has no other loop outside it, so its two lines agree."
+    reasons = [f"{POINTS.get(name, name)}: {point.reason}." for name, point in points.items() if point.reason]
     there = {POINTS.get(name, name): one.figures for name, one in points.items() if one.figures is not None}
     blocks = [doc.table("Break-point matrix", BREAK_COLUMNS, rows, note)]
     blocks += map(doc.text, [*reasons, *evidence_notes(there)])
@@ -126,10 +126,8 @@ def break_points(points: Mapping[str, BreakPoint], stages: Mapping[str, LoopFigu
         "In the finished drive a gain error or a delay occurs at one point, with every other loop closed. "
         "The matrix shows what the drive tolerates at each point."
     )
-    status = worst_status([point.stable for point in points.values()])
-    return doc.section(
-        "break-points", "Break-point matrix", blocks, result=_most_sensitive(rows), intro=intro, status=status
-    )
+    status, words = worst_status([point.stable for point in points.values()]), _most_sensitive(rows)
+    return doc.section("break-points", "Break-point matrix", blocks, result=words, intro=intro, status=status)
 
 
 def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -141,11 +139,6 @@ def _most_sensitive(rows: Sequence[Mapping[str, Any]]) -> str:
     of = f" (the {' and the '.join(unknown)} left out)" if unknown else ""
     place = f"{row['point']}{of}: peak of S {row['s_peak_db']:.2f} dB"
     return f"With all loops closed the drive is most sensitive at the {place}."
-
-
-def _break_point(name: str, others: str, figures: LoopFigures | None) -> doc.Row:
-    found = margin_row(figures) if figures else {"stable": "see below"}
-    return {"point": POINTS.get(name, name), "others": others, **found}
 
 
 def operating_points(points: Sequence[OperatingPointFigures], design: Design) -> doc.Section:

@@ -26,12 +26,10 @@ LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of t
 
 def section(result: Motion) -> doc.Section:
     run, ended = result.run, conduct(result.run, result.design.validation.full_deflection_rad)
-    detail = f" ({ended.detail})" if ended.detail else ""
-    blocks = [_table(run), _limits(run), *([_energy(run)] if run.energy else [])]
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
-    status: doc.Status = "info" if ended.wanted else "warn"
-    words = f"{run.time_s.size} rows, status {ended.status}{detail}"
-    return doc.section("simulate", "Motion", [figure, *blocks], result=words, status=status)
+    blocks = [figure, _table(run), _limits(run), *([_energy(run)] if run.energy else [])]
+    words = f"{run.time_s.size} rows, status {ended.status}" + f" ({ended.detail})" * bool(ended.detail)
+    return doc.section("simulate", "Motion", blocks, result=words, status="info" if ended.wanted else "warn")
 
 
 def data(result: Motion) -> Tree:
@@ -102,10 +100,7 @@ def _limits(run: Trajectory) -> doc.Block:
 def _energy(run: Trajectory) -> doc.Block:
     assert run.energy is not None
     values = {**vars(run.energy), "balance, relative": run.energy.relative_error}
-    rows = [
-        {"what": n.removesuffix("_J").replace("_", " "), "value": value, "unit": "J" if "_J" in n else ""}
-        for n, value in values.items()
-    ]
+    rows = [(n.removesuffix("_J").replace("_", " "), v, "J" * n.endswith("_J")) for n, v in values.items()]
     return doc.table("Where the electrical energy went", COLUMNS, rows)
 
 

@@ -75,7 +75,7 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
     chart = style.Chart(width=style.WIDE, height=420.0)
     top, bottom = chart.column(1.2, 1.0)
     top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
-    phases = [np.degrees(np.unwrap(np.angle(curve.stiffness_Nm_rad))) for curve in shown]
+    phases = [style.phases(curve.stiffness_Nm_rad) for curve in shown]
     for k, (curve, phase) in enumerate(zip(shown, phases, strict=True)):
         top.curve(curve.frequency_hz, np.abs(curve.stiffness_Nm_rad), STATES[curve.state], **style.series(k))
         bottom.curve(curve.frequency_hz, phase, STATES[curve.state], **style.series(k))
@@ -104,19 +104,20 @@ def _or_infinite(stiffness: float) -> float | str:
 
 
 def _lost_motion(result: Stiffness) -> doc.Block:
-    scale, unit = output_unit(result.design.axis)
+    size = output_unit(result.design.axis).column("sig:4")
     lost = result.lost_motion
     assert lost is not None
-    columns = [doc.column("what", "What")]
-    for key, words in (("foreseen", "Predicted"), ("seen", "Simulated")):
-        columns.append(doc.column(key, words, unit, format="sig:4"))
-    seen = None if lost.seen_rad is None else scale * lost.seen_rad
-    rows = [("play", scale * lost.play_rad, None), ("lost motion", scale * lost.foreseen_rad, seen)]
+    columns = [
+        doc.of(lambda row: row[0], "what", "What"),
+        doc.of(lambda row: row[1], "foreseen", "Predicted", **size),
+        doc.of(lambda row: row[2], "seen", "Simulated", **size),
+    ]
+    rows = [("play", lost.play_rad, None), ("lost motion", lost.foreseen_rad, lost.seen_rad)]
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
         f"the largest load {_push(result)}, which goes slowly to either side."
     )
-    return doc.table("Lost motion at the output", columns, rows, note)
+    return doc.listing("Lost motion at the output", rows, columns, note)
 
 
 def _at_rest(result: Stiffness, unit: str) -> doc.Block:

@@ -112,10 +112,10 @@ def confirmed(result: TuningResult) -> doc.Block:
 
 
 def _curve(result: TuningResult) -> doc.Block:
-    limits = {(r.id, r.unit): r.limit for r in result.requirements}
+    limits = {(r.id, r.unit) for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
-    margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
+    margin = style.known(q.minimum for q in wanted if q.quantity == "phase_margin")
     chart = style.Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
     panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
@@ -124,7 +124,7 @@ def _curve(result: TuningResult) -> doc.Block:
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
     ):
-        chosen = [(a, b) for a, b, p in zip(x, y, result.trade_off, strict=True) if p.feasible is ok]
+        chosen = [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]
         if chosen:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
@@ -138,10 +138,9 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    scale, unit = output_unit(result.design.axis)
     columns = [
         doc.of("corner", "corner", "Design"),
-        doc.of("amplitude_rad", "amplitude", "Step", unit, scale=scale, format="sig:3"),
+        doc.of("amplitude_rad", "amplitude", "Step", **output_unit(result.design.axis).column()),
         doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),

@@ -2,11 +2,18 @@
 
 import io
 import unicodedata
+from pathlib import Path
 
 import pypdf
 import pytest
 from built_report import Built
 
+AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"  # by `make page`
+FOUND = """() => axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) => violations
+    .filter(({ impact }) => ["serious", "critical"].includes(impact))
+    .map(({ id, nodes }) => [id, nodes[0].html]))"""
+STOPS = """[...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")]
+    .filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility()).length"""
 OPEN_ALL = (
     "document.querySelectorAll('main details, figure[hidden]').forEach((one) => {"
     " one.open = true; one.hidden = false; })"
@@ -138,3 +145,12 @@ def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Buil
         last = sheet.extract_text().strip().splitlines()[-1].strip()
         assert last not in titles
         assert last not in results
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make page")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious_and_few_stops_to_tab(opens, built: Built, scheme: str) -> None:
+    page = opens(built.page, bypass_csp=True, color_scheme=scheme)
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    assert page.evaluate(FOUND) == []
+    assert page.evaluate(STOPS) < 220

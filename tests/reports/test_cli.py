@@ -11,6 +11,7 @@ import typer
 
 from actuator_lti.design.loader import design_text
 from reports.cli.app import build
+from reports.cli.progress import progress
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
@@ -175,8 +176,6 @@ def test_a_closed_pipe_is_no_error() -> None:
 
 
 def test_progress_stays_off_where_nobody_looks(capsys) -> None:
-    from reports.cli.progress import progress
-
     with progress("work") as report:
         report(1, 2)
     assert capsys.readouterr().err == ""

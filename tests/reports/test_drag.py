@@ -7,11 +7,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from live_page import read, settled, written
+from live_page import read, settled
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
@@ -56,14 +55,9 @@ def drive() -> Design:
     return replace(amber, controller=replace(amber.controller, velocity=replace(velocity, filters=(notch,))))
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
-    return written(drive(), tmp_path_factory.mktemp("drag"))
-
-
 @pytest.fixture
-def page(opens, made: Path) -> Page:
-    result = opens(made)
+def page(opens) -> Page:
+    result = opens(drive())
     settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
     result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
     return result

@@ -31,6 +31,7 @@ from reports.sections.answer import believed
 from reports.sections.cycles import section as cycles_section
 from reports.sections.large_signal import _shift_table
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
+from reports.sections.names import Unit
 from reports.terminal import print_blocks
 
 
@@ -153,7 +154,7 @@ def test_friction_is_not_blamed_for_another_limit() -> None:
         np.array([1.0, 5.0]), np.array([0.1, 0.2]), np.array([0.11, 0.3]), ("current", "overload"),
         ("current", "current"), 1e-3,
     )  # fmt: skip
-    table = _shift_table(shift, load_design("ilr33-amber"), 1.0, "rad")
+    table = _shift_table(shift, load_design("ilr33-amber"), Unit(1.0, "rad"))
     assert [row["shift"] for row in table["rows"]] == [pytest.approx(10.0), None]
     assert "overload protection takes longer" in table["note"]
 

@@ -11,15 +11,7 @@ from toleranced import QUICK, need, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
 from actuator_lti.design import with_values
-from actuator_lti.design.model import (
-    Controller,
-    Design,
-    Friction,
-    Limits,
-    Motor,
-    PositionLoop,
-    Validation,
-)
+from actuator_lti.design.model import Controller, Design, Friction, Limits, Motor, PositionLoop, Validation
 from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
