@@ -50,18 +50,16 @@ def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
-    same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
     unit = "of its quantity" if field.kind == "limit" else unit
+    same = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
 
 
 def _default(field: Field, unit: str) -> str:
     value = field.default
-    if value in (None, "", ()):
-        return ""
-    if value == inf:
-        return "none"
+    if value in (None, "", inf):
+        return "none" if value == inf else ""
     if isinstance(value, bool):
         return f"{value}".lower()
     if isinstance(value, tuple):

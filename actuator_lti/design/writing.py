@@ -22,6 +22,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
+from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
@@ -123,8 +124,7 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     design : Design
     overrides : mapping
         Dotted path to text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
-        "gear.worm.ratio": 40, "design.name": "variant"}``.  A number replaces the value and drops its
-        source; a table replaces the whole entry.
+        "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry.
 
     Raises
     ------
@@ -174,10 +174,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
 def read_value(design: Design, path: str, text: str | float) -> float:
     """A numeric key's value in SI as the design's file would have it from this text; a bare number is in SI.
 
-    Raises
-    ------
-    InputError
-        For an unknown key, a wrong unit, or a value that the key does not allow.
+    An InputError for an unknown key, a wrong unit, or a value that the key does not allow.
     """
     field, _ = located(design, path)
     with suppress(ValueError):
@@ -236,11 +233,7 @@ def design_hash(design: Design) -> str:
     content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
     content |= {"waivers": [asdict(item) for item in design.waivers]} if design.waivers else {}
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
-    content["tolerances"] = {
-        path: _canonical(item.tolerance)
-        for path, item in sorted(design.parameters.items())
-        if item.tolerance is not None
-    }
+    content["tolerances"] = {path: _canonical(tolerance) for path, _, tolerance in tolerances(design)}
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -253,6 +246,4 @@ def _canonical(value: Any) -> Any:
         return {name: _canonical(getattr(value, name)) for name in names}
     if isinstance(value, tuple):
         return [_canonical(item) for item in value]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    return format(float(value), ".12g")
+    return value if isinstance(value, bool | str | None) else format(float(value), ".12g")

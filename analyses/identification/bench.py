@@ -194,10 +194,15 @@ def _items(
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
     yield size
-    yield verdict.rows_item(model.rows_used, len(model.names))
+    rows, least = model.rows_used, verdict.ROWS_EACH * len(model.names)
+    why = f"{rows} rows for {len(model.names)} parameters, {least} wanted: take a longer record"
+    yield verdict.Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
     yield verdict.residual_item(model.relative_residual, limit)
     yield from verdict.offset_items(design, model)
-    yield from verdict.kept_items(model, held, design.axis)
+    for name, kept in model.fixed.items():  # what these records neither confirm nor deny
+        if kept.value and name not in held:
+            label = parameter(name, design.axis).label
+            yield verdict.Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
     for record in right.records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():

@@ -34,18 +34,15 @@ alike by chance are no cause."""
 FEW = 2.0
 """Least factor of a cause that only two values tell."""
 
+TORQUES = dict.fromkeys(("inertia", "dry", "viscous", "load", "gravity"), 1.0)
 CAUSES: Mapping[str, Mapping[str, float]] = {
-    "the scale of the current": {
-        "inertia": 1, "dry": 1, "viscous": 1, "load": 1, "gravity": 1, "resistance": -1
-    },
-    "the torque constant (and back-EMF constant)": {
-        "inertia": 1, "dry": 1, "viscous": 1, "load": 1, "gravity": 1, "back": -1
-    },
-    "the scale of angle and speed: counts, pole pairs, or the reduction": {
-        "inertia": 1, "viscous": 1, "back": 1
-    },
-    "the clock": {"inertia": 2, "viscous": 1, "back": 1},
-}  # fmt: skip
+    "the scale of the current": {**TORQUES, "resistance": -1.0},
+    "the torque constant (and back-EMF constant)": {**TORQUES, "back": -1.0},
+    "the scale of angle and speed: counts, pole pairs, or the reduction": dict.fromkeys(
+        ("inertia", "viscous", "back"), 1.0
+    ),
+    "the clock": {"inertia": 2.0, "viscous": 1.0, "back": 1.0},
+}
 """What a factor in one of these does to the identified values: its powers."""
 
 
@@ -141,12 +138,12 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])
-        told = [one for one, power in zip(values, g, strict=True) if power]
-        if len(told) < 2 or not np.any(g):
+        told = np.count_nonzero(g)
+        if told < 2:
             continue
         a, b = g / close, x / close
         factor = float(a @ b) / float(a @ a)
-        if len(told) < LEAST_VALUES and abs(factor) < log(FEW):
+        if told < LEAST_VALUES and abs(factor) < log(FEW):
             continue
         level = float(chi2.sf(float(np.sum((b - factor * a) ** 2)), len(x) - 1))
         if level > EXPLAINED:

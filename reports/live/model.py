@@ -21,7 +21,7 @@ from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRAC
 from analyses.large_signal.tones import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.relations import relation_statements
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
@@ -46,7 +46,7 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
     if not design.controller.stages:
         return {"refused": OPEN}
     try:
-        row = exported(design).row
+        row = exported_row(design)
     except InputError as refused:
         return {"refused": f"{refused}."}
     limited = [one for one in design.requirements if one.quantity in DRIVE_QUANTITIES]
