@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from math import isfinite
 from numbers import Integral
 from reprlib import Repr
@@ -33,6 +34,15 @@ class InputError(ValueError):
         super().__init__("".join(c if c.isprintable() else "?" for c in line))
         self.message = message
         self.where = where
+
+
+@contextmanager
+def in_file(where: str) -> Iterator[None]:
+    """Name the file of what is refused inside, where nothing nearer has been named."""
+    try:
+        yield
+    except InputError as error:
+        raise error if error.where else InputError(error.message, where=where) from None
 
 
 class Mistakes(InputError):

@@ -33,8 +33,8 @@ class Option:
     argument: bool = False
 
 
-def options(request: type) -> dict[str, tuple[Any, Option]]:
-    """Type and option of every field of a request, by field.
+def options(request: type | None) -> dict[str, tuple[Any, Option]]:
+    """Type and option of every field of a request, by field; nothing where nothing is asked.
 
     Examples
     --------
@@ -43,7 +43,7 @@ def options(request: type) -> dict[str, tuple[Any, Option]]:
     'amplitude'
     """
     result = {}
-    for name, hint in get_type_hints(request, include_extras=True).items():
+    for name, hint in get_type_hints(request or object, include_extras=True).items():
         if get_origin(hint) is Annotated:
             kind, *more = get_args(hint)
             result[name] = (kind, next(one for one in more if isinstance(one, Option)))

@@ -180,7 +180,6 @@ def design_report(
 
 
 def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | None) -> str:
-    """Say which move mends the weakest point, where it is beyond its limit."""
     if point is None or survey is None or point.reserve >= 0.0:
         return ""
     move = attempt("move that mends the weakest point", lambda: mending(point, survey, bounds), None)
@@ -221,7 +220,6 @@ def validation_sections(design: Design, progress: Progress | None = None) -> lis
 
 
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
-    """Make the sections about the linear loops, verdicts first."""
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
         "Requirements": lambda: requirements.section(verdicts, load_unit(design)),

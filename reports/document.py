@@ -211,7 +211,6 @@ def remark(words: str) -> Block:
 
 
 def fact(label: str, value: Any, unit: str = "", *, better: int = 0) -> FactItem:
-    """Make one item of `facts`; ``better`` as in `column`."""
     made: FactItem = {"label": label, "value": plain(value), "unit": unit}
     return {**made, "better": better} if better else made
 

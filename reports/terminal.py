@@ -58,7 +58,6 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
 
 
 def print_verdict(passed: bool | Verdict, words: str) -> None:
-    """Print the first line of an answer: a verdict, or whether all is well, and why."""
     verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
     line = Text().append(HEADS[verdict], style=COLOURS[verdict.role()])
     console().print(line.append(f"  {printable(prose(words))}"), soft_wrap=True)
@@ -77,7 +76,6 @@ def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, nam
 
 
 def _print(block: Mapping[str, Any], out: Console) -> None:
-    """Print one block; a table that is too wide for the terminal is stacked."""
     wrapped = WRAPPED
     if block["kind"] == "verdicts":
         block, wrapped = verdict_table(block), VERDICT_WRAPPED
@@ -120,7 +118,6 @@ def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Ta
 
 
 def _fits(laid: Table, out: Console) -> bool:
-    """Whether no word and no number of a table has to be broken."""
     return Measurement.get(out, out.options.update(width=10_000), laid).minimum <= out.width
 
 
@@ -135,7 +132,6 @@ def stacked(block: Mapping[str, Any]) -> Text:
 
 
 def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
-    """Write cells one after the other, each by its label; what is not there is left out."""
     cells = [(column, _cell(value, column["format"])) for column, value in said]
     there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
     for number, (column, cell) in enumerate(there):

@@ -47,7 +47,6 @@ def judged(blocks: Iterable[Mapping[str, Any]]) -> list[Any]:
 
 
 def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
-    """Count the verdicts of some blocks, each kind by itself."""
     kinds: dict[str, Tally] = {}
     for block in blocks:
         if block["kind"] == "verdicts" and block["items"]:
@@ -85,7 +84,6 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
 
 
 def walk(part: Mapping[str, Any]) -> Iterable[Block]:
-    """Give every block of a section or block, those inside details too."""
     for block in part.get("blocks", ()):
         yield block
         yield from walk(block)
@@ -94,9 +92,7 @@ def walk(part: Mapping[str, Any]) -> Iterable[Block]:
 def open_items(sections: Iterable[Mapping[str, Any]]) -> list[str]:
     """Name what is not met, or not proven and not waived, with the reason or with value and limit."""
     every = judged(block for part in sections for block in walk(part))
-    items = sorted(
-        (one for one in every if role(one) in ("fail", "warn")), key=lambda one: role(one) != "fail"
-    )
+    items = [one for colour in ("fail", "warn") for one in every if role(one) == colour]
     return list(dict.fromkeys(f"{item['verdict']}: {item['label']}{_found(item)}" for item in items))
 
 
@@ -138,9 +134,9 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
     >>> verdict_lines({"parts": {"requirements": {}}})
     [('the design states no requirements', 'info')]
     """
-    lines: list[tuple[str, Role]] = []
-    for key, word, colour in _SECTIONS:
-        lines += [(f"{word}: {'; '.join(titles)}", colour)] if (titles := verdict.get(key)) else []
+    lines: list[tuple[str, Role]] = [
+        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
+    ]
     for what, counts in verdict["parts"].items():
         count = Tally(**counts)
         words = count.words(WORDS.get(what, what))

@@ -105,13 +105,3 @@ def root(m, factors, kind, level, parts, left, right, at):
         if near:
             break
     return w
-
-
-@kernel
-def gain_bounds(m, factors, count, low, high, least, most, parts, bounds):
-    """Fill the range of the gain over each of many intervals, between places."""
-    for k in range(count):
-        evaluated(m, factors, low[k], parts, 0)
-        evaluated(m, factors, high[k], parts, slot(m))
-        bounded(m, factors, parts, 0, slot(m), bounds)
-        least[k], most[k] = math.exp(bounds[0]), math.exp(bounds[MOST])

@@ -18,7 +18,6 @@ LIBRARY = Library(
         Entry(f"{__package__}._search", "search", (*_LOOP, *_ASKED, "int", *(_ROW,) * 6), "int"),
         Entry(f"{__package__}._nearest", "nearest", (*_LOOP, "int", *(_ROW,) * 5), "int"),
         Entry(f"{__package__}._factors", "evaluated", (*_LOOP, "float", _ROW, "int")),
-        Entry(f"{__package__}._factors", "gain_bounds", (*_LOOP, "int", *(_ROW,) * 6)),
     ),
     source_files(_FOLDER, wanted="_*.py"),
 )

@@ -26,23 +26,15 @@ def paths_of(design: Design) -> tuple[str, ...]:
         for section, path, part in parts_of(design)
         if not (section.rare and part == section.kind())
         for field in fields_in(section.template)
-        if field.is_number and _has_value(field, getattr(part, field.attribute))
+        if field.is_number
+        and (value := getattr(part, field.attribute)) is not None
+        and value != inf
+        and (value != 0.0 or field.accepts(value))  # 0: the gain of a stage with a law of one's own
     )
 
 
-def _has_value(field: Field, value: float | None) -> bool:
-    """Whether a key is there; the gain of a stage with a law of one's own is 0, which no gain may be."""
-    return value is not None and value != inf and (value != 0.0 or field.accepts(value))
-
-
 def located(design: Design, path: str) -> tuple[Field, Any]:
-    """The field of a numeric path and the part of the design that holds it.
-
-    Raises
-    ------
-    InputError
-        If there is no such key, or the design has no such stage.
-    """
+    """The field of a numeric path and the part of the design that holds it; an InputError for any other."""
     if not isinstance(design, Design) or not isinstance(path, str):
         given = f"design = {shown(design)}, key = {shown(path)}"
         raise InputError(f"{given}: allowed: a Design (load_design) and a dotted key")
@@ -122,10 +114,16 @@ def _allowed(design: Design, path: str, value: float) -> float | int:
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{path} = {shown(value)}: allowed: a number")
     number, whole = float(value), field.kind == "integer"
-    if not field.accepts(number) or (whole and number != int(number)):
+    if not field.fits(number):
         allowed = "a whole number, " * whole + field.allowed(field.unit(Structure.of(design)))
         raise InputError(f"{path} = {number!r}: allowed: {allowed}")
     return int(number) if whole else number
+
+
+def unit_in_file(design: Design, path: str, field: Field | None) -> str:
+    """The SI unit of a key as a file has to say it; ``"1"`` for what is no key with one."""
+    unit = "1" if field is None else field.unit(Structure.of(design))
+    return ampere_unit(path, unit, design.motor.constants)
 
 
 def _changed(design: Design, path: str, value: float) -> Parameter:
@@ -133,8 +131,7 @@ def _changed(design: Design, path: str, value: float) -> Parameter:
     old, (field, _) = design.parameters.get(path), located(design, path)
     if old is not None and old.value == value:
         return old
-    unit = field.unit(Structure.of(design))
-    text = si_text(value, ampere_unit(path, unit, design.motor.constants))
+    text, unit = si_text(value, unit_in_file(design, path, field)), field.unit(Structure.of(design))
     new = Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
     if old is None:
         return new

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields, replace
-from math import isfinite
-from numbers import Real
-from typing import Any
+from contextlib import suppress
+from dataclasses import replace
 
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.checks_control import CONTROL_CHECKS
-from actuator_lti.design.checks_plant import PLANT_CHECKS, check_motor, check_place, check_temperature
+from actuator_lti.design.checks_plant import (
+    PLANT_CHECKS,
+    check_motor,
+    check_place,
+    check_temperature,
+    with_stand_ins,
+)
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
-from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.sections import part_at, parts_of
 from actuator_lti.files.reading import shown
@@ -23,14 +27,9 @@ CHECKS = "validation"  # what the ids of checks by simulation begin with
 
 
 def check_design(design: Design, where: str) -> None:
-    """Refuse a design that no file may hold: values out of range, or that contradict each other.
+    """Refuse a design of the file ``where`` that none may hold: values out of range, or that contradict.
 
-    ``where`` names its file.
-
-    Raises
-    ------
-    InputError
-        All at once: key, value and what is allowed.
+    The InputError names all at once: key, value and what is allowed.
     """
     _refuse(out_of_range(design), where)  # the relations ask for numbers that are some
     check_relations(design, where)
@@ -50,31 +49,17 @@ def _refuse(refusals: Iterable[Refusal], where: str) -> None:
 def out_of_range(design: Design) -> Iterator[Refusal]:
     """Of a design made in Python: numbers outside their range, or that are none, and unknown words."""
     axis = FIELDS["design.axis"]
-    if not _fits(axis, design.axis):  # all units follow from it
+    if not axis.fits(design.axis):  # all units follow from it
         yield "design.axis", shown(design.axis), f"allowed: {axis.allowed('1')}"
         return
     structure = Structure.of(design)
     for section, path, part in parts_of(design):
-        usual = {item.name: item.default for item in fields(part)}
         for field in fields_in(section.template):
-            value, default = getattr(part, field.attribute), usual[field.attribute]
+            value = getattr(part, field.attribute)
             needed = field.required and getattr(part, "law", None) is None
-            left_out = not needed and type(value) is type(default) and value == default
-            if not (left_out or _fits(field, value)):
+            left_out = not needed and type(value) is type(field.default) and value == field.default
+            if not (left_out or field.fits(value)):
                 yield f"{path}.{field.key}", shown(value), f"allowed: {field.allowed(field.unit(structure))}"
-
-
-def _fits(field: Field, value: Any) -> bool:
-    """Whether a key takes a value."""
-    if isinstance(value, tuple | list):
-        listed = field.kind in ("quantities", "matrix", "names")
-        return listed and all(_fits(field, one) for one in value)
-    if field.kind in ("choice", "names"):
-        return value in field.choices
-    if field.kind in ("quantity", "integer", "quantities", "matrix"):
-        number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
-        return number and field.accepts(float(value)) and (field.kind != "integer" or value == int(value))
-    return True
 
 
 def contradictions(design: Design) -> Iterator[Refusal]:
@@ -82,8 +67,10 @@ def contradictions(design: Design) -> Iterator[Refusal]:
     for check in FIRST_RELATIONS:
         refused = tuple(readable(check(design)))
         yield from refused
-        unsure = {path.partition(".")[0] for path, *_ in refused}
+        unsure = {path.partition(".")[0] for path, *_ in refused} - {"motor"}
         design = replace(design, **dict.fromkeys(unsure, UNREAD))
+    with suppress(UnreadError):
+        design = with_stand_ins(design)
     for check in (*RELATIONS, _requirements, _waivers, _correlations):
         yield from readable(check(design))
 
@@ -109,16 +96,17 @@ RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 
 def _requirements(design: Design) -> Iterator[Refusal]:
     for number, item in enumerate(design.requirements):
-        for check in (_named_once, _limit, _asked_of):
-            yield from readable(check(item, design, number))
+        yield from readable(_named_once(item, design.requirements[:number]))
+        yield from readable(_limit(item))
+        yield from readable(_asked_of(item, design))
 
 
-def _named_once(item: Requirement, design: Design, number: int) -> Iterator[Refusal]:
-    if any(item.id == other.id for other in design.requirements[:number]):
+def _named_once(item: Requirement, before: tuple[Requirement, ...]) -> Iterator[Refusal]:
+    if any(item.id == other.id for other in before):
         yield f"requirement.{item.id}.id", shown(item.id), "allowed: each id once"
 
 
-def _limit(item: Requirement, *_: object) -> Iterator[Refusal]:
+def _limit(item: Requirement) -> Iterator[Refusal]:
     path = f"requirement.{item.id}"
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
@@ -126,7 +114,7 @@ def _limit(item: Requirement, *_: object) -> Iterator[Refusal]:
         yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
 
 
-def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal]:
+def _asked_of(item: Requirement, design: Design) -> Iterator[Refusal]:
     """The loop, the rotor and the response that it is of."""
     path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
     present = {"every", *design.controller.stages}
@@ -139,8 +127,11 @@ def _asked_of(item: Requirement, design: Design, *_: object) -> Iterator[Refusal
         yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
     answers = item.loop in ("position", "every") and quantity.of_response
     if item.to is not None and not (answers and "position" in present):
-        allowed = "allowed: of bandwidth, resonance and step of the position loop only"
-        yield f"{path}.to", shown(item.to), allowed
+        yield (
+            f"{path}.to",
+            shown(item.to),
+            "allowed: of bandwidth, resonance and step of the position loop only",
+        )
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:
@@ -148,12 +139,12 @@ def _waivers(design: Design) -> Iterator[Refusal]:
     known = {item.id for item in design.requirements}
     seen: set[str] = set()
     for item in design.waivers:
-        named = item.requirement in known or item.requirement.rpartition("/")[0] in known
-        if item.requirement in seen or not (named or item.requirement.startswith(CHECKS)):
+        id = item.requirement
+        named = id in known or id.rpartition("/")[0] in known
+        if id in seen or not (named or id.startswith(CHECKS)):
             allowed = f"each once: a requirement's id, id/loop, or the id of a check ({CHECKS}...)"
-            path = f"waiver.{item.requirement}.requirement"
-            yield path, shown(item.requirement), f"allowed: {allowed}"
-        seen.add(item.requirement)
+            yield f"waiver.{id}.requirement", shown(id), f"allowed: {allowed}"
+        seen.add(id)
 
 
 def _correlations(design: Design) -> Iterator[Refusal]:

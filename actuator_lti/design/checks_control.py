@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import fields as part_fields
 from math import inf, pi
-from typing import Any
+from typing import Any, get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
 from actuator_lti.design.fields import FIELDS, Field, fields_in
@@ -38,11 +37,9 @@ def _filters(design: Design) -> Iterator[Refusal]:
 def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterator[Refusal]:
     needed, optional = FILTER_KEYS[item.kind]
     name, value = field.attribute, getattr(item, field.attribute)
-    if name in ("kind", "on"):
-        return
     if name in needed and value in (None, ()):
         yield path, "nothing", f'missing; a "{item.kind}" needs it'
-    elif name not in needed | optional and value != getattr(Filter(kind=item.kind), name):
+    elif name not in needed | optional | {"kind", "on"} and value != field.default:
         yield path, value, f'not allowed with kind = "{item.kind}"'
     elif name in _BELOW_NYQUIST and value is not None and value >= nyquist:
         allowed = f"allowed: below the velocity loop's Nyquist frequency, {nyquist:.6g} rad/s"
@@ -61,10 +58,11 @@ def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterato
 
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
-    places: tuple[FilterPlace, ...] = ("torque", "speed")
     velocity = design.controller.velocity
-    for place in places:
-        count = 0 if velocity is None else len(velocity.filters_on(place))
+    if velocity is None:
+        return
+    for place in get_args(FilterPlace):
+        count = len(velocity.filters_on(place))
         if count > MAX_FILTERS:
             yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"
 
@@ -128,25 +126,28 @@ def _command_filter(design: Design) -> Iterator[Refusal]:
 
 
 def _command(design: Design) -> Iterator[Refusal]:
-    for key in _PROFILE:
-        value = getattr(design.command, FIELDS[f"command.{key}"].attribute)
-        for check in (_needed, _slow_enough):
-            yield from readable(check(design, key, value))
+    for key, (_, outer, limiter) in _PROFILE.items():
+        value = _of(design.command, f"command.{key}")
+        yield from readable(_needed(design, key, value, outer))
+        yield from readable(_slow_enough(design, key, value, limiter))
 
 
-def _needed(design: Design, key: str, value: float) -> Iterator[Refusal]:
+def _of(part: Any, path: str) -> Any:
+    """The value of a key in the part that holds it."""
+    return getattr(part, FIELDS[path].attribute)
+
+
+def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refusal]:
     if value == inf:
         return
-    outer = _PROFILE[key][1]
     if design.controller.position is None:
         yield f"command.{key}", _written(design, key, value), "allowed with a position loop"
-    if outer and getattr(design.command, FIELDS[f"command.{outer}"].attribute) == inf:
+    if outer and _of(design.command, f"command.{outer}") == inf:
         yield f"command.{key}", _written(design, key, value), f"needs command.{outer}"
 
 
-def _slow_enough(design: Design, key: str, value: float) -> Iterator[Refusal]:
-    limiter = _PROFILE[key][2]
-    limit = getattr(design.limits, FIELDS[f"limits.{limiter}"].attribute) if limiter else inf
+def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
+    limit = _of(design.limits, f"limits.{limiter}") if limiter else inf
     ratio, unit = design.total_ratio, _unit(design, key)
     if limit * (1 + 1e-9) < value * ratio < inf:
         most = f"{limit / ratio:.6g} {unit}"
@@ -214,10 +215,9 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
 def _replaced(design: Design, stage: str) -> Iterator[Refusal]:
     """Keys of the stage that its law takes the place of."""
     part = getattr(design.controller, stage)
-    usual = {item.name: item.default for item in part_fields(part)}
     for field in fields_in(f"control.{stage}"):
         value = getattr(part, field.attribute)
-        if field.key not in BESIDE_A_LAW and value is not UNREAD and value != usual[field.attribute]:
+        if field.key not in BESIDE_A_LAW and value is not UNREAD and value != field.default:
             yield f"control.{stage}.{field.key}", f"{value}", f"not allowed beside control.{stage}.law"
     if getattr(part, "filters", ()):
         allowed = f"not allowed beside control.{stage}.law, which may have it"

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from math import inf, isclose, log, pi
 from typing import Any
 
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.plant import MotorConstants, Temperature, no_load_speed
 from actuator_lti.design.sections import part_at
 from actuator_lti.design.spellings import split_quantity
 from actuator_lti.files.reading import shown
@@ -21,7 +22,11 @@ _ELECTRICAL = {
     "torque_constant": "torque_constant_Nm_A",
     "back_emf_constant": "back_emf_constant_Vs_rad",
 }
-_TORQUE_OVER_VOLTAGE = {"rms-line": (3**0.5, "sqrt(3)"), "peak-phase": (1.5, "3/2")}
+_TORQUE_OVER_VOLTAGE: dict[MotorConstants, tuple[float, str]] = {
+    "dc": (1.0, "1"),
+    "rms-line": (3**0.5, "sqrt(3)"),
+    "peak-phase": (1.5, "3/2"),
+}
 _PER_VOLT = re.compile(r"/ ?V|\bV\^?-1|V⁻¹|KV\b")  # a speed constant, kE upside down
 _AC = ": see motor.constants, if it is an AC motor"
 _FACTORS = {
@@ -35,6 +40,14 @@ _FACTORS = {
     "9.549 V/krpm": 1e3 / 9.549296585513721,
 }
 """The usual factors between conventions of data sheets."""
+_SHEETS = {
+    "dc": 1.0,
+    "rms-line": 3**0.5,
+    "peak-phase": 1.5,
+    'rms-line", kM in A peak or kE in V peak': 1.5**0.5,
+    'rms-line", kM in A peak and kE in V peak': 0.75**0.5,
+}
+"""kM over kE in SI, by what motor.constants and units say of amperes and volts."""
 
 
 def check_motor(design: Design) -> Iterator[Refusal]:
@@ -50,17 +63,58 @@ def check_motor(design: Design) -> Iterator[Refusal]:
         if value is None:
             words = "R, L, kM and kE together, or motor.source_gain alone"
             yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
-    same = design.effective_motor
-    kM, kE = same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
-    if kM is not None and kE is not None and abs(kE - kM) > 0.1 * kM * (1 + 1e-12):
+    kM, kE = _constants(design)
+    if kM is not None and kE is not None and _apart(kM, kE):
         wanted = given["back_emf_constant"] * kM / kE
-        off, words = min((abs(abs(log(kE / kM)) - log(factor)), words) for words, factor in _FACTORS.items())
         allowed = (
             f"allowed: within 10 % of {wanted:g}{_as_written(design, 'back_emf_constant', kM / kE)}, as "
             f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
-            f"constant){f'; the ratio is {words}' if off < 0.08 else ''}"
+            f"constant){_ratio(given['torque_constant'] / given['back_emf_constant'], kE / kM)}"
         )
         yield "motor.back_emf_constant", _stated(design, "back_emf_constant"), allowed
+
+
+def _constants(design: Design) -> tuple[Any, Any]:
+    """The model's kM and kE, which are one number."""
+    same = design.effective_motor
+    return same.torque_constant_Nm_A, same.back_emf_constant_Vs_rad
+
+
+def _apart(kM: Any, kE: Any) -> Any:
+    return abs(kE - kM) > 0.1 * kM * (1 + 1e-12)
+
+
+def _ratio(stated: Any, off: Any) -> str:
+    """What would explain the ratio of kM to kE, as stated and of the model's."""
+    near = {words: abs(log(stated / ratio)) for words, ratio in _SHEETS.items()}
+    words = min(near, key=near.__getitem__)
+    if near[words] < 0.04:
+        closed = words if '"' in words else f'{words}"'
+        return f'; the ratio is that of motor.constants = "{closed}'
+    factors = {words: abs(abs(log(off)) - log(factor)) for words, factor in _FACTORS.items()}
+    words = min(factors, key=factors.__getitem__)
+    return f"; the ratio is {words}" if factors[words] < 0.08 else ""
+
+
+def with_stand_ins(design: Design) -> Design:
+    """The design past what `check_motor` refuses, for the other checks.
+
+    A constant that is missing is unread; kE is as kM has it, under the motor.constants with which both agree,
+    where there are such.
+    """
+    motor, given = design.motor, {name: getattr(design.motor, name) for name in _ELECTRICAL.values()}
+    if motor.source_gain_Nm_V is not None:
+        alone = all(value is None for value in given.values())
+        return design if alone else replace(design, motor=UNREAD)
+    motor = replace(motor, **{name: UNREAD for name, value in given.items() if value is None})
+    kM: Any = motor.torque_constant_Nm_A
+    kE: Any = motor.back_emf_constant_Vs_rad
+    ways = [] if kE is UNREAD else [motor, *(replace(motor, constants=one) for one in _TORQUE_OVER_VOLTAGE)]
+    for way in (replace(design, motor=one) for one in ways):
+        if kM is UNREAD or not _apart(*_constants(way)):
+            return way
+    usual = kM / _TORQUE_OVER_VOLTAGE[motor.constants][0]
+    return replace(design, motor=replace(motor, back_emf_constant_Vs_rad=usual))
 
 
 def _stated(design: Design, key: str) -> str:
@@ -83,25 +137,29 @@ def _without(key: str, design: Design) -> str:
     """What to write where the sheet does not have it."""
     other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
     held = getattr(design.motor, _ELECTRICAL[other]) if other else None
-    if held is not None and design.motor.constants == "dc":
-        return f"; of a DC motor it is the number of motor.{other} in SI, {held:g}"
     if held is not None:
         ratio, words = _TORQUE_OVER_VOLTAGE[design.motor.constants]
-        number, sign = (held * ratio, "times") if key == "torque_constant" else (held / ratio, "over")
-        return f"; with these motor.constants it is motor.{other} {sign} {words} in SI, {number:g}"
+        sign = "times" if key == "torque_constant" else "over"
+        same = f"of a DC motor it is the number of motor.{other}"
+        if words != "1":
+            same = f"with these motor.constants it is motor.{other} {sign} {words}"
+        p = 1.0 if design.screw is None else design.screw.travel_m_rad  # constants of the motor's own shaft
+        angle = "m" if design.axis == "linear" and design.screw is None else "rad"
+        unit = "N*m/A" if key == "torque_constant" else f"V*s/{angle}"
+        unit = unit.replace("N*m", "N") if angle == "m" else unit
+        return f"; {same} in SI, {held * p * (ratio if sign == 'times' else 1.0 / ratio):g} {unit}"
     usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
     return usual if key == "inductance" else ""
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:
     """What heat leaves of R, kM and kE."""
-    for key in ("winding", "magnet") if design.temperature is not None else ():
-        yield from readable(_hot(design.temperature, key))
+    if (heat := design.temperature) is not None:
+        yield from readable(_hot(heat, "winding", heat.winding_degC, heat.resistance_per_K))
+        yield from readable(_hot(heat, "magnet", heat.magnet_degC, heat.magnet_per_K))
 
 
-def _hot(heat: Any, key: str) -> Iterator[Refusal]:
-    value = getattr(heat, f"{key}_degC")
-    per_K = heat.resistance_per_K if key == "winding" else heat.magnet_per_K
+def _hot(heat: Temperature, key: str, value: float, per_K: float) -> Iterator[Refusal]:
     if 1.0 + per_K * (value - heat.reference_degC) < 0.05:
         yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
 
@@ -150,14 +208,12 @@ def _bends(design: Design) -> Iterator[Refusal]:
     coupling = design.coupling
     if coupling is None:
         return
-    bends = [(coupling.torque_1_Nm, coupling.stiffness_2_Nm_rad)]
-    bends.append((coupling.torque_2_Nm, coupling.stiffness_3_Nm_rad))
-    for number, (torque, stiffness) in enumerate(bends, 1):
+    for number, (torque, stiffness) in enumerate(coupling.bends, 1):
         key, beside = f"coupling.torque_{number}", f"coupling.stiffness_{number + 1}"
         if (torque is None) != (stiffness is None):
             given, missing = (key, beside) if stiffness is None else (beside, key)
             yield given, f"{torque or stiffness:g}", f"allowed with {missing} beside it"
-    first, second = bends[0][0], bends[1][0]
+    first, second = coupling.torque_1_Nm, coupling.torque_2_Nm
     if second is not None and (first is None or first >= second):
         allowed = "above coupling.torque_1" if first is not None else "with coupling.torque_1"
         yield "coupling.torque_2", f"{second:g}", f"allowed: {allowed}"
@@ -181,8 +237,10 @@ def _top_speed(design: Design) -> Iterator[Refusal]:
     speed, top = design.limits.speed_rad_s, no_load_speed(design)
     if top < speed < inf:
         unit = "m/s" if design.axis == "linear" else "rad/s"
-        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.4g} rpm)"
-        allowed = f"the supply cannot reach it; allowed: at most U/kE = {top:.4g} {unit}{turns}"
+        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.5g} rpm)"
+        volts, kE = design.limits.voltage_V, design.effective_motor.back_emf_constant_Vs_rad
+        most = f"U/kE = {volts:.4g} V/({kE:.4g} V/({unit})) = {top:.4g} {unit}{turns}"
+        allowed = f"the supply cannot reach it; allowed: at most {most}"
         yield "limits.speed", f"{speed:.4g} {unit}", allowed
 
 
@@ -223,7 +281,7 @@ PLANT_CHECKS: tuple[Check, ...] = (
          lambda d: d.friction.points and d.friction.law != "coulomb"),
     _friction_points,
     Rule("load.friction", "a table", "allowed behind a coupling; a rigid drive has friction alone",
-         lambda d: d.coupling is None and d.load.friction is not None),
+         lambda d: d.coupling is None and d.load.friction),
     Rule("coupling.stiffness", "{d.coupling.stiffness_Nm_rad:g}",
          "allowed with an inertia behind it; load.inertia, or that of a gear behind it, is missing",
          lambda d: d.coupling is not None and d.load_side_inertia_kgm2 <= 0.0),

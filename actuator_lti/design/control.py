@@ -161,8 +161,8 @@ class CurrentLoop:
     The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
     """
 
-    gain_V_A: Annotated[float, positive("gain of the current PI; of a dq controller in V/A phase", "Kp_i",
-        example="20 mohm", required=True)] = ABSENT
+    gain_V_A: Annotated[float, positive("gain of the current PI; of a dq controller in V/A phase; a "
+        "bandwidth, 500 Hz, is taken times L", "Kp_i", example="20 mohm", required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive("integral time of the current PI; without it a P "
         "controller", "Tn_i", example="150 us")] = None
     back_emf_feedforward: Annotated[float, quantity("share of the back-EMF kE w added to the voltage",
@@ -181,7 +181,8 @@ class VelocityLoop:
     The gain is in A s/rad where a current loop follows, in V s/rad where the voltage does.
     """
 
-    gain: Annotated[float, positive("gain of the velocity PI", "Kp_w", unit="{drive}*s/{angle}",
+    gain: Annotated[float, positive("gain of the velocity PI; in N*m*s/rad it is taken over kM, a "
+        "bandwidth, 40 Hz, times J/kM", "Kp_w", unit="{drive}*s/{angle}",
         example="0.12 A*s/rad", required=True)] = ABSENT
     integral_time_s: Annotated[float | None, positive("integral time of the velocity PI; without it a P "
         "controller", "Tn_w", example="15 ms")] = None

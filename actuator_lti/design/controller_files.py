@@ -13,10 +13,12 @@ p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
 from math import isfinite, pi, sqrt
+from operator import mul
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,8 +29,8 @@ from actuator_lti.design.sections import parts_of
 from actuator_lti.design.settings_file import objects_of_xml, parsed_xml
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
-from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
+from actuator_lti.errors import InputError, in_file
+from actuator_lti.files.reading import parse_json, read_text, shown_path
 from actuator_lti.files.tree import Tree
 
 Stage = Literal["velocity", "-velocity", "current", "-current"]
@@ -43,11 +45,8 @@ class Setting:
     """One key of a design: a factor on one number of the file, or ``value`` of several, in the unit."""
 
     def __init__(self, key: str, unit: str, value: Value, *names: str, when: Stage | None = None) -> None:
-        self.key, self.unit, self.value, self.names, self.when = key, unit, value, names, when
-
-    def of(self, numbers: Sequence[float]) -> float:
-        """Its value."""
-        return float(self.value(*numbers) if callable(self.value) else self.value * numbers[0])
+        self.key, self.unit, self.names, self.when = key, unit, names, when
+        self.of = value if callable(value) else partial(mul, value)
 
     def holds(self, design: Design) -> bool:
         """Whether a design of these stages takes it: ``"-velocity"`` is one without a velocity loop."""
@@ -133,8 +132,7 @@ FORMATS = (
     ),
     Format(
         "VESC motor configuration", re.compile(r"<MCConfiguration"),
-        lambda text, where: {str(item.tag): item.text for item in parsed_xml(text, where).iter()
-                             if not len(item)},
+        lambda text, where: {str(item.tag): item.text for item in parsed_xml(text).iter() if not len(item)},
         (
             Setting("control.current.gain", "V/A", 2.0, "foc_current_kp"),
             Setting("control.current.integral_time", "s", _ratio, "foc_current_kp", "foc_current_ki"),
@@ -193,19 +191,16 @@ FORMATS = (
 def import_controller_file(path: Path, base: Design) -> Imported | None:
     """A design with the settings of such a file; None where it is of none of these formats.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or the design cannot hold what stands in it.
+    An InputError where the file cannot be read, or the design cannot hold what stands in it.
     """
-    where = shown_path(path)
-    text = decode(read_bytes(path, "settings file"), where)
+    where, text = shown_path(path), read_text(path, "settings file")
     found = next((one for one in FORMATS if one.known.search(text)), None)
     if found is None:
         return None
-    if unfit := found.unfit(text, base):
-        raise InputError(unfit, where=where)
-    given = found.read(text, where)
+    with in_file(where):
+        if unfit := found.unfit(text, base):
+            raise InputError(unfit)
+        given = found.read(text, where)
     overrides, used, notes = _overrides(found, given, base, path.name)
     tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
     fixed = {
@@ -215,8 +210,7 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     }
     left = ", ".join(name for name in given if name not in (*used, *found.also)) or "none"
     notes = [f"read as {found.words}", *notes, f"not understood, of {len(given)} settings: {left}"]
-    changes = {**fixed, **overrides}
-    design = with_overrides(base, changes)
+    design = with_overrides(base, changes := {**fixed, **overrides})
     changed = tuple(key for key in changes if key in design.parameters)
     return Imported(design=design, changed=changed, kept=(), notes=tuple(notes))
 
@@ -236,7 +230,7 @@ def _overrides(
             notes += [said] if item.names[0] in numbers else []
             continue
         used |= {*item.names}
-        value = item.of([*numbers.values()])
+        value = float(item.of(*numbers.values()))
         stated = ", ".join(f"{name} = {given[name]}" for name in item.names)
         if item.key == "limits.speed" and value > no_load_speed(base):
             notes.append(f"{stated}: faster than the supply allows, left out")

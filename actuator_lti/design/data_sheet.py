@@ -6,7 +6,7 @@ Read into the keys of ``[friction]`` that follow from them, which is what a desi
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from math import prod
 from typing import Any
@@ -33,7 +33,7 @@ SHEET: tuple[Field, ...] = (
 
 FROM = "from data sheet: "
 """What the source of a value begins with that follows from such keys."""
-_WORD = re.compile(r"(?P<table>motor|gear\.[\w-]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
+_WORD = re.compile(r"(?P<table>motor|gear\.[^.=;,]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
 _OPEN = "100.0 %"  # tolerance of a friction whose share is not said
 _TAKEN = {
     _CURRENT: ("dry_torque", "viscous", "dry_torque_reverse", "viscous_reverse", "point"),
@@ -90,8 +90,7 @@ class DataSheet:
     """What a file states so: values with their pedigree, by dotted key, `UNREAD` where they could not be."""
 
     def __init__(self, stated: dict[str, model.Parameter], tree: Tree) -> None:
-        self.stated = stated
-        friction = tree.get("friction")
+        self.stated, friction = stated, tree.get("friction")
         self.friction = friction if isinstance(friction, dict) else {}
         self.gears = {path: item for path, item in stated.items() if path.startswith(("gear.", "gear["))}
 
@@ -133,8 +132,8 @@ class DataSheet:
         values = {"friction.dry_torque": share * torque}
         if share < 1.0:
             values["friction.viscous"] = (1.0 - share) * torque / self.stated[_SPEED].value
-        said = (_CURRENT, _SPEED, *((_SHARE,) if _SHARE in self.stated else ()))
-        design = self._with(design, {path: value for path, value in values.items() if value}, said)
+        values = {path: value for path, value in values.items() if value}
+        design = self._with(design, values, (_CURRENT, _SPEED, _SHARE))
         if _SHARE in self.stated:
             return design
         open_ = {path: replace(design.parameters[path], tolerance=model.Tolerance(
@@ -147,12 +146,10 @@ class DataSheet:
         """A load M wants M/(N eta) of the motor; where it is not locked M/N of that acts by itself."""
         eta = prod(item.value for item in self.gears.values())
         lost = 1.0 / eta if design.load.path == "self-locking" else 1.0 / eta - 1.0
-        said = tuple(self.gears)
-        return self._with(
-            design, {"friction.load_coefficient": lost / design.total_ratio} if lost else {}, said
-        )
+        values = {"friction.load_coefficient": lost / design.total_ratio} if lost else {}
+        return self._with(design, values, self.gears)
 
-    def _with(self, design: model.Design, values: dict[str, float], said: tuple[str, ...]) -> model.Design:
+    def _with(self, design: model.Design, values: dict[str, float], said: Iterable[str]) -> model.Design:
         """The design with values of friction, whose source is what the sheet says."""
         stated = [self.stated[path] for path in said if path in self.stated]
         sources = dict.fromkeys(item.source for item in stated if item.source)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from math import inf
+from math import inf, isfinite
+from numbers import Real
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -47,8 +48,8 @@ class Field:
 
     ``unit_template`` is an SI unit in which ``{angle}``, ``{torque}`` and ``{inertia}`` stand for
     rad, N*m, kg*m^2 on a rotary axis and m, N, kg on a linear one, ``{drive}`` for A or V.
-    ``low`` and ``high`` are inclusive, in SI; ``low_open`` makes the lower one exclusive. ``most`` gives the
-    largest value in a design, where others decide it, and why.
+    ``low`` and ``high`` are inclusive, in SI. ``most`` gives the largest value in a design, where others
+    decide it, and why. ``default`` is that of the attribute.
     """
 
     path: str
@@ -59,11 +60,11 @@ class Field:
     symbol: str = ""
     low: float = -inf
     high: float = inf
-    low_open: bool = False
     choices: tuple[str, ...] = ()
     required: bool = False
     example: str = ""
     most: Callable[[Design], tuple[float, str]] | None = None
+    default: Any = None
 
     @property
     def is_number(self) -> bool:
@@ -82,11 +83,10 @@ class Field:
 
     def unit(self, structure: Structure) -> str:
         """The SI unit of this key in a drive of this structure; ``"1"`` is dimensionless."""
-        words = _AXES[structure.axis]
-        drive = "A" if structure.has_current else "V"
         if self.path == "control.position.gain" and structure.has_velocity:
             return "1/s"
-        unit = self.unit_template.format(drive=drive, **words)
+        drive = "A" if structure.has_current else "V"
+        unit = self.unit_template.format(drive=drive, **_AXES[structure.axis])
         return "1" if unit == "rad/rad" else unit
 
     def travel_power(self) -> int:
@@ -115,20 +115,29 @@ class Field:
         shown = "" if unit == "1" else f" {unit}"
         if self.low == SMALL:
             return f"above 0, {self.low:g} to {self.high:g}{shown}"
-        low = "" if self.low == -inf else f"{'above' if self.low_open else 'at least'} {self.low:g}{shown}"
+        low = "" if self.low == -inf else f"at least {self.low:g}{shown}"
         low = f"0, or at least {SMALL:g}{shown}" if self._zero_or_more else low
         high = "" if self.high == inf else f"at most {self.high:g}{shown}"
         return " and ".join(part for part in (low, high) if part) or "any finite number"
 
     def accepts(self, value: float) -> bool:
         """Whether an SI value lies in the allowed range; NaN does not, nor what is next to zero."""
-        if self._zero_or_more and 0.0 < value < SMALL:
-            return False
-        return (self.low < value if self.low_open else self.low <= value) and value <= self.high
+        return self.low <= value <= self.high and not (self._zero_or_more and 0.0 < value < SMALL)
+
+    def fits(self, value: Any) -> bool:
+        """Whether an attribute of this key may have a value; any text and truth may stand for one."""
+        if isinstance(value, tuple | list):
+            return self.kind in ("quantities", "matrix", "names") and all(map(self.fits, value))
+        if self.kind in ("choice", "names"):
+            return value in self.choices
+        if self.kind in ("quantity", "integer", "quantities", "matrix"):
+            number = isinstance(value, Real) and not isinstance(value, bool) and isfinite(value)
+            return number and self.accepts(float(value)) and (self.kind != "integer" or value == int(value))
+        return True
 
     @property
     def _zero_or_more(self) -> bool:
-        return self.kind in ("quantity", "quantities") and self.low == 0.0 and not self.low_open
+        return self.kind in ("quantity", "quantities") and self.low == 0.0
 
 
 # --- a part of a design declares a key so: ``resistance_ohm: Annotated[type, positive(words, symbol)]`` ---

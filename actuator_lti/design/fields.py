@@ -23,7 +23,8 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
             yield replace(
                 field,
                 path=f"{template}.{field.path}",
-                required=field.required or (item.default is MISSING and item.default_factory is MISSING),
+                required=field.required or item.default is MISSING,
+                default=item.default,
                 choices=field.choices or (_words(annotated) if field.kind in ("choice", "names") else ()),
                 description=form * template.endswith(".continuous") + field.description,
             )

@@ -10,7 +10,7 @@ from actuator_lti.design.data_sheet import FROM, SHEET
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
-from actuator_lti.design.sections import RECORDS, SECTIONS
+from actuator_lti.design.sections import RECORDS
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,16 @@ def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 def _entry(field: Field, structure: Structure) -> KeyEntry:
     unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
-    same = {item.name: getattr(field, item.name) for item in fields(KeyEntry) if hasattr(field, item.name)}
     unit = "of its quantity" if field.kind == "limit" else unit
-    default = "" if field.required else _default(field, unit)
+    same = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
+    default = "" if field.required or field.section == "design" else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
 
 
 def _default(field: Field, unit: str) -> str:
-    kind = next((section.kind for section in SECTIONS if section.template == field.section), None)
-    known = {item.name: item.default for item in fields(kind)} if kind is not None else {}
-    value = known.get(field.attribute)
-    if value in (None, "", ()):
-        return ""
-    if value == inf:
-        return "none"
+    value = field.default
+    if value in (None, "", inf):
+        return "none" if value == inf else ""
     if isinstance(value, bool):
         return f"{value}".lower()
     if isinstance(value, tuple):

@@ -103,20 +103,16 @@ class Law(StateSpace):
     @property
     def direct(self) -> float:
         """What a command of one gives at once."""
-        return self.gain * sum(self._commanded(self.sampled.D))
+        return self._gain_on("command", self.sampled.D)
 
     def steady(self, name: str) -> float:
         """Gain on a signal at zero frequency (of the command by the error, too); inf: integrates."""
         A, B, C, D, _ = self.sampled
         if self.integrates:
             return np.inf
-        gains = D + C @ np.linalg.solve(np.eye(len(A)) - A, B)
-        if name == "command":
-            return self.gain * sum(self._commanded(gains))
-        return self.gain * float(gains[self.inputs.index(name)]) if name in self.inputs else 0.0
+        return self._gain_on(name, D + C @ np.linalg.solve(np.eye(len(A)) - A, B))
 
-    def _commanded(self, gains: np.ndarray) -> list[float]:
-        """Of the gains on all inputs those that a command reaches."""
-        return [
-            float(one) for name, one in zip(self.inputs, gains, strict=True) if name in ("command", "error")
-        ]
+    def _gain_on(self, name: str, gains: np.ndarray) -> float:
+        """Of the gains on all inputs what a signal gets."""
+        reached = ("command", "error") if name == "command" else (name,)
+        return self.gain * sum(float(gains[k]) for k, one in enumerate(self.inputs) if one in reached)

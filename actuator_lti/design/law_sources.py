@@ -19,34 +19,33 @@ _WHAT = "file of a law: A, B, C, D and Ts, as .mat up to version 7 or .json"
 
 
 def read_law(path: Path) -> Tree:
-    """The matrices of a file as a design file writes them, with ``period``.
+    """The matrices of a file as a design file writes them, with ``period``; an InputError names the file.
 
     MATLAB: ``[A,B,C,D,Ts] = ssdata(K); save('k.mat','A','B','C','D','Ts')``, or a structure of these fields.
-
-    Raises
-    ------
-    InputError
-        Naming the file and what is allowed.
     """
     where, data = shown_path(path), read_bytes(path, _WHAT)
+
+    def refused(why: str) -> InputError:
+        return InputError(f"{why}allowed: a {_WHAT}", where=where)
+
     if path.suffix not in (".mat", ".json"):
-        raise InputError(f"allowed: a {_WHAT}", where=where)
+        raise refused("")
     try:
         held = _from_mat(data) if path.suffix == ".mat" else parse_json(decode(data, where), where)
     except InputError as error:
-        raise InputError(f"cannot be read: {error.message}; allowed: a {_WHAT}", where=where) from None
+        raise refused(f"cannot be read: {error.message}; ") from None
     tables = [held, *(held.values() if isinstance(held, dict) else ())]  # the file itself, or one in it
     held = next((one for one in tables if isinstance(one, dict) and "D" in one), None)
     if held is None:
-        raise InputError(f"holds no A, B, C and D; allowed: a {_WHAT}", where=where)
+        raise refused("holds no A, B, C and D; ")
     period = next((held[name] for name in _PERIODS if name in held), None)
     if period is None:
-        raise InputError(f"has no Ts, the period that the law was made for; allowed: a {_WHAT}", where=where)
+        raise refused("has no Ts, the period that the law was made for; ")
     try:
         A, B, C, D, L = (held.get(part, ()) for part in (*PARTS, "L"))
         return law_tree(A, B, C, D, L, np.asarray(period).item())
     except (ValueError, TypeError) as error:
-        raise InputError(f"{error}; allowed: a {_WHAT}", where=where) from None
+        raise refused(f"{error}; ") from None
 
 
 def _from_mat(data: bytes) -> Tree:
@@ -59,13 +58,7 @@ def _from_mat(data: bytes) -> Tree:
 
 
 def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) -> Tree:
-    """Matrices of one output as a design file writes them.
-
-    Raises
-    ------
-    InputError
-        For what is no matrix of numbers, or more than one output.
-    """
+    """Matrices of real numbers, of one output, as a design file writes them; other ones are an InputError."""
     parts = {}
     for name, given in zip((*PARTS, "L"), (A, B, C, D, L), strict=True):
         try:

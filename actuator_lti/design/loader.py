@@ -18,7 +18,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.files.tree import Tree
 
-_FOLDER = Path(__file__).parent / "shipped"
+SHIPPED = Path(__file__).parent / "shipped"
 
 
 def shipped_designs() -> tuple[str, ...]:
@@ -29,13 +29,8 @@ def shipped_designs() -> tuple[str, ...]:
     >>> shipped_designs()[0]
     'ilr33-amber'
     """
-    names = sorted(path.stem for path in _FOLDER.glob("*.toml"))
+    names = sorted(path.stem for path in SHIPPED.glob("*.toml"))
     return tuple(sorted(names, key=lambda name: name != "ilr33-amber"))
-
-
-def shipped_path(name: str) -> Path:
-    """Where a shipped design lies."""
-    return _FOLDER / f"{name}.toml"
 
 
 def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
@@ -85,14 +80,11 @@ def _name_of(given: object) -> str:
 def design_text(name_or_path: str | PathLike[str]) -> str:
     """The text of a design file, by shipped name or path, with its comments.
 
-    Raises
-    ------
-    InputError
-        If there is no such design, or the file is too large or not UTF-8.
+    An InputError if there is no such design, or the file is too large or not UTF-8.
     """
     name = _name_of(name_or_path)
     if name in shipped_designs():
-        return shipped_path(name).read_text(encoding="utf-8")
+        return (SHIPPED / f"{name}.toml").read_text(encoding="utf-8")
     path = Path(name)
     named = not path.suffix and "/" not in name and "\\" not in name
     if named and not (name and os.path.exists(name)):

@@ -6,6 +6,7 @@ What could not be read is `UNREAD`, so that what does not need it is checked all
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -163,26 +164,27 @@ def lines_of(text: str, tree: Tree) -> dict[str, int]:
     3
     """
     lines: dict[str, int] = {}
-    counts: dict[str, int] = {}
+    counts = Counter[tuple[str, ...]]()
     tables: tuple[str, ...] = ("",)
     for number, line in _outside_texts(text):
         if header := _HEADER.match(line):
-            names = [_plain(name) for name in _PARTS.findall(header[2])]
-            counts["\0".join(names)] = counts.get("\0".join(names), 0) + (header[1] == "[[")
+            names = _names(header[2])
+            counts[names] += header[1] == "[["
             tables = _paths(names, tree, counts)
             for path in tables:
                 lines[path] = number
             lines.setdefault(".".join(names), number)
         elif entry := _ENTRY.match(line):
-            names = [_plain(name) for name in _PARTS.findall(entry[1])]
+            names = _names(entry[1])
             for table in tables:
                 for depth in range(1, len(names) + 1):
                     lines.setdefault(".".join(filter(None, (table, *names[:depth]))), number)
     return lines
 
 
-def _plain(name: str) -> str:
-    return name[1:-1] if name[0] in "\"'" else name
+def _names(dotted: str) -> tuple[str, ...]:
+    """The parts of a dotted key, without quotes."""
+    return tuple(name[1:-1] if name[0] in "\"'" else name for name in _PARTS.findall(dotted))
 
 
 def _outside_texts(text: str) -> Iterator[tuple[int, str]]:
@@ -195,14 +197,14 @@ def _outside_texts(text: str) -> Iterator[tuple[int, str]]:
             inside = "" if inside == mark else inside or mark
 
 
-def _paths(names: list[str], tree: Any, counts: Mapping[str, int]) -> tuple[str, ...]:
+def _paths(names: tuple[str, ...], tree: Any, counts: Counter[tuple[str, ...]]) -> tuple[str, ...]:
     """The spellings of a table's path, with the label of each repeated table on the way."""
     spelled: tuple[str, ...] = ("",)
     for depth, name in enumerate(names, 1):
         tree = tree.get(name) if isinstance(tree, dict) else None
         labels = [name]
         if isinstance(tree, list):
-            count = counts.get("\0".join(names[:depth]), 0)
+            count = counts[names[:depth]]
             tree = tree[count - 1] if 0 < count <= len(tree) else None
             known = [tree.get(key) for key in ("name", "id", "requirement")] if isinstance(tree, dict) else []
             label = next((one for one in known if isinstance(one, str)), count)

@@ -10,7 +10,7 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import check_relations
 from actuator_lti.design.model import ControllerObject, ControllerObjects, Design
 from actuator_lti.design.object_dictionary import OBJECTS, PER_RPM, KnownObject, model_value, step_of
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import shown
 
 __all__ = ["PER_RPM", "Exported", "Imported", "Rounding", "export_objects", "import_objects"]
@@ -65,7 +65,8 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     InputError names the file ``where``.
     """
     _check_cascade(base)
-    given = _checked(objects.values, where)
+    with in_file(where):
+        given = _checked(objects.values)
     changes: dict[str, float] = {}
     kept: list[ControllerObject] = []
     for item in objects.values:
@@ -93,7 +94,7 @@ def _follows(known: KnownObject, value: int, given: _Values) -> bool:
 
 def _check_cascade(design: Design) -> None:
     control = design.controller
-    cascade = control.velocity is not None and control.current is not None and control.own_law is None
+    cascade = {"velocity", "current"} <= {*control.stages} and control.own_law is None
     if design.axis != "rotary" or not cascade:
         raise InputError(
             f"the design {design.name} cannot hold a motion controller's settings; "
@@ -101,7 +102,7 @@ def _check_cascade(design: Design) -> None:
         )
 
 
-def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
+def _checked(values: tuple[ControllerObject, ...]) -> _Values:
     """Values by index and subindex; duplicates and values out of their object's range are refused."""
     seen: _Values = {}
     for item in values:
@@ -113,20 +114,18 @@ def _checked(values: tuple[ControllerObject, ...], where: str) -> _Values:
         elif not (-(2**63) <= item.value < 2**64 and item.index <= 0xFFFF and item.subindex <= 0xFF):
             allowed = "an integer of at most 64 bits"
         if allowed:
-            raise InputError(f"{item.label} = {item.value}: allowed: {allowed}", where=where)
+            raise InputError(f"{item.label} = {item.value}: allowed: {allowed}")
         seen[item.index, item.subindex] = item.value
     return seen
 
 
-def checked_objects(values: tuple[ControllerObject, ...], factor: Any, where: str) -> ControllerObjects:
+def checked_objects(values: tuple[ControllerObject, ...], factor: Any) -> ControllerObjects:
     """Settings from their parts as every file of them is held to: each in its range, the factor positive."""
     if len(values) > MAX_OBJECTS:
-        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}", where=where)
-    _checked(values, where)
+        raise InputError(f"{len(values)} objects; allowed: at most {MAX_OBJECTS}")
+    _checked(values)
     if isinstance(factor, bool) or not isinstance(factor, int | float) or not 1e-6 <= factor <= 1e6:
-        raise InputError(
-            f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)", where=where
-        )
+        raise InputError(f"velocity_gain_factor = {shown(factor)}: allowed: 1 (per rad/s) or 9.549 (per rpm)")
     return ControllerObjects(velocity_gain_factor=float(factor), values=values)
 
 
@@ -165,13 +164,13 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     before = design.objects
     complete = not before.values if complete is None else complete
     original = {item.place: item.value for item in before.values}
-    written: list[ControllerObject] = []
     rounded: list[Rounding] = []
-    for item in before.values:
+    written = list(before.values)
+    for k, item in enumerate(before.values):
         known = OBJECTS.get(item.place)
-        follows = known is not None and (known.paths or _follows(known, item.value, original))
-        value = _encode(design, known, rounded) if known is not None and follows else None
-        written.append(item if value is None else replace(item, value=value))
+        if known is not None and (known.paths or _follows(known, item.value, original)):
+            value = _encode(design, known, rounded)
+            written[k] = item if value is None else replace(item, value=value)
     missing = [known for key, known in OBJECTS.items() if key not in original]
     for known in missing if complete else []:
         value = _encode(design, known, rounded)

@@ -131,11 +131,15 @@ class Coupling:
         "gear")] = None
 
     @property
+    def bends(self) -> tuple[tuple[Any, Any], ...]:
+        """The torques at which the stiffness changes, and what it becomes."""
+        return (self.torque_1_Nm, self.stiffness_2_Nm_rad), (self.torque_2_Nm, self.stiffness_3_Nm_rad)
+
+    @property
     def pieces(self) -> tuple[tuple[Any, Any, Any], ...]:
         """Torque and twist without play from which on each piece of the spring holds, and its stiffness."""
         made = [(0.0, 0.0, self.stiffness_Nm_rad)]
-        bends = (self.torque_1_Nm, self.stiffness_2_Nm_rad), (self.torque_2_Nm, self.stiffness_3_Nm_rad)
-        for torque, stiffness in bends:
+        for torque, stiffness in self.bends:
             if torque is not None and stiffness is not None:
                 before, twist, k = made[-1]
                 made.append((torque, twist + (torque - before) / k, stiffness))

@@ -6,7 +6,7 @@ A mistake is noted and the walk goes on, past what is `UNREAD` then, so that all
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from datetime import date
@@ -16,14 +16,16 @@ from typing import Any
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
 from actuator_lti.design import model
 from actuator_lti.design.asked import FrozenMap, default_deflection
+from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Axis, Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
-from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children
+from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
+from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
 from actuator_lti.errors import InputError
@@ -32,7 +34,7 @@ from actuator_lti.files.tree import Tree
 
 MAX_GEARS = 20
 MAX_LIST = 200
-_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}\Z")
+_NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _FIELD_OF_LEAD = FIELDS["screw.lead"]
 _CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
@@ -47,6 +49,26 @@ _UPSIDE_DOWN = {
     "motor.cogging_periods": (2.0 * pi, "{angle}"),
     "control.period": (2.0 * pi, "rad/s"),
 }
+Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
+
+
+def _torque(design: model.Design) -> Any:
+    """Torque per ampere of the current loop, or per volt."""
+    motor = design.effective_motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V
+    kM: Any = motor.torque_constant_Nm_A
+    return kM if design.controller.current is not None else kM / motor.resistance_ohm
+
+
+GAINS: dict[str, dict[str, Per]] = {
+    "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H},
+    "control.velocity.gain": {
+        "rad/s": lambda design: design.inertia_kgm2 / _torque(design),
+        "{torque}*s/{angle}": lambda design: 1.0 / _torque(design),
+    },
+}
+"""Gains that controllers state by what they do, the loop's bandwidth or a torque: unit, gain per that."""
 
 
 def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
@@ -63,11 +85,10 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     name = values.setdefault("name", UNREAD)
     values["title"] = UNREAD if values.get("title") is UNREAD else values.get("title") or name
     design = model.Design(
-        **{**values, "validation": fallback, **parts, **records},
-        objects=objects,
-        origin=origin,
-        parameters=FrozenMap(reader.parameters),
+        **{**values, "validation": fallback, **parts, **records}, objects=objects, origin=origin
     )
+    design = reader.with_gains(design)
+    design = replace(design, parameters=FrozenMap(reader.parameters))
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
@@ -84,6 +105,7 @@ class Reader:
         self.findings = findings
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
+        self.gains: dict[str, tuple[Field, Tree, float, Per]] = {}
         head, control, motor = (
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
@@ -95,30 +117,25 @@ class Reader:
 
     def refuse(self, path: str, value: object, reason: str) -> Any:
         """Note the mistake of one key, which is unread."""
-        self.findings.note(path, shown(value), reason)
-        return UNREAD
+        return self.unread(path, reason, shown(value))
 
-    def unread(self, path: str, reason: str) -> Any:
+    def unread(self, path: str, reason: str, value: str = "") -> Any:
         """The same of a key without a value to show."""
-        self.findings.note(path, "", reason)
+        self.findings.note(path, value, reason)
         return UNREAD
 
-    def missing(self, path: str, field: Field | None = None) -> Any:
-        """Note that a key is missing, which is unread."""
-        return self.unread(path, f"missing{_example(field)}")
-
-    def known(self, table: Tree, known: Iterable[str], path: str) -> dict[str, str]:
+    def known(self, table: Tree, known: Collection[str], path: str) -> dict[str, str]:
         """Note unknown keys; gives those that they are near to, with what only renames one."""
-        known, meant = list(known), dict[str, str]()
-        for key in table:
-            if key not in known:
-                word = key_for(path, key, known)
-                said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
-                hint = said if word else nearest(key, known)
-                where = f"{path}.{key}" if path else key
-                self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
-                named = [] if word.startswith("not needed") else known  # what is not needed stands for no key
-                for one in (one for one in named if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint)):
+        meant: dict[str, str] = {}
+        for key in (key for key in table if key not in known):
+            word = key_for(path, key, known)
+            word += _time_said(word, table, key)
+            said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
+            hint = said if word else nearest(key, known)
+            where = f"{path}.{key}" if path else key
+            self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
+            for one in () if word.startswith("not needed") else known:  # that stands for no key
+                if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint):
                     renamed = key if word.partition(", which takes")[0] == one else ""
                     meant[one] = meant.get(one) or renamed
         return meant
@@ -131,8 +148,10 @@ class Reader:
         What stands under another name is read as well, so that all that is wrong with it is told at once.
         """
         if not isinstance(table, dict):
-            allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}"
-            self.missing(path) if table is None else self.refuse(path, table, allowed)
+            word = key_for(path.rpartition(".")[0], path.rpartition(".")[2])
+            number = f"; a number of that name is {word}" if word else ""
+            allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}{number}"
+            self.unread(path, "missing") if table is None else self.refuse(path, table, allowed)
             return {}, ()
         fields, stated = fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
@@ -152,7 +171,7 @@ class Reader:
             elif field.key in meant:
                 values[field.attribute] = self.parameters[where] = UNREAD
             elif field.required and not (field.key == "gain" and "law" in table):
-                values[field.attribute] = self.missing(where, field)
+                values[field.attribute] = self.unread(where, f"missing{_example(field)}")
         return values, meant
 
     def value(self, field: Field, table: Tree, path: str) -> Any:
@@ -171,20 +190,19 @@ class Reader:
         raw = raw.isoformat() if field.kind == "day" and isinstance(raw, date) else raw
         if _fits(field, raw):
             return raw
-        hint = nearest(raw, field.choices).strip() if field.choices and isinstance(raw, str) else ""
+        hint = nearest(raw, field.choices).strip() if isinstance(raw, str) else ""
         return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {field.allowed('1')}")
 
     def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
         """Some of the words that a key may have, each once."""
-        known = raw if isinstance(raw, list) and all(isinstance(word, str) for word in raw) else []
-        if not known or len({*known}) != len(known):
-            return self.refuse(path, raw, f"allowed: a list of {', '.join(field.choices)}, each at most once")
-        read = tuple(known)
-        for word in known:
-            if word not in field.choices:
-                hint = nearest(word, field.choices)
-                read = self.refuse(path, word, f"unknown{hint}; allowed: {', '.join(field.choices)}")
-        return read
+        known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
+        texts = all(isinstance(word, str) for word in known)
+        if not known or not texts or len({*known}) != len(known):
+            return self.refuse(path, raw, f"allowed: a list of {allowed}, each at most once")
+        strange = [word for word in known if word not in field.choices]
+        for word in strange:
+            self.refuse(path, word, f"unknown{nearest(word, field.choices)}; allowed: {allowed}")
+        return UNREAD if strange else tuple(known)
 
     def entry(self, field: Field, raw: Any, path: str, into: dict[str, model.Parameter]) -> Any:
         """A value with its pedigree, which is kept."""
@@ -192,13 +210,22 @@ class Reader:
         table = raw if isinstance(raw, dict) else {"value": raw}
         self.known(table, _ENTRY, path)
         if "value" not in table:
-            return self.missing(f"{path}.value", field)
+            return self.unread(f"{path}.value", f"missing{_example(field)}")
         for key in ("source", "grade"):
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
-        value, unit = self.number(field, table["value"], path), field.unit(self.structure)
+        for template, per in GAINS.get(field.path, {}).items() if isinstance(table["value"], str) else ():
+            with suppress(InputError):
+                size = self.quantity(table["value"], replace(field, unit_template=template))
+                self.gains[path] = field, table, size, per
+                return UNREAD
+        return self.kept(field, table, self.number(field, table["value"], path), path, into)
+
+    def kept(self, field: Field, table: Tree, value: Any, path: str, into: dict[str, model.Parameter]) -> Any:
+        """A value with its pedigree."""
         if value is UNREAD:
             return UNREAD
+        unit = field.unit(self.structure)
         tolerance = self.tolerance(field, table.get("tolerance"), value, f"{path}.tolerance")
         if tolerance is not UNREAD:
             text = table["value"] if isinstance(table["value"], str) else si_text(table["value"], unit)
@@ -207,6 +234,23 @@ class Reader:
                 source=table.get("source", ""), grade=table.get("grade", ""),
             )  # fmt: skip
         return value
+
+    def with_gains(self, design: model.Design) -> model.Design:
+        """The design with the gains that say what they do, in amperes or volts from here on."""
+        for path, (field, table, size, per) in self.gains.items():
+            with suppress(UnreadError, ValueError):  # of a coupling after no gear
+                value = size * per(replace(with_stand_ins(design), temperature=None))
+                unit = field.unit(self.structure)
+                if not field.accepts(value):
+                    self.refuse(path, table["value"], f"allowed: {field.allowed(unit)}")
+                    continue
+                text = si_text(value, ampere_unit(path, unit, self.constants))
+                source = "; ".join(filter(None, (f"from {table['value']}", table.get("source"))))
+                table = {**table, "value": text, "source": source}
+                self.kept(field, table, value, path, self.parameters)
+                part = replace(part_at(design, field.section), **{field.attribute: value})
+                design = with_part(design, field.section, part)
+        return design
 
     def tolerance(self, field: Field, raw: Any, value: float, path: str) -> model.Tolerance | None:
         """How far a value may lie from what is written."""
@@ -285,7 +329,7 @@ class Reader:
             if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
                 line = field.section == "motor" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
-        raise refused[-1]
+        raise refused[-1 if field.section in ("load", "command") else 0]
 
     def _said(self, text: Any, field: Field, value: float) -> float:
         """The value, unless an AC motor has several amperes that the text may mean."""
@@ -343,9 +387,9 @@ class Reader:
         raw = self.law(raw, path) if section.kind is model.Law else raw
         names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
         values, meant = self.values(section.template, raw, path, names)
-        values |= self.tables(section.path, raw, meant)
         if not isinstance(raw, dict):
             return UNREAD
+        values |= self.tables(section.path, raw, meant)
         if section.many == "named":
             values["name"] = raw["name"] if path == f"{section.path}.{raw.get('name')}" else UNREAD
         if section.kind is model.Requirement:
@@ -360,19 +404,18 @@ class Reader:
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
         held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
         twice = [key for key in held if key in rest]
-        if not isinstance(file, str) or twice:
-            self.refuse(f"{path}.file", file, f"allowed: a file's name, without {', '.join(twice) or 'more'}")
-            return {**held, **rest}
         try:
+            if not isinstance(file, str) or twice:
+                raise InputError(f"allowed: a file's name, without {', '.join(twice) or 'more'}")
             held = read_law(self.findings.folder / file)
         except InputError as error:
             self.refuse(f"{path}.file", file, error.message)
         return {**held, **rest}
 
-    def tables(self, path: str, table: Any, meant: Iterable[str] = ()) -> Tree:
+    def tables(self, path: str, table: Tree, meant: Iterable[str]) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
         result: Tree = {}
-        for section in children(path) if isinstance(table, dict) else ():
+        for section in children(path):
             if section.key in meant and section.key not in table:
                 result[section.attribute] = UNREAD
             elif section.many:
@@ -408,8 +451,9 @@ class Reader:
         if name is None:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
-            plain = re.sub(r"[^A-Za-z0-9_-]+", "-", f"{name}").strip("-_")[:64] or "first"
-            allowed = f'allowed: 1 to 64 letters, digits, - and _, no dot or space, as "{plain}"'
+            plain = re.sub(r"[^A-Za-z0-9 _/:+()-]+", "-", f"{name}").strip(" _/:+()-")[:60].strip(" /:(")
+            plain = plain or "first"
+            allowed = f'allowed: 1 to 64 letters, digits, spaces and - _ / : + ( ), no dot, as "{plain}"'
             self.refuse(f"{numbered}.name", name, allowed)
         elif path in before:
             self.refuse(f"{numbered}.name", name, "allowed: each name once")
@@ -420,7 +464,7 @@ class Reader:
     def objects(self, raw: Any) -> model.ControllerObjects:
         """The settings that the design was imported from."""
         try:
-            return objects_from({} if raw is None else raw, self.findings.where)
+            return objects_from({} if raw is None else raw)
         except InputError as error:
             self.unread("objects", error.message)
         return model.ControllerObjects()
@@ -442,8 +486,7 @@ class Reader:
 def _meant(table: Tree, path: str) -> Any:
     """The word of a key on which the reading of others depends: where it is none, the nearest."""
     field = FIELDS[path]
-    default = field.choices[0]
-    return meant_of(f"{table.get(field.key, default)}", field.choices) or default
+    return meant_of(f"{table.get(field.key, field.default)}", field.choices) or field.default
 
 
 def _rows_flat(raw: Any) -> Any:
@@ -467,9 +510,21 @@ def _fits(field: Field, raw: Any) -> bool:
     return bool(raw.strip()) if field.kind == "label" else not field.choices or raw in field.choices
 
 
-def _example(field: Field | None) -> str:
-    if field is None:
+def _time_said(word: str, table: Tree, key: str) -> str:
+    """The time that an integral or derivative gain is beside the gain of its table, for its hint."""
+    if not word.startswith(("integral_time =", "derivative_time =")):
         return ""
+    named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
+    gain, own = (_CONVENTION.sub("", f"{table.get(one)}") for one in (named, key))
+    quotients = [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]
+    for quotient in quotients:
+        with suppress(ValueError, ZeroDivisionError):
+            (a, of), (b, per) = map(split_quantity, quotient)
+            return f"; here {parse_quantity(f'{a / b!r} ({of or 1})/({per})', 's/rad'):.4g} s"
+    return ""
+
+
+def _example(field: Field) -> str:
     example = f'example: {field.key} = "{field.example}" ({field.description})'
     return f"; {example if field.example else field.description}"
 

@@ -26,8 +26,7 @@ class Section:
     ``many``: repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
     ``rare``: whether lists of values pass over it while all its values are the defaults.
     ``label``: the key that a listed table is known by; its number from 1 where empty.
-    ``asked``: whether it says what is asked of the drive and not what the drive is: the hash of a design
-    without it does not know it.
+    ``asked``: whether it says what is asked of the drive, not what it is: the hash knows it where it stands.
     """
 
     path: str
@@ -65,9 +64,10 @@ class Section:
         owner = BY_PATH[self.parent].kind if self.parent else model.Design
         return any(item.name == self.attribute and item.default is None for item in fields(owner))
 
-    def item_path(self, index: int, item: Any) -> str:
-        """Dotted path of one repeated table: ``gear.worm``, ``friction.point.2``."""
-        return f"{self.path}.{item.name if self.many == 'named' else index + 1}"
+    def items(self, design: model.Design) -> Iterator[tuple[str, Any]]:
+        """Its repeated tables in a design, by their dotted paths: ``gear.worm``, ``friction.point.2``."""
+        for number, item in enumerate(at_place(design, self.place) or (), 1):
+            yield f"{self.path}.{item.name if self.many == 'named' else number}", item
 
 
 SECTIONS: tuple[Section, ...] = (
@@ -128,20 +128,18 @@ def template_of(path: str) -> str:
     ('gear.*.ratio', 'control.velocity.filter.*.depth')
     """
     for section in SECTIONS:
-        if section.many and path.startswith(section.path + "."):
-            rest = path[len(section.path) + 1 :].split(".")
-            return ".".join([section.path, "*", *rest[1:]])
+        if section.many and path.startswith(f"{section.path}."):
+            _, *rest = path.removeprefix(f"{section.path}.").split(".")
+            return ".".join([section.path, "*", *rest])
     return path
 
 
 def parts_of(design: model.Design) -> Iterator[tuple[Section, str, Any]]:
     """Each section that a design has: section, dotted path, part; repeated ones one by one."""
     for section in SECTIONS:
-        part = at_place(design, section.place)
         if section.many:
-            for index, item in enumerate(part or ()):
-                yield section, section.item_path(index, item), item
-        elif part is not None:
+            yield from ((section, path, item) for path, item in section.items(design))
+        elif (part := at_place(design, section.place)) is not None:
             yield section, section.path, part
 
 
@@ -160,8 +158,7 @@ def part_at(design: model.Design, path: str) -> Any:
     section = BY_PATH[path.rpartition(".")[0]]
     if not section.many:
         raise KeyError(path)
-    items = enumerate(at_place(design, section.place) or ())
-    return next((item for index, item in items if section.item_path(index, item) == path), None)
+    return dict(section.items(design)).get(path)
 
 
 def with_part(design: model.Design, path: str, part: Any) -> model.Design:
@@ -169,8 +166,7 @@ def with_part(design: model.Design, path: str, part: Any) -> model.Design:
     section = BY_PATH.get(path)
     if section is None:
         section = BY_PATH[path.rpartition(".")[0]]
-        old = at_place(design, section.place)
-        part = tuple(part if section.item_path(i, item) == path else item for i, item in enumerate(old))
+        part = tuple(part if one == path else item for one, item in section.items(design))
     outer, _, name = section.place.rpartition(".")
     while outer:
         part = replace(at_place(design, outer), **{name: part})

@@ -13,8 +13,8 @@ from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import checked_objects
-from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown, shown_path
+from actuator_lti.errors import InputError, in_file
+from actuator_lti.files.reading import parse_toml, read_text, shown, shown_path
 
 _INTEGER = re.compile(r"(?:[+-]?[0-9]{1,20}|0[xX][0-9A-Fa-f]{1,16})\Z")
 _NAMESPACE = "http://www.canopen.org/xml/1.0"
@@ -27,32 +27,29 @@ def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -
 
     The factor is 1 (per rad/s) or 9.549 (per rpm); without it what a TOML file says, else 1.
     """
-    where = shown_path(path)
-    text = decode(read_bytes(path, "settings file"), where)
+    text = read_text(path, "settings file")
     read = read_settings_xml if text.lstrip().startswith("<") else read_settings_toml
-    return read(text, where, velocity_gain_factor)
+    return read(text, shown_path(path), velocity_gain_factor)
 
 
-def parse_label(label: str, where: str) -> tuple[int, int]:
+def parse_label(label: str) -> tuple[int, int]:
     """Index and subindex of ``"0x2344.01"`` or ``"0x6080"``."""
     match = _LABEL.match(label)
     if match is None:
-        raise InputError(f'{shown(label)}: allowed: an object such as "0x2344.01" or "0x6080"', where=where)
+        raise InputError(f'{shown(label)}: allowed: an object such as "0x2344.01" or "0x6080"')
     return int(match[1], 16), int(match[2] or "0", 16)
 
 
-def _object_from(label: str, raw: Any, where: str) -> ControllerObject:
+def _object_from(label: str, raw: Any) -> ControllerObject:
     """One object from its entry in TOML: an integer, or a table with value, name and data_type."""
-    index, subindex = parse_label(label, where)
+    index, subindex = parse_label(label)
     table = {"name": "", "data_type": "", **(raw if isinstance(raw, dict) else {"value": raw})}
     value = table.get("value")
     if len(table) > 3 or isinstance(value, bool) or not isinstance(value, int):
-        raise InputError(
-            f"{label} = {shown(value)}: allowed: a whole number, or a table with value, name, data_type",
-            where=where,
-        )
+        allowed = "a whole number, or a table with value, name, data_type"
+        raise InputError(f"{label} = {shown(value)}: allowed: {allowed}")
     if not all(isinstance(table[key], str) for key in ("name", "data_type")):
-        raise InputError(f"{label}: name and data_type are texts", where=where)
+        raise InputError(f"{label}: name and data_type are texts")
     return ControllerObject(index=index, subindex=subindex, **table)
 
 
@@ -62,9 +59,7 @@ def object_entry(item: ControllerObject) -> Any:
     return {"value": item.value, **more} if more else item.value
 
 
-def objects_from(
-    raw: Any, where: str, factor: float | None = None, values: str = "values"
-) -> ControllerObjects:
+def objects_from(raw: Any, factor: float | None = None, values: str = "values") -> ControllerObjects:
     """Settings as a table: the calibration of the velocity gain, the family, and the objects.
 
     ``values`` is the key of the objects: in ``[objects]`` of a design file ``"values"``.
@@ -73,24 +68,24 @@ def objects_from(
     table = raw if isinstance(raw, dict) else {"": raw}
     for key in table:
         if key not in known:
-            raise InputError(f"{shown(key)}: unknown key; allowed: {', '.join(known)}", where=where)
+            raise InputError(f"{shown(key)}: unknown key; allowed: {', '.join(known)}")
     entries, family = table.get(values, {}), table.get("family", "")
     if not isinstance(entries, dict):
-        raise InputError(f"{values} = {shown(entries)}: allowed: a table", where=where)
+        raise InputError(f"{values} = {shown(entries)}: allowed: a table")
     if family not in get_args(ObjectFamily):
         allowed = " or ".join(f'"{one}"' for one in get_args(ObjectFamily))
-        raise InputError(f"family = {shown(family)}: allowed: {allowed}", where=where)
-    read = tuple(_object_from(label, entry, where) for label, entry in entries.items())
+        raise InputError(f"family = {shown(family)}: allowed: {allowed}")
+    read = tuple(_object_from(label, entry) for label, entry in entries.items())
     factor = table.get("velocity_gain_factor", 1.0) if factor is None else factor
-    return replace(checked_objects(read, factor, where), family=family)
+    return replace(checked_objects(read, factor), family=family)
 
 
 def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
     """Settings from TOML: ``velocity_gain_factor``, and ``"0x2344.01" = 120000`` in a table ``[objects]``."""
-    result = objects_from(parse_toml(text, where), where, velocity_gain_factor, "objects")
-    if not result.values:
-        allowed = 'allowed: a table with entries such as "0x2344.01" = 344'
-        raise InputError(f"objects: missing; {allowed}", where=where)
+    with in_file(where):
+        result = objects_from(parse_toml(text, where), velocity_gain_factor, "objects")
+        if not result.values:
+            raise InputError('objects: missing; allowed: a table with entries such as "0x2344.01" = 344')
     return result
 
 
@@ -119,73 +114,71 @@ def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None 
     No DTD, no entities and no external references are accepted.
     """
     values = objects_of_xml(text, where)
-    if not values:
-        raise InputError(
-            "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC", where=where
-        )
-    return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor, where)
+    with in_file(where):
+        if not values:
+            raise InputError(
+                "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC"
+            )
+        return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor)
 
 
 def objects_of_xml(text: str, where: str) -> tuple[ControllerObject, ...]:
     """The objects of a device configuration that have an actual value."""
-    return tuple(item for item, _ in _objects_in(parsed_xml(text, where), where))
+    with in_file(where):
+        return tuple(item for item, _ in _objects_in(parsed_xml(text)))
 
 
-def parsed_xml(text: str, where: str) -> Element:
+def parsed_xml(text: str) -> Element:
     """Plain XML; no DTD, no entities, at most 1 MiB."""
     from defusedxml import DefusedXmlException
     from defusedxml.ElementTree import fromstring
 
     if len(text) > TOML_BYTES.most:
-        raise InputError("is larger than allowed: at most 1 MiB", where=where)
+        raise InputError("is larger than allowed: at most 1 MiB")
     try:
         root: Element = fromstring(text.encode(), forbid_dtd=True)
     except DefusedXmlException:
-        raise InputError("holds a DTD or an entity; allowed: plain XML", where=where) from None
+        raise InputError("holds a DTD or an entity; allowed: plain XML") from None
     except (ParseError, ValueError, LookupError, RecursionError) as error:
-        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}", where=where) from None
+        raise InputError(f"not XML: {shown(str(error), 200)[1:-1]}") from None
     return root
 
 
-def _objects_in(element: Element, where: str, depth: int = 0) -> Iterator[tuple[ControllerObject, Element]]:
+def _objects_in(element: Element, depth: int = 0) -> Iterator[tuple[ControllerObject, Element]]:
     """Every object with an actual value, and the element that holds it."""
     if depth > 8 * TOML_DEPTH.most:
-        raise InputError("nested too deeply", where=where)
+        raise InputError("nested too deeply")
     if not _is(element, "CANopenObject"):
         for child in element:
-            yield from _objects_in(child, where, depth + 1)
+            yield from _objects_in(child, depth + 1)
         return
-    index = _hex(element, "index", 4, where)
+    index = _hex(element, "index", 4)
     subs = [child for child in element if _is(child, "CANopenSubObject")]
     for one in (element, *subs):
-        subindex = 0 if one is element else _hex(one, "subIndex", 2, where)
-        text = one.get("actualValue")
-        if text is not None:
-            yield _object_of(one, index, subindex, text.strip(), where), one
+        subindex = 0 if one is element else _hex(one, "subIndex", 2)
+        if one.get("actualValue") is not None:
+            yield _object_of(one, index, subindex), one
 
 
 def _is(element: Element, name: str) -> bool:
     return str(element.tag).rpartition("}")[2] == name
 
 
-def _hex(element: Element, attribute: str, digits: int, where: str) -> int:
+def _hex(element: Element, attribute: str, digits: int) -> int:
     text = element.get(attribute, "")
     if not re.fullmatch(rf"(?:0[xX])?[0-9A-Fa-f]{{1,{digits}}}", text):
-        raise InputError(
-            f"{attribute} = {shown(text)}: allowed: up to {digits} hexadecimal digits", where=where
-        )
+        raise InputError(f"{attribute} = {shown(text)}: allowed: up to {digits} hexadecimal digits")
     return int(text, 16)
 
 
-def _object_of(element: Element, index: int, subindex: int, text: str, where: str) -> ControllerObject:
+def _object_of(element: Element, index: int, subindex: int) -> ControllerObject:
     names = {"name": element.get("name", ""), "data_type": element.get("dataType", "")}
     item = ControllerObject(index=index, subindex=subindex, value=0, **names)
+    text = element.attrib["actualValue"].strip()
     if not _INTEGER.match(text):
-        raise InputError(
-            f"{item.label} = {shown(element.attrib['actualValue'])}: allowed: a whole number", where=where
-        )
+        raise InputError(f"{item.label} = {shown(element.attrib['actualValue'])}: allowed: a whole number")
     if any(len(name) > 200 for name in names.values()):
-        raise InputError(f"{item.label}: a name of more than 200 characters", where=where)
+        raise InputError(f"{item.label}: a name of more than 200 characters")
     return replace(item, value=int(text, 16 if text[:2] in ("0x", "0X") else 10))
 
 
@@ -211,13 +204,11 @@ def settings_xml(objects: ControllerObjects, into: Path | None = None) -> tuple[
     """Settings as XML text, alone or put into a device configuration file; and what found no place there."""
     if into is None:
         return write_settings_xml(objects), ()
-    where = shown_path(into)
-    return update_settings_xml(decode(read_bytes(into, "device configuration"), where), objects, where)
+    with in_file(shown_path(into)):
+        return update_settings_xml(read_text(into, "device configuration"), objects)
 
 
-def update_settings_xml(
-    text: str, objects: ControllerObjects, where: str = "settings"
-) -> tuple[str, tuple[str, ...]]:
+def update_settings_xml(text: str, objects: ControllerObjects) -> tuple[str, tuple[str, ...]]:
     """Put settings into the device configuration that they came from, which keeps all but its comments.
 
     Gives the new text, and the labels of objects that it has no place for.
@@ -225,9 +216,9 @@ def update_settings_xml(
     for prefix, uri in re.findall(r'xmlns(?::([A-Za-z][\w.-]*))?\s*=\s*"([^"]*)"', text):
         if not re.fullmatch(r"ns[0-9]+", prefix):
             register_namespace(prefix, uri)
-    root = parsed_xml(text, where)
+    root = parsed_xml(text)
     left = {item.place: item for item in objects.values}
-    for item, element in _objects_in(root, where):
+    for item, element in _objects_in(root):
         value = left.pop(item.place, item).value
         if value != item.value:
             as_hex = element.get("actualValue", "").strip()[:2] in ("0x", "0X") and value >= 0

@@ -31,10 +31,11 @@ def warnings_of(design: Design) -> tuple[str, ...]:
 
 
 def _loops(design: Design) -> Iterator[tuple[str, Any, float]]:
-    """Name, settings and period in s of each loop that the design has."""
-    for name in reversed(design.controller.stages):
-        loop = getattr(design.controller, name)
-        yield name, loop, getattr(loop, "every", 1) * design.controller.period_s
+    """Name, settings and period in s of each loop."""
+    control = design.controller
+    for name in reversed(control.stages):
+        loop = getattr(control, name)
+        yield name, loop, getattr(loop, "every", 1) * control.period_s
 
 
 def _sampling(design: Design) -> Iterator[str]:
@@ -108,12 +109,10 @@ def _unused(design: Design) -> Iterator[str]:
 
 
 def _gears(design: Design) -> Iterator[str]:
-    if design.total_ratio < 1.0:
-        for gear in (one for one in design.gears if one.ratio < 1.0):
-            yield (
-                f"gear.{gear.name}.ratio: {gear.ratio:.4g} turns the output faster than the motor; "
-                f'a reduction is written "{1.0 / gear.ratio:.6g}:1"'
-            )
+    for gear in design.gears if design.total_ratio < 1.0 else ():
+        if gear.ratio < 1.0:
+            faster = f"{gear.ratio:.4g} turns the output faster than the motor"
+            yield f'gear.{gear.name}.ratio: {faster}; a reduction is written "{1.0 / gear.ratio:.6g}:1"'
 
 
 def _loads(design: Design) -> Iterator[str]:
@@ -140,13 +139,11 @@ def _loads(design: Design) -> Iterator[str]:
             f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
             f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
         )
-    for load in design.validation.loads_Nm:
+    asked = [("validation.loads", load) for load in design.validation.loads_Nm]
+    asked += [(f"requirement.{item.id}.load", item.load_Nm or 0.0) for item in design.requirements]
+    for key, load in asked:
         if abs(load) > largest:
-            yield f"validation.loads: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"
-    for item in design.requirements:
-        if abs(item.load_Nm or 0.0) > largest:
-            key = f"requirement.{item.id}.load"
-            yield f"{key}: {item.load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+            yield f"{key}: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:
@@ -180,11 +177,10 @@ def _pedigree(design: Design) -> Iterator[str]:
 
 def _encoder(design: Design) -> Iterator[str]:
     quantum, encoder, top = design.angle_quantum_rad, design.encoder, design.limits.speed_rad_s
-    if encoder.speed != "difference" or quantum is None or design.controller.velocity is None:
+    velocity = design.controller.velocity
+    if encoder.speed != "difference" or quantum is None or velocity is None:
         return
-    step = quantum / (
-        encoder.difference_samples * design.controller.velocity.every * design.controller.period_s
-    )
+    step = quantum / (encoder.difference_samples * velocity.every * design.controller.period_s)
     if isfinite(top) and step > 0.05 * top:
         unit = "m/s" if design.axis == "linear" else "rad/s"
         yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"

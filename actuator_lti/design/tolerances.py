@@ -31,13 +31,8 @@ def _width(text: str | float | int, nominal: float, parse: Parse) -> float:
 def read_tolerance(raw: Any, nominal: float, parse: Parse, field: Field, unit: str) -> Tolerance:
     """The tolerance of a value from its text (half width of a uniform one) or its table.
 
-    ``parse`` reads a quantity of this key into SI.
-
-    Raises
-    ------
-    InputError
-        If a part is missing or too many, or the tolerance leaves the allowed range of the key; ``where`` is
-        the key of a table that is wrong.
+    ``parse`` reads a quantity of this key into SI. An InputError where a part is missing or too many, or the
+    tolerance leaves the allowed range of the key; its ``where`` is the key of a table that is wrong.
     """
     table = raw if isinstance(raw, dict) else {"half_width": raw}
     if isinstance(raw, bool | list) or not isinstance(raw, dict | str | int | float):

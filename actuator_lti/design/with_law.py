@@ -20,14 +20,13 @@ METHODS = {"tustin": "bilinear", "zoh": "zoh"}
 
 
 def _columns(system: Any) -> tuple[Any, ...]:
-    """A, B, C, D of a transfer function of python-control with one output, its columns side by side."""
+    """Of a transfer function of python-control: one output, its columns side by side."""
     from scipy.linalg import block_diag
     from scipy.signal import tf2ss
 
     if len(system.num) != 1:
         raise InputError(f"system: {len(system.num)} outputs; allowed: one, that of the stage")
-    parts = [tf2ss(num, den) for num, den in zip(system.num[0], system.den[0], strict=True)]
-    A, B, C, D = zip(*parts, strict=True)
+    A, B, C, D = zip(*map(tf2ss, system.num[0], system.den[0]), strict=True)
     return block_diag(*A), block_diag(*B), np.hstack(C), np.hstack(D)
 
 

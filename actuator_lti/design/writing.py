@@ -12,17 +12,18 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any, cast
 
-from actuator_lti.design.access import located
+from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
-from actuator_lti.design.fields import Structure, field_of, fields_in
+from actuator_lti.design.fields import field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
 from actuator_lti.design.mistakes import Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
-from actuator_lti.design.sections import RECORDS, SECTIONS, parts_of
+from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
-from actuator_lti.design.units import ampere_unit, si_text
+from actuator_lti.design.tolerances import tolerances
+from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -42,12 +43,11 @@ def write_design(design: Design) -> str:
 
 def design_tree(design: Design) -> Tree:
     """The tree of plain values behind :func:`write_design`."""
-    structure = Structure.of(design)
     head = {"name": design.name, "title": design.title, "axis": design.axis}
     head |= {key: getattr(design, key) for key in ("revision", "description") if getattr(design, key)}
     tree: Tree = {"design": head}
     for section, path, part in parts_of(design):
-        table = _section(design, part, path, section.template, structure)
+        table = _table(design, part, path, section)
         here = tree
         for name in section.path.split(".")[:-1]:
             here = here.setdefault(name, {})
@@ -57,8 +57,7 @@ def design_tree(design: Design) -> Tree:
         elif table or section.required or section.optional:
             here[section.key] = table
     for record in RECORDS:
-        items = getattr(design, record.attribute)
-        tree[record.key] = [_section(design, item, "", record.template, structure) for item in items]
+        tree[record.key] = [_table(design, item, "", record) for item in getattr(design, record.attribute)]
     if design.objects != ControllerObjects():
         tree["objects"] = {
             "velocity_gain_factor": design.objects.velocity_gain_factor,
@@ -68,22 +67,20 @@ def design_tree(design: Design) -> Tree:
     return {key: value for key, value in tree.items() if value not in ({}, [])}
 
 
-def _section(design: Design, part: Any, name: str, template: str, structure: Structure) -> Tree:
-    defaults = {item.name: item.default for item in dataclass_fields(part)}
-    section: Tree = {}
-    for field in fields_in(template):
-        value = getattr(part, field.attribute)
-        known = design.parameters.get(f"{name}.{field.key}")
+def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
+    table: Tree = {}
+    for field in fields_in(section.template):
+        value, path = getattr(part, field.attribute), f"{name}.{field.key}"
+        known = design.parameters.get(path)
         if known is not None and known.value == value:
-            section[field.key] = _entry(known, design.motor.constants)
-        elif value is not None and value != inf and value != defaults[field.attribute]:
-            unit = part.unit if field.kind == "limit" else field.unit(structure)
-            unit = ampere_unit(f"{name}.{field.key}", unit, design.motor.constants)
-            section[field.key] = _bare(value, unit)
+            table[field.key] = _entry(known, unit_in_file(design, path, field))
+        elif value is not None and value != inf and value != field.default:
+            unit = part.unit if field.kind == "limit" else unit_in_file(design, path, field)
+            table[field.key] = _bare(value, unit)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
-    if unsaid and len(section) == 1 and part.full_deflection_rad == default_deflection(design.axis):
+    if unsaid and len(table) == 1 and part.full_deflection_rad == default_deflection(design.axis):
         return {}
-    return section
+    return table
 
 
 def _bare(value: Any, unit: str) -> Any:
@@ -102,11 +99,11 @@ def _written(text: str) -> str | int | float:
     return text
 
 
-def _entry(known: Parameter, constants: str) -> Any:
+def _entry(known: Parameter, unit: str) -> Any:
     value = _written(known.text)
     more: Tree = {key: getattr(known, key) for key in ("source", "grade") if getattr(known, key)}
     if known.tolerance is not None:
-        more["tolerance"] = _tolerance(known.tolerance, ampere_unit(known.path, known.unit, constants))
+        more["tolerance"] = _tolerance(known.tolerance, unit)
     return {"value": value, **more} if more else value
 
 
@@ -127,8 +124,7 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     design : Design
     overrides : mapping
         Dotted path to text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
-        "gear.worm.ratio": 40, "design.name": "variant"}``.  A number replaces the value and drops its
-        source; a table replaces the whole entry.
+        "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry.
 
     Raises
     ------
@@ -166,12 +162,10 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
     if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
         raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
-    structure = Structure.of(design)
     result: Tree = {}
     for path, value in values.items():
         field = field_of(path)
-        unit = "1" if field is None or field.kind != "quantity" else field.unit(structure)
-        unit = ampere_unit(path, unit, design.motor.constants)
+        unit = unit_in_file(design, path, field if field is None or field.kind == "quantity" else None)
         plain = isinstance(value, int | float) and not isinstance(value, bool)
         result[path] = si_text(float(value), unit) if plain and unit != "1" else value
     return result
@@ -180,10 +174,7 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
 def read_value(design: Design, path: str, text: str | float) -> float:
     """A numeric key's value in SI as the design's file would have it from this text; a bare number is in SI.
 
-    Raises
-    ------
-    InputError
-        For an unknown key, a wrong unit, or a value that the key does not allow.
+    An InputError for an unknown key, a wrong unit, or a value that the key does not allow.
     """
     field, _ = located(design, path)
     with suppress(ValueError):
@@ -242,11 +233,7 @@ def design_hash(design: Design) -> str:
     content["requirements"] = sorted((_canonical(item) for item in design.requirements), key=str)
     content |= {"waivers": [asdict(item) for item in design.waivers]} if design.waivers else {}
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
-    content["tolerances"] = {
-        path: _canonical(item.tolerance)
-        for path, item in sorted(design.parameters.items())
-        if item.tolerance is not None
-    }
+    content["tolerances"] = {path: _canonical(tolerance) for path, _, tolerance in tolerances(design)}
     text = json.dumps(content, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -259,6 +246,4 @@ def _canonical(value: Any) -> Any:
         return {name: _canonical(getattr(value, name)) for name in names}
     if isinstance(value, tuple):
         return [_canonical(item) for item in value]
-    if isinstance(value, bool | str) or value is None:
-        return value
-    return format(float(value), ".12g")
+    return value if isinstance(value, bool | str | None) else format(float(value), ".12g")

@@ -24,6 +24,7 @@ from actuator_lti.files.reading import reason
 
 Name = TypeVar("Name", bound=str | os.PathLike[str])
 _PART = ".part"
+_NO_FILE = "is no file; allowed: a file, a pipe or a character device"
 _STANDARD = ("stdin", "stdout", "stderr")
 _OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|stderr))\Z")
 
@@ -81,8 +82,7 @@ def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO]
     try:
         for name, write in files:
             path = Path(name)
-            target = _target(path)
-            if target is None:
+            if (target := _target(path)) is None:
                 through.append((_held(write), path))
             else:
                 staged.append((_stage(target, write), target))
@@ -114,12 +114,8 @@ def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO]
 def _target(path: Path) -> Path | None:
     """Where a file is put: links are followed to their end; ``None`` for what is no regular file.
 
-    Everything below ``/dev`` and ``/proc`` is an open file of some process, whatever it looks like.
-
-    Raises
-    ------
-    InputError
-        For a directory, a socket or a block device.
+    Everything below ``/dev`` and ``/proc`` is an open file of some process, whatever it looks like. A socket
+    or a block device is an InputError.
     """
     if str(path.absolute()).startswith(("/dev/", "/proc/")) and not str(path).startswith("/dev/shm/"):
         return None
@@ -132,7 +128,7 @@ def _target(path: Path) -> Path | None:
         return real
     if stat.S_ISCHR(mode) or stat.S_ISFIFO(mode):
         return None
-    raise InputError("is no file; allowed: a file, a pipe or a character device", where=str(path))
+    raise InputError(_NO_FILE, where=str(path))
 
 
 def _held(write: Callable[[BinaryIO], object]) -> BinaryIO:
@@ -154,7 +150,7 @@ def _write_through(held: BinaryIO, path: Path) -> None:
     with os.fdopen(handle, "wb", buffering=0) as device:
         mode = os.fstat(handle).st_mode
         if stat.S_ISBLK(mode) or stat.S_ISDIR(mode):
-            raise InputError("is no file; allowed: a file, a pipe or a character device", where=str(path))
+            raise InputError(_NO_FILE, where=str(path))
         if not own:
             os.set_blocking(handle, True)
         shutil.copyfileobj(held, device)

@@ -97,24 +97,21 @@ class _Reader:
     def _array(self, name: str, parts: list[Part], place: int) -> bool:
         """A numeric array; a complex one is kept, too, but not taken for a real one."""
         flags = self._flags(parts[0])
-        is_complex = bool((flags >> 8) & COMPLEX_FLAG)
+        is_complex, at = bool((flags >> 8) & COMPLEX_FLAG), f'array "{name}" at byte {place}'
         if len(parts) < (5 if is_complex else 4) or not (is_complex or flags & 0xFF in NUMERIC_CLASSES):
             return False
         shape, values = self._numbers(parts[1]), self._numbers(parts[3])
         if shape is None or values is None or not 0 < len(shape) <= MAX_DIMENSIONS:
-            raise InputError(f'array "{name}" at byte {place}: no numbers in it')
+            raise InputError(f"{at}: no numbers in it")
         dimensions = [int(n) for n in shape]
-        count = prod(dimensions)
-        if min(dimensions) < 0 or count != len(values):
-            raise InputError(
-                f'array "{name}" at byte {place}: {len(values)} numbers for the shape {dimensions}'
-            )
+        if min(dimensions) < 0 or prod(dimensions) != len(values):
+            raise InputError(f"{at}: {len(values)} numbers for the shape {dimensions}")
         if not is_complex:
             self.content.arrays[name] = values.reshape(dimensions, order="F")
             return True
         imaginary = self._numbers(parts[4])
-        if imaginary is None or len(imaginary) != count:
-            raise InputError(f'array "{name}" at byte {place}: no imaginary part for the shape {dimensions}')
+        if imaginary is None or len(imaginary) != len(values):
+            raise InputError(f"{at}: no imaginary part for the shape {dimensions}")
         self.content.complexes[name] = (values + 1j * imaginary).reshape(dimensions, order="F")
         return False
 

@@ -13,6 +13,7 @@ import re
 import stat
 import tomllib
 import unicodedata
+from collections import Counter
 from difflib import get_close_matches
 from os import PathLike
 from pathlib import Path
@@ -30,7 +31,7 @@ from actuator_lti.bounds import (
     TOML_VALUES,
     Bound,
 )
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.tree import Tree
 
 INTEGERS = range(-(1 << 63), 1 << 63)
@@ -80,23 +81,19 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
     InputError
         Naming the file and what is allowed.
     """
-    where = shown_path(path)
-    try:
-        handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    except FileNotFoundError:
-        raise InputError(
-            f"cannot be read: no such file{_near(path)}; allowed: a {what}", where=where
-        ) from None
-    except IsADirectoryError:
-        raise InputError(f"is a directory; allowed: a {what}", where=where) from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {reason(error)}", where=where) from None
-    mode = os.fstat(handle).st_mode
-    if not stat.S_ISREG(mode):
+    with in_file(shown_path(path)):
+        try:
+            handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        except FileNotFoundError:
+            raise InputError(f"cannot be read: no such file{_near(path)}; allowed: a {what}") from None
+        except (OSError, ValueError) as error:
+            raise InputError(f"cannot be read: {reason(error)}") from None
+        mode = os.fstat(handle).st_mode
+        if stat.S_ISREG(mode):
+            return os.fdopen(handle, "rb")
         os.close(handle)
         kind = "is a directory" if stat.S_ISDIR(mode) else "is no regular file"
-        raise InputError(f"{kind}; allowed: a {what}", where=where)
-    return os.fdopen(handle, "rb")
+        raise InputError(f"{kind}; allowed: a {what}")
 
 
 def _near(path: str | PathLike[str]) -> str:
@@ -122,16 +119,15 @@ def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound
     InputError
         Naming the file and what is allowed.
     """
-    where = shown_path(path)
     data = bytearray()
-    with open_regular(path, what) as stream:
+    with in_file(shown_path(path)), open_regular(path, what) as stream:
         try:
             while len(data) <= most.most and (piece := stream.read(_PIECE)):
                 data += piece
         except OSError as error:
-            raise InputError(f"cannot be read: {reason(error)}", where=where) from None
-    if len(data) > most.most:
-        raise InputError(f"is larger than allowed: {most.allowed}", where=where)
+            raise InputError(f"cannot be read: {reason(error)}") from None
+        if len(data) > most.most:
+            raise InputError(f"is larger than allowed: {most.allowed}")
     return bytes(data)
 
 
@@ -145,7 +141,17 @@ def decode(data: bytes, where: str) -> str:
         raise InputError(f"byte {error.start} is not UTF-8; allowed: UTF-8 text", where=where) from None
 
 
-def read_toml(path: str | PathLike[str], what: str = "design file") -> Tree:
+def read_text(path: str | PathLike[str], what: str = "design file", most: Bound = TOML_BYTES) -> str:
+    """The text of a regular file of bounded size; as `read_bytes`, `decode`."""
+    return decode(read_bytes(path, what, most), shown_path(path))
+
+
+def read_toml(
+    path: str | PathLike[str],
+    what: str = "design file",
+    size: Bound = TOML_BYTES,
+    values: Bound = TOML_VALUES,
+) -> Tree:
     """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
 
     Raises
@@ -153,20 +159,17 @@ def read_toml(path: str | PathLike[str], what: str = "design file") -> Tree:
     InputError
         Naming the file, the place and what is allowed.
     """
-    return parse_toml(decode(read_bytes(path, what), shown_path(path)), shown_path(path))
+    return parse_toml(read_text(path, what, size), shown_path(path), size=size, values=values)
 
 
 def read_campaign_toml(path: str | PathLike[str]) -> Tree:
     """As `read_toml`, for campaign and record files, which list thousands of runs."""
-    where = shown_path(path)
-    text = decode(read_bytes(path, "campaign or record file", CAMPAIGN_BYTES), where)
-    return parse_toml(text, where, size=CAMPAIGN_BYTES, values=CAMPAIGN_VALUES)
+    return read_toml(path, "campaign or record file", CAMPAIGN_BYTES, CAMPAIGN_VALUES)
 
 
 def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
     """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
-    where = shown_path(path)
-    text = decode(read_bytes(path, what, REPORT_BYTES), where)
+    where, text = shown_path(path), read_text(path, what, REPORT_BYTES)
     if not text.strip():
         raise InputError(f"is empty; allowed: a {what}", where=where)
     return parse_json(text, where)
@@ -174,17 +177,17 @@ def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
 
 def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound = TOML_VALUES) -> Tree:
     """The tree of a TOML text, refused with line and column where the syntax is wrong."""
-    if len(text) > size.most:
-        raise InputError(f"is larger than allowed: {size.allowed}", where=where)
-    _refuse_long_keys(text, where)
-    try:
-        tree = tomllib.loads(text)
-    except RecursionError:
-        raise InputError(_too_deep("", TOML_DEPTH), where=where) from None
-    except (ValueError, OverflowError) as error:
-        said = f"{shown(str(error), 200)[1:-1]}{_hint(text, error)}"
-        raise InputError(f"not TOML: {said}", where=where) from None
-    _walk(tree, where, TOML_DEPTH, values, TEXT_CHARACTERS)
+    with in_file(where):
+        if len(text) > size.most:
+            raise InputError(f"is larger than allowed: {size.allowed}")
+        _refuse_long_keys(text)
+        try:
+            tree = tomllib.loads(text)
+        except RecursionError:
+            raise InputError(_too_deep("", TOML_DEPTH)) from None
+        except (ValueError, OverflowError) as error:
+            raise InputError(f"not TOML: {_plain(str(error), 200)}{_hint(text, error)}") from None
+        _walk(tree, TOML_DEPTH, values, TEXT_CHARACTERS)
     return tree
 
 
@@ -217,21 +220,22 @@ def _hint(text: str, error: Exception) -> str:
     if result := _COMMA.match(line):
         return f"; use a decimal point: {result[1]} = {result[2].replace(',', '.')}"
     if result := _UNQUOTED.match(line):
-        return f'; put a quantity in quotes: {result[1]} = "{shown(result[2].replace(",", "."))[1:-1]}"'
+        return f'; put a quantity in quotes: {result[1]} = "{_plain(result[2].replace(",", "."))}"'
     return ""
 
 
 def parse_json(text: str, where: str) -> Any:
     """The value of a JSON text: no NaN, no key twice, bounded depth, no control characters."""
-    try:
-        value = json.loads(
-            text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_no_key_twice
-        )
-    except RecursionError:
-        raise InputError(_too_deep("", JSON_DEPTH), where=where) from None
-    except (ValueError, OverflowError) as error:
-        raise InputError(f"not JSON: {shown(str(error), 200)[1:-1]}", where=where) from None
-    _walk(value, where, JSON_DEPTH, None, None)
+    with in_file(where):
+        try:
+            value = json.loads(
+                text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_no_key_twice
+            )
+        except RecursionError:
+            raise InputError(_too_deep("", JSON_DEPTH)) from None
+        except (ValueError, OverflowError) as error:
+            raise InputError(f"not JSON: {_plain(str(error), 200)}") from None
+        _walk(value, JSON_DEPTH, None, None)
     return value
 
 
@@ -247,30 +251,30 @@ def _finite(digits: str) -> float:
 
 
 def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
-    made = dict(pairs)
-    if len(made) != len(pairs):
-        keys = [key for key, _ in pairs]
-        raise ValueError(
-            f"the key {shown(next(k for k in keys if keys.count(k) > 1))} stands twice in one table"
-        )
-    return made
+    twice = next((key for key, count in Counter(key for key, _ in pairs).items() if count > 1), None)
+    if twice is not None:
+        raise ValueError(f"the key {shown(twice)} stands twice in one table")
+    return dict(pairs)
 
 
-def _refuse_long_keys(text: str, where: str) -> None:
+def _refuse_long_keys(text: str) -> None:
     for number, line in enumerate(text.splitlines(), 1):
         head = line.partition("=")[0]
         if head.count(".") > KEY_PARTS.most and not head.lstrip().startswith("#"):
-            raise InputError(
-                f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels", where=where
-            )
+            raise InputError(f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels")
+
+
+def _plain(text: str, longest: int = 60) -> str:
+    """A text as `shown`, without quotes."""
+    return shown(text, longest)[1:-1]
 
 
 def _too_deep(path: str, depth: Bound) -> str:
-    at = f"{shown(path)[1:-1]}: " if path else ""
+    at = f"{_plain(path)}: " if path else ""
     return f"{at}nested too deeply; allowed: {depth.most} levels"
 
 
-def _walk(tree: Any, where: str, depths: Bound, values: Bound | None, length: Bound | None) -> None:
+def _walk(tree: Any, depths: Bound, values: Bound | None, length: Bound | None) -> None:
     """Refuse deep nesting, too many values, long texts, huge integers and control characters."""
     stack: list[tuple[str, Any, int]] = [("", tree, 0)]
     count = 0
@@ -278,12 +282,12 @@ def _walk(tree: Any, where: str, depths: Bound, values: Bound | None, length: Bo
         path, value, depth = stack.pop()
         count += 1
         if depth > depths.most:
-            raise InputError(_too_deep(path, depths), where=where)
+            raise InputError(_too_deep(path, depths))
         if values is not None and count > values.most:
-            raise InputError(f"more values than allowed: {values.allowed}", where=where)
+            raise InputError(f"more values than allowed: {values.allowed}")
         if isinstance(value, dict):
             for key, item in value.items():
-                _check_text(key, f"a key of {path or 'the file'}", where, _CONTROL_OF_KEYS, length)
+                _check_text(key, f"a key of {path or 'the file'}", _CONTROL_OF_KEYS, length)
                 stack.append((f"{path}.{key}" if path else key, item, depth + 1))
         elif isinstance(value, list):
             stack.extend(
@@ -292,25 +296,18 @@ def _walk(tree: Any, where: str, depths: Bound, values: Bound | None, length: Bo
                 if values is not None or type(item) not in _HARMLESS
             )
         elif isinstance(value, str):
-            _check_text(value, path, where, _CONTROL, length)
+            _check_text(value, path, _CONTROL, length)
         elif isinstance(value, int) and value not in INTEGERS:
-            raise InputError(
-                f"{shown(path)[1:-1]} = {shown(value)}: allowed: whole numbers of 64 bits", where=where
-            )
+            raise InputError(f"{_plain(path)} = {shown(value)}: allowed: whole numbers of 64 bits")
 
 
-def _check_text(text: str, path: str, where: str, refused: tuple[str, ...], length: Bound | None) -> None:
+def _check_text(text: str, path: str, refused: tuple[str, ...], length: Bound | None) -> None:
     """Refuse a long text, and characters of some Unicode categories; line break and tab may stand."""
     if length is not None and len(text) > length.most:
-        raise InputError(
-            f"{shown(path)[1:-1]}: {len(text)} characters; allowed: {length.allowed}", where=where
-        )
-    if text.isprintable():
-        return
-    for character in text:
+        raise InputError(f"{_plain(path)}: {len(text)} characters; allowed: {length.allowed}")
+    for character in () if text.isprintable() else text:
         if unicodedata.category(character) in refused and character not in "\n\t":
+            code = f"U+{ord(character):04X}"
             raise InputError(
-                f"{shown(path)[1:-1]} = {shown(text)}: holds the control character U+{ord(character):04X}; "
-                "allowed: printable text",
-                where=where,
+                f"{_plain(path)} = {shown(text)}: holds the control character {code}; allowed: printable text"
             )

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.mat5 import read_mat5
-from actuator_lti.files.reading import decode, read_bytes, shown, shown_path
+from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
 
 FloatArray = NDArray[np.float64]
 Loop = Literal["L", "T", "S"]
@@ -107,21 +107,15 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
         return _response(columns | {"re": values.real, "im": values.imag}, "measured response", averages)
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
-    where = shown_path(source)
-    try:
-        if Path(source).suffix.lower() == ".mat":
-            content = read_mat5(read_bytes(source, WHAT, MAT_BYTES))
-            split = {
-                f"{k}.{part}": getattr(z, part)
-                for k, z in content.complexes.items()
-                for part in ("real", "imag")
-            }
-            columns = {name: values.ravel() for name, values in (content.arrays | split).items()}
+    with in_file(shown_path(source)):
+        if Path(source).suffix.lower() != ".mat":
+            columns = _table(read_text(source, WHAT, TABLE_BYTES))
         else:
-            columns = _table(decode(read_bytes(source, WHAT, TABLE_BYTES), where))
+            content = read_mat5(read_bytes(source, WHAT, MAT_BYTES))
+            columns = {name: values.ravel() for name, values in content.arrays.items()}
+            for name, values in content.complexes.items():
+                columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}
         return _response(columns, Path(source).name, averages)
-    except InputError as error:
-        raise InputError(error.message, where=where) if error.where is None else error from None
 
 
 def _table(text: str) -> dict[str, FloatArray]:
@@ -205,9 +199,8 @@ def _values(table: Mapping[str, FloatArray], found: Mapping[str, str]) -> NDArra
         if said is None:
             raise InputError(f"{shown(found[role])} says no unit; allowed: {allowed}")
     with np.errstate(over="ignore", under="ignore"):
-        made: NDArray[np.complex128] = np.where(unit == "dB", 10.0 ** (size / 20.0), size) * np.exp(
-            1j * turn * phase
-        )
+        ratio = 10.0 ** (size / 20.0) if unit == "dB" else size
+        made: NDArray[np.complex128] = ratio * np.exp(1j * turn * phase)
     return made
 
 

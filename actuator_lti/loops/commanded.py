@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,7 @@ from scipy.optimize import brentq
 
 from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
 from actuator_lti.drive.profile import CommandMean
-from actuator_lti.margins.delays.form import delay_form
+from actuator_lti.margins.delays.form import delay_form, in_series
 from actuator_lti.margins.distances import INVERSE
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import given_of
@@ -25,7 +24,6 @@ from actuator_lti.margins.loop import Real, loop_of, rational_loop
 from actuator_lti.step import StepFigures
 from actuator_lti.systems.delay_response import DelayResponse
 
-_NARROW = 1e-6  # of the frequency: what is decided by a sign at both ends of so small an interval
 _OVER = 1e-9  # of the final value: less is no overshoot
 
 
@@ -40,15 +38,17 @@ def commanded_bandwidth(response: Any, mean: CommandMean) -> Bandwidth:
     end = zero_rad_s
     if own.resonance_peak_db > 13.0:  # the lobes behind the zero are 13.26 dB down: only then they matter
         end = max(end, 2.0 * own.resonance_rad_s)
-    if hasattr(response, "delays_s") and response.delays_s.size:
-        late = DelayResponse.of(delay_form(response)).behind_mean(mean.samples, mean.period_s)
-        crossings = late.crossings(abs(own.dc_gain) * math.sqrt(0.5), zero_rad_s)
-        least, place = late.smallest(INVERSE, end)
-        peak = 1.0 / (least * abs(own.dc_gain))
+    dc, level = abs(own.dc_gain), math.sqrt(0.5)
+    if response.dt:
+        gain = _Gain(response, mean, dc)
+        crossings, (peak, place) = gain.crossings(level), gain.largest(end)
     else:
-        gain = _Gain(response, mean, abs(own.dc_gain))
-        crossings = gain.crossings(math.sqrt(0.5))
-        peak, place = gain.largest(end)
+        has_delays = hasattr(response, "delays_s")
+        form = delay_form(response) if has_delays else in_series(rational_loop(response), 0.0)
+        late = DelayResponse.of(form).behind_mean(mean.samples, mean.period_s)
+        crossings = late.crossings(dc * level, zero_rad_s)
+        least, place = late.smallest(INVERSE, end)
+        peak = 1.0 / (least * dc)
     peak_db = 20.0 * math.log10(peak)
     return replace(
         own,
@@ -61,79 +61,56 @@ def commanded_bandwidth(response: Any, mean: CommandMean) -> Bandwidth:
 
 
 class _Gain:
-    """The gain behind the mean over its value at zero frequency, bounded over intervals of frequency."""
+    """The gain of a sampled response behind the mean, over its value at zero frequency.
+
+    The mean over n samples is (z^n - 1)/(n (z - 1) z^(n-1)): n - 1 zeros on the unit circle, as many poles at
+    z = 0, which join the factors of the response.
+    """
 
     def __init__(self, response: Any, mean: CommandMean, dc: float) -> None:
-        if hasattr(response, "delays_s"):
-            response = response.to_state_space()
-        self._loop = loop_of(given_of(response), warp=True)
-        self.factors = factored(self._loop)
-        self.mean, self.dc = mean, dc
-
-    def w(self, omega: float) -> float:
-        """The argument of the factors."""
-        period = self._loop.period_s
-        return omega if period is None else math.tan(min(0.5 * omega * period, 0.5 * math.pi))
-
-    def omega(self, w: Real) -> Real:
-        """Angular frequency, rad/s."""
-        period = self._loop.period_s
-        return w if period is None else 2.0 * np.arctan(w) / period
+        self.loop = loop_of(given_of(response), warp=True)
+        self.mean, self.dc, n = mean, dc, mean.samples
+        own, k = factored(self.loop), np.arange(1, n)
+        zeros = 1j * np.tan(math.pi / n * k[2 * k != n])  # one at z = -1 lies at infinity
+        roots, weights = np.append(zeros, -1.0), np.append(np.ones(zeros.size), 1.0 - n)
+        self.factors = replace(
+            own,
+            roots=np.concatenate((own.roots, roots)),
+            weights=np.concatenate((own.weights, weights)),
+            log_gain=own.log_gain - math.log(dc) - float(np.log(np.abs(zeros)).sum()),
+        )
 
     def at(self, w: float) -> float:
-        """The gain."""
-        own = abs(complex(self._loop.at(np.array([w]))[0]))
-        return own / self.dc * abs(complex(self.mean.response(self.omega(np.array([w])))[0]))
+        """The gain at w = tan(angle/2)."""
+        own, mean = self.loop.at(np.array([w])), self.mean.response(np.array([self.loop.frequency(w)]))
+        return float(np.abs(own * mean)[0]) / self.dc
 
-    def bounds(self, low_w: Real, high_w: Real) -> tuple[Real, Real]:
-        """No less and no more than this inside each interval: the mean falls up to its first zero."""
-        own = np.array(self.factors.gain_bounds(low_w, high_w)) / self.dc
-        low, high = self.omega(low_w), self.omega(high_w)
-        before = high <= self.mean.first_zero_rad_s
-        least = np.where(before, np.abs(self.mean.response(high)), 0.0)
-        half = 0.5 * low * self.mean.period_s
-        with np.errstate(divide="ignore"):
-            lobe = 1.0 / (self.mean.samples * np.abs(np.sin(np.minimum(half, 0.5 * math.pi))))
-        most = np.where(before, np.abs(self.mean.response(low)), np.minimum(lobe, 1.0))
-        return own[0] * least, own[1] * most
-
-    def _split(self, end: float, resolved: Any) -> Real:
-        """Intervals up to there, resolved or narrow: low, high and most gain, in order; shape (3, k)."""
-        places = self.factors.places
-        edges = np.concatenate(([0.0], places[places < self.w(end)], [self.w(end)]))
-        low, high, done = edges[:-1], edges[1:], []
-        while low.size:
-            least, most = self.bounds(low, high)
-            good = resolved(least, most) | (high - low < _NARROW * high)
-            done.append(np.array((low, high, most))[:, good])
-            low, high = low[~good], high[~good]
-            middle = 0.5 * (low + high)
-            low, high = np.append(low, middle), np.append(middle, high)
-        found = np.concatenate(done, axis=1)
-        return found[:, found[0].argsort()]
+    def _top(self, omega: float) -> float:
+        return math.tan(min(0.5 * omega * self.mean.period_s, 0.5 * math.pi))
 
     def crossings(self, level: float) -> list[float]:
         """Where the gain passes a level, rad/s, up to the first zero of the mean; at least one."""
-        _, high, _ = self._split(
-            self.mean.first_zero_rad_s, lambda least, most: (least > level) | (most < level)
-        )
-        edges = [0.0, *high.tolist()]
-        pairs = [(a, b) for a, b in pairwise(edges) if (self.at(a) > level) != (self.at(b) > level)]
+        w = self.factors.passages(0.0, self._top(self.mean.first_zero_rad_s), math.log(level))
+        between = 0.5 * (w[1:] + w[:-1])
+        low, high = np.maximum(0.5 * w, [0.0, *between]), np.minimum(2.0 * w, [*between, np.inf])
+        pairs = zip(low, high, strict=True)
         found = [brentq(lambda w: self.at(w) - level, *pair, xtol=1e-300, rtol=1e-14) for pair in pairs]
-        return self.omega(np.array(found)).tolist()
+        return [self.loop.frequency(each) for each in found]
 
     def largest(self, end: float) -> tuple[float, float]:
         """The largest gain up to there and where, rad/s; (1, 0) where it only falls."""
-        best = [1.0]
+        ((_, w),) = self.factors.nearest(self.factors.along(0.0, self._top(end)), (INVERSE,), ((1.0, 0.0),))
+        return max((self.at(w), self.loop.frequency(w)), (1.0, 0.0))
 
-        def beaten(least: Real, most: Real) -> Any:
-            best[0] = max(best[0], float(least.max(initial=0.0)))
-            return most <= best[0]
 
-        low, high, most = self._split(end, beaten)
-        near = 0.5 * (low + high)[most >= best[0]]
-        w = max(near.tolist(), key=self.at, default=0.0)
-        return (self.at(w), float(self.omega(np.array(w)))) if w and self.at(w) > 1.0 else (1.0, 0.0)
+def sampled_step(system: Any, samples: int) -> Real:
+    """The first samples of the unit step response of a sampled system."""
+    loop = rational_loop(system)
+    state, y = np.zeros(loop.order), np.empty(samples)
+    for k in range(samples):
+        y[k] = float(state @ loop.c) + loop.d
+        state = loop.A @ state + loop.b
+    return y
 
 
 def commanded_step(response: Any, own: StepFigures, mean: CommandMean) -> StepFigures:
@@ -142,12 +119,8 @@ def commanded_step(response: Any, own: StepFigures, mean: CommandMean) -> StepFi
     ``own`` are those of the response itself; it has settled before the end of its own time.
     """
     period = float(own.period_s or 0.0)
-    loop, count = rational_loop(response), round(float(own.time_s[-1]) / period) + 1 + mean.samples
-    state, y = np.zeros(loop.order), np.empty(count)
-    for k in range(count):
-        y[k] = float(state @ loop.c) + loop.d
-        state = loop.A @ state + loop.b
-    total = np.cumsum(y)
+    count = round(float(own.time_s[-1]) / period) + 1 + mean.samples
+    total = np.cumsum(sampled_step(response, count))
     total[mean.samples :] -= total[: -mean.samples].copy()
     part = total / mean.samples / own.final_value
     outside = np.flatnonzero(np.abs(part - 1.0) > 0.02)

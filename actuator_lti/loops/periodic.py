@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.tick import Block, TickProgram, siso, used
+from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, used
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_common_rest_mode
 
@@ -144,27 +144,13 @@ class PeriodicLoop:
             return np.asarray(np.where(T == 1.0, np.inf, T / (1.0 - T)))
 
     def closed(self, points: npt.ArrayLike) -> np.ndarray:
-        """T of the fundamental at points z, of their shape.
-
-        T(z) is the mean over the updates m of ``C_m x_m z^-m`` for the input z^m at the closed loop, with
-        ``x_M = z^M x_0``.
-        """
-        z = np.asarray(points, dtype=complex)
-        turn, n = z.reshape(-1, 1), self.systems[0][0].shape[0]
-        forced, over = np.zeros((turn.size, n), dtype=complex), np.eye(n)
-        _, scale = balanced(self._over(1.0))
+        """T of the fundamental at points z, of their shape."""
+        z, (_, scale) = np.asarray(points, dtype=complex), balanced(self._over(1.0))
         closed = [
-            ((A - B @ C) * scale / scale[:, None], B[:, 0] / scale, C[0] * scale) for A, B, C in self.systems
+            ((A - B @ C) * scale / scale[:, None], B / scale[:, None], C * scale, 0.0)
+            for A, B, C in self.systems
         ]
-        for m, (A, b, _) in enumerate(closed):
-            forced, over = forced @ A.T + turn**m * b, A @ over
-        M = len(closed)
-        x = np.linalg.solve(turn[:, :, None] ** M * np.eye(n) - over, forced[:, :, None])[:, :, 0]
-        total = np.zeros(turn.size, dtype=complex)
-        for m, (A, b, c) in enumerate(closed):
-            total += (x @ c) * turn[:, 0] ** -m / M
-            x = x @ A.T + turn**m * b
-        return total.reshape(z.shape)
+        return mean_response(closed, z.reshape(-1, 1, 1)).reshape(z.shape)
 
 
 def _wired(loops: Loops) -> Drive:

@@ -3,10 +3,8 @@
 K = M_ext / output angle, the inverse of the compliance: the response to a load torque held over every tick.
 One design or stacked ones (arrays of shape (K,)).
 
-Slower stages make the drive periodically time-varying, with a period of M ticks.  A moment ``z^k`` leaves the
-states ``z^k p_k`` with p_k of period M, ``z p_(k+1) = A_k p_k + B_k``, and the fundamental of the output is
-the mean of ``C_k p_k + D_k`` over a period.  That needs n states, where one time-invariant system of the same
-response (`actuator_lti.loops.periodic.cyclic`) has M n.
+Slower stages make the drive periodically time-varying, with a period of M ticks: `mean_response` needs its n
+states, where one time-invariant system of the same response (`actuator_lti.loops.periodic.cyclic`) has M n.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ import numpy.typing as npt
 from actuator_lti.drive.choice import where
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops.tick import Block, TickProgram, pruned, siso
+from actuator_lti.loops.tick import Block, TickProgram, mean_response, pruned, siso
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
@@ -129,12 +127,7 @@ class Compliance:
         points = np.atleast_1d(np.asarray(z, dtype=complex))[..., None, None]
         parts = [(block.A, block.B, block.C, block.D) for block in self.blocks]
         steps = [tuple(part[..., None, :, :] for part in each) for each in parts]
-        p = _start(steps, points)
-        total: Any = 0.0
-        for A, B, C, D in steps:
-            total = total + C @ p + D
-            p = (A @ p + B) / points
-        result = total[..., 0, 0] / len(steps)
+        result = mean_response(steps, points)[..., 0, 0]
         return np.asarray(result[..., 0] if np.ndim(z) == 0 else result)
 
     @property
@@ -164,11 +157,3 @@ def compliance(design: Design, at: Operating | None = None) -> Compliance:
     ticks = [program.tick(k) for k in range(program.ticks)]
     blocks = [siso(program, [tick], "moment", "output_angle") for tick in ticks]
     return Compliance(pruned(blocks), wired.tick_s)
-
-
-def _start(steps: Sequence[tuple[np.ndarray, ...]], z: np.ndarray) -> np.ndarray:
-    """p_0, from ``z^M p_0 = A_(M-1) ... A_0 p_0 + sum of A_(M-1) ... A_(k+1) B_k z^k``."""
-    over, driven, power = np.eye(steps[0][0].shape[-1]), np.zeros(steps[0][1].shape[-2:]), np.ones_like(z)
-    for A, B, _, _ in steps:
-        over, driven, power = A @ over, A @ driven + B * power, power * z
-    return np.linalg.solve(power * np.eye(over.shape[-1]) - over, driven)

@@ -253,3 +253,20 @@ def siso(program: TickProgram, ticks: Sequence[Tick], source: str, signal: str, 
     A, B = compose(ticks)
     row = np.asarray(scale)[..., None, None] * ticks[0].signals[signal][..., None, :]
     return Block(A, B[..., :, [column]], row[..., :n], row[..., [n + column]], program.states)
+
+
+def mean_response(steps: Sequence[tuple[Any, ...]], z: np.ndarray) -> np.ndarray:
+    """Fundamental of a periodic system at z (..., 1, 1): A, B, C, D of each of the M steps of its period.
+
+    An input z^k leaves the states z^k p_k with p_k of period M, ``z p_(k+1) = A_k p_k + B_k``; the mean of
+    ``C_k p_k + D_k`` over a period is asked. It begins where ``z^M p_0`` is ``A_(M-1) ... A_0 p_0`` and the
+    sum of ``A_(M-1) ... A_(k+1) B_k z^k``.
+    """
+    n = steps[0][0].shape[-1]
+    over, driven, power, total = np.eye(n), np.zeros((n, 1)), np.ones_like(z), 0.0
+    for A, B, _, _ in steps:
+        over, driven, power = A @ over, A @ driven + B * power, power * z
+    p = np.linalg.solve(power * np.eye(n) - over, driven)
+    for A, B, C, D in steps:
+        total, p = total + C @ p + D, (A @ p + B) / z
+    return np.asarray(total / len(steps))

@@ -121,6 +121,10 @@ class Factored:
         ends = [low, *([listed_to] if low < listed_to < high else []), high]
         return self._searched(ends, _search.CIRCLE, 0.0, listed_to)
 
+    def along(self, low: float, high: float) -> Found:
+        """The intervals between two frequencies alone."""
+        return self._searched([low, high], _search.GAIN_LEVEL, math.inf, math.inf)
+
     def passages(self, low: float, high: float, level: float, kind: int = _search.GAIN_LEVEL) -> Real:
         """Every w between two at which the log gain (0) or the phase (1) passes a level, in order."""
         return self._searched([low, high], kind, level, math.inf).gain_w
@@ -159,12 +163,6 @@ class Factored:
                 raise Doubtful("the smallest distance to -1 was not settled")
             out.append((float(best[0]), float(best[1])))
         return out
-
-    def gain_bounds(self, low: Real, high: Real) -> tuple[Real, Real]:
-        """The least and the greatest gain in each of many intervals, between places."""
-        least, most = np.empty(low.size), np.empty(low.size)
-        LIBRARY.functions.gain_bounds(*self._row, low.size, low, high, least, most, *self._lent())
-        return least, most
 
     @property
     def _row(self) -> tuple[int, Real]:

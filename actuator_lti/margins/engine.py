@@ -126,7 +126,7 @@ def _behind_delay(
             margins = late_margins(given, delay_s, band)
         except Doubtful as error:
             margins = _withheld(given.period_s, delay_s, "factors of the loop", f"{doubt}; {error}")
-    if given.period_s is not None or not (certify or margins.withheld):
+    if given.period_s is not None or margins.evidence == "certified" or not (certify or margins.withheld):
         return margins
     from actuator_lti.margins.delays.certified import certified_delayed_margins  # python-flint if needed
     from actuator_lti.margins.delays.exact import exact_behind_delay

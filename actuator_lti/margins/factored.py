@@ -115,7 +115,9 @@ def _zeros(loop: RationalLoop, poles: Complex) -> Complex:
     inverse = np.linalg.inv(scale * loop.A - ((1.0 + shift) if loop.in_z else shift) * eye)
     W, size = (inverse + loop.A @ inverse, 2.0) if loop.in_z else (inverse, 1.0)
     b, c = inverse @ loop.b, loop.c @ inverse
-    sigma = eigenvalues(W + np.outer((size / (loop.d - scale * float(loop.c @ b))) * b, c))
+    if not (there := loop.d - scale * float(loop.c @ b)):
+        raise Doubtful("the loop is zero where its zeros are looked for from")
+    sigma = eigenvalues(W + np.outer((size / there) * b, c))
     zeros = shift + 1.0 / sigma[sigma != 0.0]
     if loop.in_z or loop.d or zeros.size < loop.order:
         return zeros

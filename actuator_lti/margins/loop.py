@@ -108,6 +108,8 @@ class RationalLoop:
             L, slope = self.response_and_slope(np.array([math.pi]))
             return complex(slope[0] / L[0]) - 1j * self.delay
         assert self.coefficients is not None
+        if not self.order:
+            return -1j * self.delay
         above, below = self.coefficients  # in u = 1/w: angle = pi - 2 u, s = j/u
         rate = (above[1] / above[0] - below[1] / below[0]) / 1j if above[0] else math.inf
         return -0.5 * complex(rate) - 1j * self.delay

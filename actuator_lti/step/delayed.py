@@ -21,9 +21,10 @@ from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to step at first
-_MEET = 1e-5
+_MEET = 1e-8
 _POINTS = 32
-_PARTS = 4  # intervals of a step at whose ends the response is kept
+_PARTS = np.linspace(0.0, 1.0, 5)  # of a step, at which the response is kept
+_SERIES = np.linalg.inv(np.vander(_PARTS))  # from its values there to the quartic through them
 _ZERO = 1e-12  # of the largest response about the poles
 _MOST = 400_000
 _FORGOTTEN = 25.0  # time constants
@@ -40,7 +41,7 @@ class Stepped:
 
     def __init__(self, values: Real, h: float) -> None:
         self.shortest, self.end = h, h * len(values)
-        self._series = values @ np.linalg.inv(np.vander(np.linspace(0.0, 1.0, values.shape[1]))).T
+        self._series = values @ _SERIES.T
 
     def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """See `actuator_lti.step.motion.Motion.spans`."""
@@ -54,7 +55,7 @@ class Stepped:
         """Times up to ``end``, and e there."""
         time = np.linspace(0.0, end, count)
         step = np.minimum((time / self.shortest).astype(int), len(self._series) - 1)
-        return time, (np.vander(time / self.shortest - step, _PARTS + 1) * self._series[step]).sum(axis=1)
+        return time, (np.vander(time / self.shortest - step, _PARTS.size) * self._series[step]).sum(axis=1)
 
 
 def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
@@ -62,7 +63,7 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
 
     The first delays are stepped; after them the response is the free motion of the exact poles, which the
     collocation of the delays starts and integrals of T about them sharpen. The two have to agree
-    where they meet, to 1e-5 of the final value; otherwise stepping goes on.
+    where they meet, to 1e-8 of the final value; otherwise stepping goes on.
     """
     form = delay_form(system)
     form = replace(form, whole=balanced(form.whole))
@@ -147,38 +148,30 @@ def _grid_step(delays: Real, horizon: float) -> float:
 
 
 def _stepped(form: DelayForm, h: float, steps: int) -> Real:
-    """March: x exactly for delayed signals that are parabolas over a step, zero before t = 0.
+    """March: x exactly for delayed signals that are quartics over a step, zero before t = 0.
 
     Returns y at the start, at each quarter and at the end of each step (shape (steps + 1, 5)).
     """
-    n, q = form.states, form.delays_s.size
-    M = np.zeros((n + 3 * q + 1, n + 3 * q + 1))
-    M[:n, : n + q], M[:n, -1] = form.whole[:n, :-1], form.whole[:n, -1]
-    M[n : n + 2 * q, n + q : n + 3 * q] = np.eye(2 * q)
-    positions = np.arange(_PARTS + 1) / _PARTS
-    inside = np.stack([expm(M * (h * part))[:n] for part in positions])
+    n, q, m = form.states, form.delays_s.size, _PARTS.size
+    M = np.zeros((n + m * q + 1, n + m * q + 1))  # of x, the delayed signals with their derivatives, and u
+    M[:n, : n + q], M[:n, -1] = h * form.whole[:n, :-1], h * form.whole[:n, -1]
+    M[n : n + (m - 1) * q, n + q : -1] = np.eye((m - 1) * q)
+    inside = np.stack([expm(M * part)[:n] for part in _PARTS])
+    to_derivatives = np.cumprod([1.0, *range(1, m)])[:, None] * _SERIES[::-1]
+    by_delayed = np.einsum("pnkq,kv->pnqv", inside[:, :, n:-1].reshape(m, n, m, q), to_derivatives)
     lag = form.delays_s / h
     whole = np.floor(lag + 1e-9).astype(int)
-    rest = np.where(np.abs(lag - whole) < 1e-9 * lag, 0.0, lag - whole)
-    past, columns = np.zeros((steps + 1, 3, q)), np.arange(q)  # of each step the parabolas of what is delayed
-
-    def late(k: int, position: float) -> Real:
-        earlier = position < rest  # in the step before that
-        step, t = k - whole - earlier, position - rest + earlier
-        a, b, c = past[np.maximum(step, 0), :, columns].T
-        return np.where(step >= 0, a + t * (b + t * c), 0.0)
-
-    x, y = np.zeros(n), np.empty((steps + 1, _PARTS + 1))
+    rest = np.where(np.abs(lag - whole) < 1e-9 * lag, 0.0, lag - whole)[:, None]
+    before = rest > _PARTS  # part of a step that looks back into the one before
+    looks = np.stack([np.vander(at, m) @ _SERIES for at in _PARTS - rest + before])
+    late = np.concatenate([looks * ~before[..., None], looks * before[..., None]], axis=2)
+    first, delays = int(whole.max()) + 1, np.arange(q)
+    past, x, y = np.zeros((first + steps + 1, q, m)), np.zeros(n), np.empty((steps + 1, m))
     for k in range(steps + 1):
-        z = np.stack([late(k, part) for part in positions])
-        a, b, c = _parabola(z)
-        states = inside @ np.concatenate((x, a, b / h, 2.0 * c / h**2, [1.0]))
-        out = np.hstack((states, z)) @ form.whole[n:, :-1].T + form.whole[n:, -1]
-        past[k], y[k], x = _parabola(out[:, :-1]), out[:, -1], states[-1]
+        at = first + k - whole
+        known = np.concatenate([past[at, delays], past[at - 1, delays]], axis=1)
+        z = (late @ known[..., None])[..., 0]
+        states = inside[:, :, :n] @ x + by_delayed.reshape(m, n, -1) @ z.ravel() + inside[:, :, -1]
+        out = np.hstack((states, z.T)) @ form.whole[n:, :-1].T + form.whole[n:, -1]
+        past[first + k], y[k], x = out[:, :-1].T, out[:, -1], states[-1]
     return y
-
-
-def _parabola(values: Real) -> tuple[Real, Real, Real]:
-    """Through the start, the middle and the end of a step: coefficients of the part of it, lowest first."""
-    a, m, b = values[0], values[_PARTS // 2], values[-1]
-    return a, -3.0 * a + 4.0 * m - b, 2.0 * a - 4.0 * m + 2.0 * b

@@ -59,7 +59,7 @@ def step_figures(system: Any) -> StepFigures:
     A rational system is taken exactly as its doubles say, as the free motion of its certified poles; every
     figure is found by halving all of time, so that nothing hides between two points of a grid. A sampled
     system is looked at at its samples. A system with inner delays is stepped along its first delays, the
-    delayed signals parabolas over steps of which at least 12 make the shortest one, and is then the free
+    delayed signals quartics over steps of which at least 12 make the shortest one, and is then the free
     motion of its exact poles.
 
     All figures are relative to the final value, however small it is beside what comes before: a resonance

@@ -15,7 +15,6 @@ Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Ort
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import flint
@@ -69,46 +68,35 @@ class Motion:
         self.sampled, self.start, self.tie = sampled, start, _TIE if sampled else 0.0
         self._x, self._c = (np.array([complex(each) for each in part]) for part in (state, output))
         self._A, n = _doubles(A), len(self._x)
-        rates = [1 - abs(A[k, k]) if sampled else -A[k, k].real for k in range(n)]
-        self._decay = np.array([float(rate.mid()) for rate in rates], dtype=float)
         size = float(np.linalg.norm(self._A, 2)) if n and not sampled else 0.0
         self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
         turned = self._A - np.eye(n) if sampled else self._A
-        self._second = np.abs(self._c @ turned @ turned)
+        # rows that bound abs(e) over a span, and how far e leaves its chord there, from abs(x) at its start
+        rows = np.abs([self._c, 0.125 * self.shortest**2 * (self._c @ turned @ turned)])
+        after = np.abs(self._A) if sampled else np.eye(n) + 2.0 * self.shortest * np.abs(np.triu(self._A, 1))
+        self._bounds = [np.maximum(rows, rows @ after)]
         self._moves = self._levels(A)
+        for move in self._moves[:-1]:
+            rows = self._bounds[-1]
+            self._bounds.append(np.maximum(rows, rows @ np.abs(move)) * [[1.0], [4.0]])
 
     def _levels(self, exact: flint.acb_mat) -> list[Complex]:
         """Transitions over 1, 2, 4 ... shortest spans, until nothing is left that counts."""
-        everlasting = np.abs(self._c) @ self._largest(np.inf)
         with flint.ctx.workprec(_BITS):  # a rounding of the first is doubled each time
             move = exact if self.sampled or not self._x.size else (exact * flint.arb(self.shortest)).exp()
             moves = [_doubles(move)]
-            while everlasting @ np.abs(moves[-1] @ self._x) > OVER:
+            while np.linalg.norm(self._c) * np.linalg.norm(moves[-1] @ self._x) > OVER:
                 if len(moves) == _LEVELS:
                     raise NumericalError(_LONG)
                 move = move * move
                 moves.append(_doubles(move))
         return moves
 
-    def _largest(self, span: float) -> Real:
-        """M with |x(t)| <= M |x(0)| over a span, row by row: what flows into a state is integrated."""
-        n = self._x.size
-        inflow = np.abs(np.triu(self._A, 1))
-        with np.errstate(divide="ignore"):  # a pole at z = 0
-            rate = -np.log1p(-self._decay) if self.sampled else self._decay
-        within = np.diag(-np.expm1(-rate * span) / self._decay)  # integral of a decay over the span
-        return np.asarray(np.eye(n) + inflow @ np.linalg.solve(np.eye(n) - within @ inflow, within))
-
-    @cached_property
-    def _bounds(self) -> list[tuple[Real, Real]]:
-        """For each level rows that bound |e|, and how far e leaves its chord, from |x| at the start."""
-        every = [(h, self._largest(h)) for h in self.shortest * 2.0 ** np.arange(len(self._moves))]
-        return [(np.abs(self._c) @ M, 0.125 * h * h * (self._second @ M)) for h, M in every]
-
     @property
     def slowest(self) -> float:
         """Smallest decay rate; infinity where there is no motion."""
-        return float(self._decay.min(initial=np.inf))
+        poles = np.diagonal(self._A)
+        return float((1.0 - np.abs(poles) if self.sampled else -poles.real).min(initial=np.inf))
 
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times from the start on to ``end``, at most twice ``count`` and evenly apart, and e there."""

@@ -157,15 +157,14 @@ def compare(
 
     work = partial(_beside, base, origin, plan, tested)
     (engine or Engine(threads=1)).map(work, missing, take, lambda done, _: tell(first + done, total))
-    pairs = zip((study.base, *good), (base, *result), strict=True)
-    reference, *ends = (_compared(variant, one) for variant, one in pairs if one is not None)
+    reference, *ends = (
+        Compared(variant=variant, **{part.name: getattr(one, part.name) for part in fields(Found)})
+        for variant, one in zip((study.base, *good), (base, *result), strict=True)
+        if one is not None
+    )
     names = figure_names([c.figures for c in (reference, *ends)], origin)
     refused = tuple(v for v in study.variants if v.design is None)
     return Comparison(study, names, reference, tuple(ends), slopes, refused)
-
-
-def _compared(variant: Variant, result: Found) -> Compared:
-    return Compared(variant=variant, **{part.name: getattr(result, part.name) for part in fields(Found)})
 
 
 def _design(variant: Variant) -> Design:

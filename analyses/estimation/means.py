@@ -26,11 +26,6 @@ class Means:
     covariance: FloatArray
     correlation_samples: FloatArray
 
-    @property
-    def standard_errors(self) -> FloatArray:
-        """Standard errors of the means."""
-        return np.sqrt(np.diag(self.covariance))
-
 
 def correlated_means(columns: FloatArray) -> Means:
     """Means and their covariance, by batch means: columns of shape (n, k), n samples of k signals.

@@ -115,10 +115,7 @@ class FrictionEffects:
 
 
 def friction_effects(
-    design: Design,
-    loops: Loops | None = None,
-    *,
-    settlings: Iterable[Settling] | None = None,
+    design: Design, loops: Loops | None = None, *, settlings: Iterable[Settling] | None = None
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 

@@ -98,7 +98,7 @@ def identify_bench(
     right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     used, model = right.records, right.model
     if electrical is None:
-        model = with_given_constant(start, model, used, recipe)
+        model = with_given_constant(start, model, used)
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
     source, given = f"identified from {names}", given_constant(model)
     if given is not None:
@@ -178,7 +178,7 @@ def _fitted(
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         return design_with_fit(with_structure(start, model), values, "")
 
-    return without_bias(start, made, replace(model, records=tuple(parts)), records, recipe)
+    return without_bias(start, made, replace(model, records=tuple(parts)), records)
 
 
 def _items(
@@ -194,10 +194,15 @@ def _items(
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
     yield size
-    yield verdict.rows_item(model.rows_used, len(model.names))
+    rows, least = model.rows_used, verdict.ROWS_EACH * len(model.names)
+    why = f"{rows} rows for {len(model.names)} parameters, {least} wanted: take a longer record"
+    yield verdict.Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
     yield verdict.residual_item(model.relative_residual, limit)
     yield from verdict.offset_items(design, model)
-    yield from verdict.kept_items(model, held, design.axis)
+    for name, kept in model.fixed.items():  # what these records neither confirm nor deny
+        if kept.value and name not in held:
+            label = parameter(name, design.axis).label
+            yield verdict.Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
     for record in right.records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():

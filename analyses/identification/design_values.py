@@ -17,7 +17,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
-from analyses.identification.joint_model import JointModel, Recipe, default_value
+from analyses.identification.joint_model import JointModel, default_value
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, electrical_parts
 from analyses.records.factors import with_factor
@@ -34,18 +34,15 @@ alike by chance are no cause."""
 FEW = 2.0
 """Least factor of a cause that only two values tell."""
 
+TORQUES = dict.fromkeys(("inertia", "dry", "viscous", "load", "gravity"), 1.0)
 CAUSES: Mapping[str, Mapping[str, float]] = {
-    "the scale of the current": {
-        "inertia": 1, "dry": 1, "viscous": 1, "load": 1, "gravity": 1, "resistance": -1
-    },
-    "the torque constant (and back-EMF constant)": {
-        "inertia": 1, "dry": 1, "viscous": 1, "load": 1, "gravity": 1, "back": -1
-    },
-    "the scale of angle and speed: counts, pole pairs, or the reduction": {
-        "inertia": 1, "viscous": 1, "back": 1
-    },
-    "the clock": {"inertia": 2, "viscous": 1, "back": 1},
-}  # fmt: skip
+    "the scale of the current": {**TORQUES, "resistance": -1.0},
+    "the torque constant (and back-EMF constant)": {**TORQUES, "back": -1.0},
+    "the scale of angle and speed: counts, pole pairs, or the reduction": dict.fromkeys(
+        ("inertia", "viscous", "back"), 1.0
+    ),
+    "the clock": {"inertia": 2.0, "viscous": 1.0, "back": 1.0},
+}
 """What a factor in one of these does to the identified values: its powers."""
 
 
@@ -141,12 +138,12 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])
-        told = [one for one, power in zip(values, g, strict=True) if power]
-        if len(told) < 2 or not np.any(g):
+        told = np.count_nonzero(g)
+        if told < 2:
             continue
         a, b = g / close, x / close
         factor = float(a @ b) / float(a @ a)
-        if len(told) < LEAST_VALUES and abs(factor) < log(FEW):
+        if told < LEAST_VALUES and abs(factor) < log(FEW):
             continue
         level = float(chi2.sf(float(np.sum((b - factor * a) ** 2)), len(x) - 1))
         if level > EXPLAINED:
@@ -174,9 +171,7 @@ def given_constant(model: JointModel) -> str | None:
     return next((name for name in CONSTANTS if name in model.fixed), None)
 
 
-def with_given_constant(
-    start: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
-) -> JointModel:
+def with_given_constant(start: Design, model: JointModel, records: Sequence[Record]) -> JointModel:
     """The model and, among what is kept, the design's constant that all its values hang on; none if told.
 
     A motion and a current tell ratios to kM alone: with another kM, or a current of another scale, the same
@@ -190,7 +185,7 @@ def with_given_constant(
     value = float(getattr(start.motor, CONSTANTS[name]))
     changed: dict[str, Any] = {CONSTANTS[name]: (1.0 + STEP) * value}
     more = replace(start, motor=replace(start.motor, **changed))
-    share = _shares(start, more, model, records, recipe)
+    share = _shares(start, more, model, records)
     each = [f"{100.0 * STEP * part:+.2g} %" for part in share]
     words = f"{each[0]} of every value"
     if len(set(each)) > 1:
@@ -216,13 +211,11 @@ def _constant(design: Design, record: Record) -> str | None:
     return None if closely else "torque_constant"
 
 
-def _shares(
-    start: Design, more: Design, model: JointModel, records: Sequence[Record], recipe: Recipe | None
-) -> FloatArray:
+def _shares(start: Design, more: Design, model: JointModel, records: Sequence[Record]) -> FloatArray:
     """Relative change of each fitted value over that of the constant; exact, as the fit is linear in it."""
     tables, targets = [], []
     for weight, record in zip(model.weights, records, strict=True):
-        one, other = (rows_under(design, record, model, recipe) for design in (start, more))
+        one, other = (rows_under(design, record, model) for design in (start, more))
         tables.append(weight * one.columns(model.names))
         targets.append(weight * np.column_stack([one.y - model.kept(one), (other.y - one.y) / STEP]))
     table = np.concatenate(tables)

@@ -79,7 +79,7 @@ def diagnosed(
     model = fit(used)
     sure: dict[int, Lag] = {}
     for k, (record, like) in enumerate(zip(used, model.simulated, strict=False)):
-        own, other = (lag_of(start, one, like, model, recipe) for one in (record, like))
+        own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
             error = float(np.hypot(own.standard_error, other.standard_error))
             lag = Lag(own.seconds - other.seconds, error)
@@ -211,9 +211,7 @@ def shifted(design: Design, record: Record, seconds: float) -> Record:
     return replace(record, signals={**record.signals, name: moved})
 
 
-def lag_of(
-    design: Design, record: Record, simulated: Record, model: JointModel, recipe: Recipe | None
-) -> Lag | None:
+def lag_of(design: Design, record: Record, simulated: Record, model: JointModel) -> Lag | None:
     """The lag with which the inverse model leaves the least, the model's values being found anew.
 
     Gauss-Newton on the shift of the drive signal, its derivative by a difference over the record's period.
@@ -225,11 +223,11 @@ def lag_of(
     def slopes(record: Record) -> FloatArray:
         """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
         half = 0.5 * record.period_s
-        late, early = (rows_under(design, shifted(design, record, s), model, recipe) for s in (half, -half))
+        late, early = (rows_under(design, shifted(design, record, s), model) for s in (half, -half))
         return np.column_stack([late.columns(model.names), (early.y - late.y) / (2.0 * half)])
 
     try:
-        own, other = (rows_under(design, one, model, recipe) for one in (record, simulated))
+        own, other = (rows_under(design, one, model) for one in (record, simulated))
         if len(other.keep) > len(own.keep):
             return None
         both = own.keep[: len(other.keep)] & other.keep
@@ -239,7 +237,7 @@ def lag_of(
         lag, error = 0.0, np.inf
         for _ in range(ROUNDS):
             late = shifted(design, record, lag)
-            y = rows_under(design, late, model, recipe).y - model.kept(own)
+            y = rows_under(design, late, model).y - model.kept(own)
             table = picked(slopes(late), own.keep, both)
             step, error = _step(z, table, picked(y, own.keep, both))
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))

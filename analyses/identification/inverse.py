@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -65,58 +65,73 @@ def fit_records(
             record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots)
             for record, moment in zip(records, moments, strict=True)
         ]
-        model = _fitted(design, blocks, form, fixed or {}, weights)
+        model = _fitted(design, blocks, fixed or {}, weights)
         if gravity:
             a, b = model["gravity_sin"], model["gravity_cos"]
             moments = [a * block.sine + b * block.cosine for block in blocks]
-    return replace(model, knots_rad_s=knots)
+    return replace(model, form=form, knots_rad_s=knots, asked=recipe)
 
 
-def _stacked(blocks: Sequence[Rows], names: Sequence[str]) -> FloatArray:
-    return np.concatenate([block.columns(names) for block in blocks])
+@dataclass(frozen=True)
+class _Problem:
+    """The rows of records, the names that are free in them, and those that are held."""
+
+    blocks: Sequence[Rows]
+    free: Sequence[str]
+    fixed: Mapping[str, Fixed]
+
+    def columns(self, names: Sequence[str]) -> FloatArray:
+        return np.concatenate([block.columns(names) for block in self.blocks])
+
+    def targets(self) -> list[FloatArray]:
+        """The drive signal of each record less what is held explains."""
+        held = {name: one.value for name, one in self.fixed.items()}
+        return [block.y - block.explained(held, list(held)) for block in self.blocks]
+
+    def solved(self, weights: FloatArray) -> Solution:
+        w = np.concatenate([g * one.columns(self.free) for g, one in zip(weights, self.blocks, strict=True)])
+        y = np.concatenate([g * target for g, target in zip(weights, self.targets(), strict=True)])
+        try:
+            return solve(w, y, np.cumsum([block.rows_used for block in self.blocks]).tolist())
+        except np.linalg.LinAlgError:
+            raise NumericalError(f"the records do not tell {', '.join(self.free)} apart") from None
 
 
 def _fitted(
-    design: Design,
-    blocks: Sequence[Rows],
-    form: FrictionForm,
-    held: Mapping[str, float],
-    given: Sequence[float] | None,
+    design: Design, blocks: Sequence[Rows], held: Mapping[str, float], given: Sequence[float] | None
 ) -> JointModel:
     names = blocks[0].names
     unknown = sorted(set(held) - set(names))
     if unknown:
         raise InputError(f"{unknown[0]}: no parameter of this model; there are: {', '.join(names)}")
     fixed = {name: Fixed(value=value, reason="fixed as asked") for name, value in held.items()}
-    free = [name for name in names if name not in fixed]
-    kept, left = told_apart(_stacked(blocks, free), free)
+    problem = _Problem(blocks, [name for name in names if name not in fixed], fixed)
+    kept, left = told_apart(problem.columns(problem.free), problem.free)
     for one in left:
         moved = " and ".join(f"{name} by {-factor:.3g} times it" for name, factor in one.moves.items())
         why = f"{one}: the design's value kept" + (f"; an error of it moves {moved}" if moved else "")
         fixed[one.name] = Fixed(value=default_value(design, one.name), reason=why, moves=one.moves)
-    free = [free[k] for k in kept]
-    if not free:
+    problem = _Problem(blocks, [problem.free[k] for k in kept], fixed)
+    if not problem.free:
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].name)
     weights = np.ones(len(blocks)) if given is None else np.asarray(given, dtype=float)
-    solution = _joint(blocks, free, fixed, weights)
+    solution = problem.solved(weights)
     for _ in range(3 if len(blocks) > 1 and given is None else 0):
         weights = _weights(blocks, solution, weights)
-        solution = _joint(blocks, free, fixed, weights)
-    found = dict(zip(free, solution.values.tolist(), strict=True))
+        solution = problem.solved(weights)
+    found = dict(zip(problem.free, solution.values.tolist(), strict=True))
     negative = {name: value for name, value in found.items() if value < 0.0 and name not in SIGNED}
     if negative:  # as no drive has them
         again = {name: default_value(design, name) for name in negative}
-        return _said(design, blocks, negative, _fitted(design, blocks, form, {**held, **again}, given))
-    return _model(design, blocks, free, fixed, form, solution, weights)
+        return _said(design, problem, negative, _fitted(design, blocks, {**held, **again}, given))
+    return _model(design, problem, solution, weights)
 
 
-def _said(
-    design: Design, blocks: Sequence[Rows], negative: Mapping[str, float], model: JointModel
-) -> JointModel:
+def _said(design: Design, problem: _Problem, negative: Mapping[str, float], model: JointModel) -> JointModel:
     """The model that says why some values are the design's, and holds what their errors move."""
     said = {}
     for name, value in negative.items():
-        moves = np.linalg.lstsq(_stacked(blocks, model.names), _stacked(blocks, [name])[:, 0], rcond=None)[0]
+        moves = np.linalg.lstsq(problem.columns(model.names), problem.columns([name])[:, 0], rcond=None)[0]
         said[name] = Fixed(
             value=model[name],
             reason="would come out negative: not determined, the design's value kept",
@@ -136,22 +151,6 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
     return added
 
 
-def _target(block: Rows, fixed: Mapping[str, Fixed]) -> FloatArray:
-    """The drive signal less what fixed parameters explain."""
-    return block.y - block.explained({name: one.value for name, one in fixed.items()}, list(fixed))
-
-
-def _joint(
-    blocks: Sequence[Rows], free: Sequence[str], fixed: Mapping[str, Fixed], weights: FloatArray
-) -> Solution:
-    w = np.concatenate([g * block.columns(free) for g, block in zip(weights, blocks, strict=True)])
-    y = np.concatenate([g * _target(block, fixed) for g, block in zip(weights, blocks, strict=True)])
-    try:
-        return solve(w, y, np.cumsum([block.rows_used for block in blocks]).tolist())
-    except np.linalg.LinAlgError:
-        raise NumericalError(f"the records do not tell {', '.join(free)} apart") from None
-
-
 def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) -> FloatArray:
     """Inverse residual of each record, against the median so that the size of things stays."""
     ends = np.cumsum([block.rows_used for block in blocks])
@@ -161,51 +160,38 @@ def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) ->
     return weights if middle == 0.0 else np.asarray(middle / np.maximum(sizes, 0.05 * middle))
 
 
-def _single(
-    block: Rows, free: Sequence[str], fixed: Mapping[str, Fixed], found: Mapping[str, float]
-) -> tuple[Fit, FloatArray]:
+def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple[Fit, FloatArray]:
     """One record fitted alone, and its residual: what it tells, the rest held at what all gave."""
-    kept, left = told_apart(block.columns(free), free)
+    kept, left = told_apart(block.columns(problem.free), problem.free)
     rest = {one.name: Fixed(value=found[one.name], reason="determined by other records") for one in left}
-    own = tuple(free[k] for k in kept)
-    result = _joint([block], own, {**fixed, **rest}, np.ones(1))
+    own = tuple(problem.free[k] for k in kept)
+    result = _Problem([block], own, {**problem.fixed, **rest}).solved(np.ones(1))
     return Fit(names=own, values=result.values, covariance=result.correlated), result.residual
 
 
-def _model(
-    design: Design,
-    blocks: Sequence[Rows],
-    free: Sequence[str],
-    fixed: Mapping[str, Fixed],
-    form: FrictionForm,
-    solution: Solution,
-    weights: FloatArray,
-) -> JointModel:
-    found = {name: one.value for name, one in fixed.items()}
+def _model(design: Design, problem: _Problem, solution: Solution, weights: FloatArray) -> JointModel:
+    blocks, free = problem.blocks, tuple(problem.free)
+    found = {name: one.value for name, one in problem.fixed.items()}
     found |= dict(zip(free, solution.values.tolist(), strict=True))
-    singles = [_single(block, free, fixed, found) for block in blocks] if len(blocks) > 1 else []
-    rests = [_target(block, fixed) - block.columns(free) @ solution.values for block in blocks]
+    singles = [_single(block, problem, found) for block in blocks] if len(blocks) > 1 else []
+    targets = zip(blocks, problem.targets(), strict=True)
+    rests = [target - block.columns(free) @ solution.values for block, target in targets]
     parts = []
     for block, rest, own in zip(blocks, rests, [rest for _, rest in singles] or rests, strict=True):
         other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
-        rows = replace(block, names=tuple(free), w=block.columns(free))
-        residuals: dict[str, Any] = {
-            "residual": rest,
-            "own_residual": own,
-            "noise": own,
-            "friction": block.y - other,
-        }
-        parts.append(RecordFit(**vars(rows), **residuals, compared=np.ones(len(own), dtype=bool)))
+        rows = vars(replace(block, names=free, w=block.columns(free)))
+        left: dict[str, Any] = {"residual": rest, "own_residual": own, "noise": own}
+        every = np.ones(len(own), dtype=bool)
+        parts.append(RecordFit(**rows, **left, friction=block.y - other, compared=every))
     scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])
     model = JointModel(
-        form=form,
-        names=tuple(free),
+        names=free,
         values=solution.values,
         white_errors=np.sqrt(np.diag(solution.white)),
         covariance=covariance_of(scaled),
         between={},
-        fixed=dict(fixed),
+        fixed=dict(problem.fixed),
         relative_residual=float(np.linalg.norm(np.concatenate(rests)) / np.linalg.norm(drive)),
         records=tuple(parts),
         recipe=blocks[0].recipe,

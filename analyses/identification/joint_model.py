@@ -179,14 +179,16 @@ class JointModel(Fit):
     the drive signal, after decimation. ``alone`` are the records fitted one by one; ``bias`` was taken
     off each value as the fit's own, ``bias_told`` says how, or why not, ``simulated`` are the records as the
     design simulates them that comes of it (none: it cannot). ``laws`` are the friction laws that were tried.
+    ``recipe`` is that of the first record, ``asked`` that of all (none: each has its own).
     """
 
-    form: FrictionForm
+    form: FrictionForm = "symmetric"
     white_errors: FloatArray
     between: Mapping[str, float]
     relative_residual: float
     records: tuple[RecordFit, ...]
     recipe: Recipe
+    asked: Recipe | None = field(default=None, repr=False)
     condition: float
     alone: tuple[Fit, ...] = field(default=(), repr=False)
     knots_rad_s: tuple[float, ...] | None = None

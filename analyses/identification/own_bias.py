@@ -17,7 +17,7 @@ from analyses.estimation.arrays import FloatArray, picked
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of
 from analyses.identification.inverse import fit_records, with_scatter
-from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
+from analyses.identification.joint_model import JointModel, RecordFit, default_value
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
@@ -34,7 +34,6 @@ def without_bias(
     make: Callable[[JointModel], Design],
     model: JointModel,
     records: Sequence[Record],
-    recipe: Recipe | None,
 ) -> JointModel:
     """The model less what the same fit finds too much in records simulated with the design that came of it.
 
@@ -53,7 +52,7 @@ def without_bias(
         fit_records,
         start,
         form=model.form,
-        recipe=recipe,
+        recipe=model.asked,
         fixed={name: one.value for name, one in model.fixed.items()},
         gravity="gravity_sin" in model,
         knots_rad_s=model.knots_rad_s,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from scipy.ndimage import minimum_filter1d
@@ -226,14 +227,14 @@ def _torque(design: Design, record: Record, motion: Motion) -> tuple[FloatArray,
     return drive, driven_by, told
 
 
-def rows_under(design: Design, record: Record, model: JointModel, recipe: Recipe | None = None) -> Rows:
+def rows_under(design: Design, record: Record, model: JointModel) -> Rows:
     """The rows of one record as a model has them, its pendulum in the load's share of the friction."""
     gravity, knots = "gravity_sin" in model, model.knots_rad_s
-    rows = record_rows(design, record, model.form, recipe, gravity=gravity, knots_rad_s=knots)
+    made = partial(record_rows, design, record, model.form, model.asked, gravity=gravity, knots_rad_s=knots)
+    rows = made()
     if not gravity:
         return rows
-    moment = model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine
-    return record_rows(design, record, model.form, recipe, gravity=True, moment=moment, knots_rad_s=knots)
+    return made(moment=model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine)
 
 
 def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:

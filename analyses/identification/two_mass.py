@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import ComplexArray, FloatArray
 from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.means import autocovariance
 from analyses.records.record import Record
 
 MIN_PERIODS = 4
@@ -105,9 +105,7 @@ def period_of_excitation(record: Record, name: str) -> float:
     """The period with which a recorded command repeats itself, five times or more."""
     values = record[name] - np.polyval(np.polyfit(record.time_s, record[name], 1), record.time_s)
     n = len(values)
-    size = next_fast_len(2 * n, real=True)
-    spectrum = rfft(values, size)
-    correlation = irfft(np.abs(spectrum) ** 2, size)[:n]
+    correlation = n * autocovariance(values, n - 1)
     power, early = np.cumsum(values[::-1] ** 2)[::-1], np.cumsum(values**2)
     lags = np.arange(1, n // (MIN_PERIODS + 1))
     alike = correlation[lags] / np.sqrt(np.maximum(power[lags] * early[n - 1 - lags], 1e-300))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -94,21 +94,6 @@ def sampling_items(record: Record) -> Iterator[Item]:
     )
     label = f"{record.name}: current sampled fast enough"
     yield Item.of(f"sampling-{record.name}", label, reason if off > LARGEST_LINE_ERROR else "")
-
-
-def kept_items(fit: Fit, held: Collection[str], axis: str) -> Iterator[Item]:
-    """The design's own values that these records neither confirm nor deny, whatever they are."""
-    for name, one in fit.fixed.items():
-        if one.value and name not in held:
-            label = parameter(name, axis).label
-            yield Item(id=f"kept-{name}", label=label, passed=None, reason=one.reason)
-
-
-def rows_item(rows: int, parameters: int) -> Item:
-    """Whether there are enough rows for an error that can be trusted."""
-    least = ROWS_EACH * parameters
-    why = f"{rows} rows for {parameters} parameters, {least} wanted: take a longer record"
-    return Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
 
 
 def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:

@@ -183,14 +183,14 @@ def margins_by_amplitude(bench: Bench) -> Iterator[AmplitudeMargin]:
 
 def _first(release: _Release, linear: float) -> tuple[float | None, tuple[str, float]]:
     """The first value at which an oscillation lasts, closed in from the one before; none beyond is asked."""
-    low, seen = -1.0, ("", nan)
-    value: float | None = None
-    for one in _asked(release, linear):
-        if (lasting := release.lasting(one)) is not None:
-            value, seen = one, lasting
+    low = -1.0
+    for value in _asked(release, linear):
+        if (seen := release.lasting(value)) is not None:
             break
-        low = one
-    while low >= 0.0 and value is not None and value - low > CLOSE * value:
+        low = value
+    else:
+        return None, ("", nan)
+    while low >= 0.0 and value - low > CLOSE * value:
         middle = 0.5 * (low + value)
         lasting = release.lasting(middle)
         low, value, seen = (middle, value, seen) if lasting is None else (low, middle, lasting)
@@ -235,9 +235,8 @@ class _Release:
         None where it does not last from the last window but one to the last.
         """
         gain, delay = (value, 0.0) if self.kind == "gain" else (1.0, value)
-        rows = self.setup.rows(gain, delay)
+        rows, outer = self.setup.rows(gain, delay), self.setup.outer
         start = {"position": "angle_start", "velocity": "speed_start", "current": "current_start"}
-        outer = self.setup.outer
         scale = -self.setup.design.total_ratio if outer == "position" else 1.0
         rows[start[outer]] = scale * self.part * self.sizes[outer]
         rows["ticks"] = self.wait + 2 * self.window
@@ -245,11 +244,8 @@ class _Release:
         rows.window(self.window, self.cycles, 0)
         result = rows.run()
         last, before = (float(np.ptp(result.span(f"probe_{self.setup.point}_before", k))) for k in (0, 1))
-        full = {
-            "u": self.setup.design.limits.voltage_V,
-            "i_ref": self.sizes["current"],
-            "w_ref": self.sizes["velocity"],
-        }[self.setup.point]
+        voltage, sizes = self.setup.design.limits.voltage_V, self.sizes
+        full = {"u": voltage, "i_ref": sizes["current"], "w_ref": sizes["velocity"]}[self.setup.point]
         if result.ok[0] and not (last > ALIVE * full and last >= self.lasts * before):
             return None
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]

@@ -16,14 +16,7 @@ from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
 from analyses.finite import finite
 from analyses.friction_effects.breakaway import static_threshold
-from analyses.large_signal.classify import (
-    CAUSES,
-    WAVEFORMS,
-    causes,
-    limiter_fractions,
-    not_linear,
-    waveforms,
-)
+from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
 from analyses.large_signal.tones import (
     MOST_TICKS,
     amplitudes,
@@ -113,7 +106,6 @@ def amplitude_map(
     design: Design,
     loops: Loops,
     *,
-    load_Nm: float = 0.0,
     friction_on: bool = True,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
 ) -> AmplitudeMap:
@@ -126,7 +118,7 @@ def amplitude_map(
     given, counts = counts, (max(int(part * counts[0]), 2), max(int(part * counts[1]), 2))
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
-    threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
+    threshold = static_threshold(design).smallest_rad if friction_on else None
     levels = amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
     border, slow = onset(loops, omega), slow_protection(design, loops)
@@ -134,20 +126,18 @@ def amplitude_map(
     amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
     result = run_tones(
-        design, frequencies, which, amplitude, start, begin,
-        load_Nm=load_Nm, friction_on=friction_on, insist=True,
-    )  # fmt: skip
+        design, frequencies, which, amplitude, start, begin, friction_on=friction_on, insist=True
+    )
     cause = causes(result, linear, amplitude, friction_on)
     off = np.flatnonzero(cause == CAUSES.index("friction"))
     if len(off):  # the same runs without dry friction: is it that?
         free = run_tones(
-            design, frequencies, which[off], amplitude[off], start, begin[off],
-            load_Nm=load_Nm, friction_on=False,
-        )  # fmt: skip
+            design, frequencies, which[off], amplitude[off], start, begin[off], friction_on=False
+        )
         cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
-        load_Nm=load_Nm,
+        load_Nm=0.0,
         amplitude_rad=levels,
         frequency_hz=omega / (2.0 * np.pi),
         cause=cause.reshape(shape),

@@ -152,10 +152,7 @@ class LargeSignals:
 
 
 def large_signals(
-    design: Design,
-    loops: Loops | None = None,
-    *,
-    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
+    design: Design, loops: Loops | None = None, *, counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES)
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 

@@ -126,13 +126,12 @@ def sawtooth(
         return Sawtooth(amplitude, 0.0, rate, reason=reason)
     wanted = OVERRUN * rate / (2.0 * math.pi * amplitude) if frequency_hz is None else frequency_hz
     chosen = tone(wanted, design, least_updates=400)
-    runs = []
+    runs = list[SawtoothRun]()
     for load in design.validation.loads_Nm:
-        result = _run(design, amplitude, chosen, load, rate)
-        if result is None:
+        if (run := _run(design, amplitude, chosen, load, rate)) is None:
             reason = f"at a load of {load:g} N m the output stands still"
             return Sawtooth(amplitude, chosen.frequency_hz, rate, reason=reason)
-        runs.append(result)
+        runs.append(run)
     push = min(result.acceleration_rad_s2 for result in figures)
     return Sawtooth(
         amplitude,
@@ -148,14 +147,10 @@ def sawtooth(
 
 def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float) -> SawtoothRun | None:
     """Simulate from the flank of the triangle on, and keep the last periods; none of a drive that stands."""
-    formula, N, period = (
-        rate_limited(amplitude, at.omega_rad_s, rate),
-        design.total_ratio,
-        at.ticks // at.cycles,
-    )
-    begin = State()
+    formula = rate_limited(amplitude, at.omega_rad_s, rate)
+    N, period, begin = design.total_ratio, at.ticks // at.cycles, State()
     if formula.x >= FULL_TRIANGLE:
-        lag_s = math.radians(formula.lag_deg) / (2.0 * math.pi * at.frequency_hz)
+        lag_s = math.radians(formula.lag_deg) / at.omega_rad_s
         begin = State(motor_angle_rad=-N * rate * lag_s)
     seconds = (2 + PERIODS_SHOWN) * period * design.controller.period_s
     run = simulate(design, commands.sine(amplitude, at.frequency_hz), seconds, load_Nm, initial=begin)

@@ -69,13 +69,6 @@ class LinearSteadyState:
     stable: bool
     settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
 
-    def put(self, rows: Rows, which: np.ndarray, amplitude_rad: np.ndarray) -> None:
-        """Write the initial state of each row: tone ``which[r]`` at an amplitude."""
-        if not self.stable:
-            return
-        for place, values in self.states.items():
-            rows[place] = amplitude_rad * values.imag[which]
-
 
 def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadyState:
     """Solve the sampled loop for its periodic state at each frequency."""
@@ -241,7 +234,6 @@ def run_tones(
     start: LinearSteadyState,
     start_amplitude_rad: np.ndarray,
     *,
-    load_Nm: float = 0.0,
     friction_on: bool = True,
     harmonics: int = HARMONICS,
     insist: bool = False,
@@ -252,13 +244,13 @@ def run_tones(
     goes on with what has not settled, for four times the start-up and several periods more.
     """
     rows = Rows.of(design, len(which), friction_on=friction_on)
-    windows = np.array([t.ticks for t in tones])[which]
-    cycles = np.array([t.cycles for t in tones])[which]
-    rows.sine("command", amplitude_rad, np.array([t.frequency_hz for t in tones])[which])
+    hertz, windows, cycles = np.array([(t.frequency_hz, t.ticks, t.cycles) for t in tones])[which].T
+    rows.sine("command", amplitude_rad, hertz)
     rows.window(windows, cycles, harmonics)
-    start.put(rows, which, start_amplitude_rad)
+    for place, values in start.states.items() if start.stable else ():
+        rows[place] = start_amplitude_rad * values.imag[which]
     triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
-    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
+    rows["tanh_tolerance"] = TANH_TOLERANCE
     rows["ticks"] = start.settling_ticks + 2 * windows
     if not insist:
         return rows.run()

@@ -151,11 +151,10 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
 
 def _standing(design: Design, ideal: Design) -> float:
     """Error that counts leave after a step."""
-    size = np.array([min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad])
-    spans = [
-        step_rows(one, size, LONGEST_TICKS // 4).run().span("output_angle_rad") for one in (design, ideal)
-    ]
-    ends = [abs(0.5 * (float(low[0]) + float(high[0])) - float(size[0])) for low, high in spans]
+    size, ends = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad, []
+    for one in (design, ideal):
+        low, high = step_rows(one, np.array([size]), LONGEST_TICKS // 4).run().span("output_angle_rad")
+        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - size))
     return abs(ends[0] - ends[1])
 
 

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.linalg import schur
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.phase import unwrapped_phase_deg
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import LoopFigures
@@ -122,16 +121,6 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
     if nyquist is not None:
         grid[-1] = nyquist * (1.0 - 1e-4)  # a zero at z = -1 has turned nothing yet
     return grid
-
-
-def sampled_step(system: Any, samples: int) -> np.ndarray:
-    """Give the first samples of the unit step response of a sampled system, for a figure."""
-    loop = rational_loop(system)
-    state, response = np.zeros(loop.order), np.empty(samples)
-    for k in range(samples):
-        response[k] = float(state @ loop.c) + loop.d
-        state = loop.A @ state + loop.b
-    return response
 
 
 def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[np.ndarray, np.ndarray]:

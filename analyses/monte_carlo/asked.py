@@ -44,7 +44,6 @@ class Asked(OnMachines):
     sample: Annotated[int | None, Option("Only print sample number K as a design file.", "K")] = None
 
     def __post_init__(self) -> None:
-        """Refuse a probability that is none."""
         if self.at_least is not None and not 0.0 <= self.at_least <= 1.0:
             raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
 

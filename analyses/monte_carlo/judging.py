@@ -6,13 +6,11 @@ where its samples are computed, and its size does not grow with their number.
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -87,7 +85,6 @@ def in_populations(requirement: Requirement, design: Design) -> bool:
 
 
 def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
-    """Columns that a requirement reads."""
     if requirement.quantity in DRIVE_QUANTITIES:
         return (drive_column(requirement.quantity, requirement.load_Nm),)
     loops = judged_loops(requirement.loop, loops_of(design))
@@ -129,7 +126,6 @@ def label(requirement: Requirement) -> str:
 
 WORST_KEPT = 8
 BLOCK = 4096  # samples that are in memory at once
-_ARRAYS = ("keys", "counts")
 
 
 @dataclass(frozen=True)
@@ -141,13 +137,11 @@ class Tally:
 
     @classmethod
     def of(cls, distance: np.ndarray, number: np.ndarray, value: np.ndarray, passed: np.ndarray) -> Tally:
-        """The tally of some samples."""
         order = np.argsort(distance, kind="stable")[:WORST_KEPT]
         worst = tuple((float(distance[k]), int(number[k]), float(value[k])) for k in order)
         return cls(int(passed.sum()), worst)
 
     def merged(self, other: Tally) -> Tally:
-        """The tally of the samples of both."""
         worst = sorted([*self.worst, *other.worst], key=lambda one: one[:2])[:WORST_KEPT]
         return Tally(self.passed + other.passed, tuple(worst))
 
@@ -162,7 +156,6 @@ class Reduction:
     tallies: tuple[Tally, ...] = ()
 
     def merged(self, other: Reduction) -> Reduction:
-        """What the samples of both come to."""
         if not self.count or not other.count:
             return self if self.count else other
         return Reduction(
@@ -174,30 +167,21 @@ class Reduction:
 
     def packed(self, done: Sequence[Chunk]) -> bytes:
         """All of it in a file, with the ranges that it holds."""
-        plain = asdict(replace(self, columns={}))
-        scalars = {
-            name: {k: v for k, v in vars(s).items() if k not in _ARRAYS} for name, s in self.columns.items()
-        }
-        arrays = {f"{k}.{n}": getattr(s, k) for n, s in self.columns.items() for k in _ARRAYS}
-        text = json.dumps({**plain, "columns": scalars, "done": list(done)})
-        buffer = io.BytesIO()
-        np.savez_compressed(buffer, about=np.frombuffer(text.encode(), dtype=np.uint8), **arrays)
-        return buffer.getvalue()
+        return zlib.compress(json.dumps([asdict(self), list(done)], default=np.ndarray.tolist).encode(), 3)
 
 
 def unpacked(data: bytes) -> tuple[Reduction, list[Chunk]]:
     """Read what `Reduction.packed` wrote; of a damaged file nothing: its ranges are computed again."""
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            about: dict[str, Any] = json.loads(file["about"].tobytes())
-            columns = {
-                name: Sketch(**scalars, **{k: file[f"{k}.{name}"] for k in _ARRAYS})
-                for name, scalars in about["columns"].items()
-            }
+        about, done = json.loads(zlib.decompress(data))
+        columns = {}
+        for name, sketch in about["columns"].items():
+            keys, counts = (np.array(sketch[of], dtype=np.int64) for of in ("keys", "counts"))
+            columns[name] = Sketch(**{**sketch, "keys": keys, "counts": counts})
         tallies = tuple(Tally(one["passed"], tuple(map(tuple, one["worst"]))) for one in about["tallies"])
-        done = [(int(first), int(count)) for first, count in about["done"]]
-        return Reduction(about["count"], about["together"], columns, tallies), done
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile, zlib.error, EOFError):
+        whole = Reduction(about["count"], about["together"], columns, tallies)
+        return whole, [(int(first), int(count)) for first, count in done]
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError, zlib.error):
         return Reduction(), []
 
 
@@ -225,11 +209,9 @@ class Reducing:
     task: SampleTask
 
     def sample(self) -> bytes:
-        """See `SampleTask.sample`."""
         return self.task.sample()
 
     def __call__(self, chunk: Chunk) -> Reduction:
-        """What the samples of a chunk come to."""
         made, first = Reduction(), chunk[0]
         draws = self.task.sampler.draw(*chunk)  # at once: far on it takes long
         for start in range(0, len(draws), BLOCK):

@@ -56,7 +56,6 @@ class ColumnStatistics:
 
 
 def column_statistics(name: str, unit: str, sketch: Sketch) -> ColumnStatistics:
-    """Statistics of a column from its sketch."""
     infinite = sketch.low + sketch.high
     defined = sketch.finite + infinite
     ranks = [min(max(int(np.ceil(share * defined)) - 1, 0), defined - 1) for share in SHARES if defined]
@@ -103,7 +102,6 @@ class Sketch:
 
     @classmethod
     def of(cls, values: np.ndarray) -> Sketch:
-        """The sketch of some values."""
         finite = values[np.isfinite(values)] + 0.0  # no minus zero
         bits = finite.view(np.int64)
         keys, counts = np.unique(np.where(bits < 0, bits ^ _LAST_63, bits), return_counts=True)
@@ -114,7 +112,6 @@ class Sketch:
         )  # fmt: skip
 
     def merged(self, other: Sketch) -> Sketch:
-        """The sketch of the values of both."""
         dropped = max(self.dropped, other.dropped)
         keys = np.concatenate([one.keys >> (dropped - one.dropped) for one in (self, other)])
         counts = np.concatenate([self.counts, other.counts])
@@ -127,7 +124,6 @@ class Sketch:
 
     @property
     def finite(self) -> int:
-        """How many values are finite."""
         return int(self.counts.sum())
 
     @property

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -140,17 +141,13 @@ def monte_carlo(
     nominal = task.figures(sampler.nominal[None, :])
     tallies = list(zip(judged(design), whole.tallies, strict=True))
     odds = [
-        replace(
-            _odds(r.id, label(r), r.unit, tally.passed, whole.count),
-            minimum=r.minimum,
-            maximum=r.maximum,
-            nominal=float(judge(r, design, nominal).value[0]),
-            worst=tally.worst[0][2],
-            worst_sample=tally.worst[0][1],
-            columns=source_columns(r, design),
+        _odds(
+            r.id, label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
+            nominal=float(judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
+            worst_sample=tally.worst[0][1], columns=source_columns(r, design),
         )
         for r, tally in tallies
-    ]
+    ]  # fmt: skip
     if tallies:
         odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
     return MonteCarloResult(
@@ -179,16 +176,15 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
     return tuple(sorted(made, key=lambda one: (names.index(one.column), -one.swing)))
 
 
-def _odds(id: str, words: str, unit: str, passed: int, count: int) -> Odds:
-    low, high = clopper_pearson(passed, count)
-    return Odds(id, words, unit, passed, count, passed / count, low, high)
+def _odds(id: str, words: str, unit: str, passed: int, count: int, **more: Any) -> Odds:
+    return Odds(id, words, unit, passed, count, passed / count, *clopper_pearson(passed, count), **more)
 
 
 def _reduced(
     task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
 ) -> Reduction:
     """Reduce the samples where they are computed; what is done is noted every `NOTED_S` and at the end."""
-    path = store.folder / f"reduced-{samples}.npz"
+    path = store.folder / f"reduced-{samples}.json.zlib"
     whole, done = unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
     noted = time.monotonic()
 

@@ -70,11 +70,9 @@ class Store:
         write_bytes(path, data)
 
     def path(self, chunk: Chunk) -> Path:
-        """File of a chunk."""
         return self.folder / f"samples-{chunk[0]:010d}-{chunk[1]}.parquet"
 
     def chunks(self, total: int) -> list[Chunk]:
-        """All chunks of a study of so many numbers."""
         return [(first, min(self.chunk, total - first)) for first in range(0, total, self.chunk)]
 
     def missing(self, total: int) -> list[Chunk]:
@@ -82,7 +80,6 @@ class Store:
         return [chunk for chunk in self.chunks(total) if not _whole(self.path(chunk), chunk[1])]
 
     def write(self, chunk: Chunk, arrays: Arrays) -> None:
-        """Put a chunk on disk."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -91,7 +88,6 @@ class Store:
         self.put(self.path(chunk), sink.getvalue().to_pybytes())
 
     def blocks(self, total: int) -> Iterator[Arrays]:
-        """The columns of one chunk after the other."""
         import pyarrow.parquet as pq
 
         for chunk in self.chunks(total):
@@ -156,7 +152,6 @@ def step_units() -> dict[str, str]:
 
 
 def step_rows(step: StepCheck, population: Population) -> Rows:
-    """Simulator rows of every design."""
     rows = Rows.of(population.stacked, population.count)
     rows["load"] = step.load_Nm
     rows["ticks"] = np.maximum(np.round(step.duration_s / rows["period"]), 1.0)
@@ -193,7 +188,6 @@ class SampleTask:
                 raise InputError(f"{path}: cannot vary in a Monte Carlo study")
 
     def __call__(self, chunk: Chunk) -> Arrays:
-        """All columns of the samples from the first of a chunk on."""
         return self.columns(chunk[0], self.sampler.draw(*chunk))
 
     def columns(self, first: int, draws: np.ndarray) -> Arrays:

@@ -39,7 +39,6 @@ class Group:
 
     @classmethod
     def of(cls, columns: tuple[int, ...], correlation: np.ndarray) -> Group:
-        """The group of some columns, from the correlation matrix of all."""
         values, vectors = np.linalg.eigh(correlation[np.ix_(columns, columns)])
         kept = values > _LEAST
         axes = vectors[:, kept] * np.sqrt(values[kept])
@@ -89,7 +88,6 @@ class Region:
 
     @property
     def dimensions(self) -> int:
-        """Coordinates of the unit cube."""
         ranks = sum(group.axes.shape[1] for group in self.groups)
         return len(self.alone) + ranks + (self.sampler.table is not None)
 

@@ -40,37 +40,31 @@ def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = MAX_R
     stays bounded whatever its length; ``Record.averaged`` and a note tell. An InputError names the file, the
     line, the column and the reason.
     """
-    counts, digest = RowCounts(), hashlib.sha256()
-    rows = BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
-    for chunk in stream_csv(path, spec, counts=counts, digest=digest):
+    counts, rows = RowCounts(), BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
+    for chunk in stream_csv(path, spec, counts):
         rows.add(chunk)
-    return record_of_rows(rows.array(), spec, Path(path), counts, digest.hexdigest(), rows.factor)
+    with open_regular(path, "CSV file") as stream:
+        digest = hashlib.file_digest(stream, "sha256").hexdigest()
+    return record_of_rows(rows.array(), spec, Path(path), counts, digest, rows.factor)
 
 
-def stream_csv(
-    path: str | Path,
-    spec: RecordSpec,
-    *,
-    counts: RowCounts | None = None,
-    digest: hashlib._Hash | None = None,
-) -> Iterator[FloatArray]:
+def stream_csv(path: str | Path, spec: RecordSpec, counts: RowCounts | None = None) -> Iterator[FloatArray]:
     """Yield blocks of rows, shape (n, 1 + signals): time in s, then each signal in SI.
 
     Memory does not depend on the length of the file. ``counts`` is filled in on the way.
     """
     counts = RowCounts() if counts is None else counts
     in_si = SiRows(spec, counts, str(path))
-    for block in _blocks(Path(path), spec, counts, digest or hashlib.sha256()):
+    for block in _blocks(Path(path), spec, counts):
         rows = in_si(block)
         if len(rows):
             yield rows
 
 
-def _blocks(path: Path, spec: RecordSpec, counts: RowCounts, digest: hashlib._Hash) -> Iterator[Block]:
+def _blocks(path: Path, spec: RecordSpec, counts: RowCounts) -> Iterator[Block]:
     layout, origin, header = spec.format, str(path), tuple[str, ...]()
     with open_regular(path, "CSV file") as stream:
         for data in _line_blocks(stream, origin):
-            digest.update(data)
             line = counts.lines + 1
             counts.lines += data.count(b"\n") + (not data.endswith(b"\n"))
             text = _clean(data, layout, counts)
@@ -279,7 +273,6 @@ class BoundedRows:
         self._rest = np.empty((0, columns))
 
     def add(self, rows: FloatArray) -> None:
-        """Append rows, shape (n, columns)."""
         for start in range(0, len(rows), self.limit):
             part = np.concatenate([self._rest, rows[start : start + self.limit]])
             whole = len(part) // self.factor * self.factor
@@ -296,7 +289,6 @@ class BoundedRows:
         self.factor *= 2
 
     def array(self) -> FloatArray:
-        """All rows, shape (m, columns)."""
         last = [self._rest.mean(axis=0, keepdims=True)] if len(self._rest) else []
         return np.concatenate([*self._held, *last])
 

@@ -30,7 +30,6 @@ class InputUse:
 
     @property
     def is_used(self) -> bool:
-        """Whether the analysis read it."""
         return not self.use.startswith("no: ")
 
 

@@ -15,9 +15,9 @@ from actuator_lti.drive.steady import motor_torque_Nm, voltage_limit_torque_Nm
 from analyses.large_signal.tones import tone
 from nonlinear import commands, simulate
 
-POINTS = 400
-SINE_SHARE, OVERRUN = 0.7, 3.0
-LONGEST_TICKS = 60_000
+POINTS, PLANE_POINTS = 400, 41
+LONGEST_TICKS, RUN_UP_TICKS = 60_000, 40_000
+STEADY_SHARE = 0.1
 
 
 @dataclass(frozen=True)
@@ -76,8 +76,8 @@ def manoeuvres(
     # angular frequencies at which a sine needs all of the rate, or of the acceleration
     bounds = [rate_rad_s / full] * moves + [math.sqrt(acceleration_rad_s2 / full)] * turns
     slow_hz = min(bounds, default=0.0) / (2.0 * math.pi)
-    names = ("sine at 70 % of what rate and torque allow", "sine three times as fast as allowed")
-    for name, share in zip(names, (SINE_SHARE, OVERRUN), strict=True) if bounds else ():
+    shares = {"sine at 70 % of what rate and torque allow": 0.7, "sine three times as fast as allowed": 3.0}
+    for name, share in shares.items() if bounds else ():
         every = design.controller.position_loop.every
         hz = min(share * slow_hz, 0.2 / (every * design.controller.period_s))
         chosen = tone(hz, design)
@@ -98,7 +98,7 @@ def _manoeuvre(
     current = np.abs(run.current_A[-count:]) if design.motor.has_electrical_dynamics else None
     speed = run.motor_speed_rad_s[-count:]
     thin = _thinned(speed, torque)
-    rms = None if current is None else float(np.sqrt(np.mean(current**2)))
+    rms = None if current is None else _rms(current)
     return Manoeuvre(
         name=name,
         load_Nm=load_Nm,
@@ -106,12 +106,16 @@ def _manoeuvre(
         torque_Nm=torque[thin],
         rms_current_A=rms,
         peak_current_A=None if current is None else float(current.max()),
-        rms_torque_Nm=float(np.sqrt(np.mean(torque**2))),
+        rms_torque_Nm=_rms(torque),
         peak_torque_Nm=float(np.max(np.abs(torque))),
         duty=thermal_duty(design, rms) if period is not None else None,
         limits={key: use.fraction for key, use in run.limits.items() if use.active},
         periodic=period is not None,
     )
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
@@ -120,9 +124,6 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
     places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
     return np.unique(np.minimum(places, len(way) - 1))
-
-
-PLANE_POINTS = 41
 
 
 @dataclass(frozen=True)
@@ -150,21 +151,17 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     motor, limits = design.effective_motor, design.limits
     top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
     speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
-    bounds = []
-
-    def level(name: str, torque: float) -> None:
-        if math.isfinite(torque):
-            bounds.append(Curve(name, speed[[0, -1]], np.full(2, torque)))
-
-    if motor.source_gain_Nm_V is not None:
-        level("drive signal at its limit", stall_torque_Nm(design))
-    else:
+    bounds, levels = [], {"drive signal at its limit": stall_torque_Nm(design)}
+    if motor.source_gain_Nm_V is None:
         if math.isfinite(limits.voltage_V):
             line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
             bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
-        if design.controller.current is not None:
-            level("peak current", motor_torque_Nm(design, limits.peak_current_A, math.nan))
-        level("continuous current", motor_torque_Nm(design, limits.continuous_current_A, math.nan))
+        currents = {"peak current": limits.peak_current_A, "continuous current": limits.continuous_current_A}
+        levels = {name: motor_torque_Nm(design, current, math.nan) for name, current in currents.items()}
+        if design.controller.current is None:
+            del levels["peak current"]
+    ends = speed[[0, -1]]
+    bounds += [Curve(name, ends, np.full(2, level)) for name, level in levels.items() if math.isfinite(level)]
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
         high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
         bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
@@ -176,23 +173,14 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     return TorqueSpeedPlane(tuple(bounds), demands)
 
 
-RUN_UP_TICKS = 40_000
-STEADY_SHARE = 0.1
-
-
 @dataclass(frozen=True)
 class DriveFigures:
-    """Figures of the whole drive at one load torque; output side in rad (linear axis: m)."""
+    """`actuator_lti.drive.facts.Capability` of one design at one load torque at the output shaft."""
 
-    load_Nm: float  # load torque at the output shaft
-    # Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it cannot
-    # move; ``inf`` without any limit
+    load_Nm: float
     output_rate_rad_s: float
-    rate_limit: str  # what sets it: one of `actuator_lti.drive.facts.RATE_LIMITS`
-    # Current needed at that speed; ``None`` without a motor current (ideal source) or where the speed has no
-    # bound
+    rate_limit: str  # one of `actuator_lti.drive.facts.RATE_LIMITS`
     motor_current_A: float | None
-    # Largest acceleration of the output from rest, within the acceleration limit; 0 if it cannot move
     acceleration_rad_s2: float
 
 
@@ -239,9 +227,9 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     rate, push = figures.output_rate_rad_s, figures.acceleration_rad_s2
     current, continuous = figures.motor_current_A, design.limits.continuous_current_A
     ratio = current / continuous if current is not None and math.isfinite(continuous) else None
-    duty = thermal_duty(design, current)
+    found = Capability(figures, None, None, None, ratio, thermal_duty(design, current))
     if not (0.0 < rate < math.inf and 0.0 < push < math.inf):
-        return Capability(figures, None, None, None, ratio, duty)
+        return found
     friction = design.friction  # the way that meets the greater resistance
     forward = friction.dry_Nm(load_Nm, 1) + friction.offset_torque_Nm
     direction = 1 if forward >= friction.dry_Nm(load_Nm, -1) - friction.offset_torque_Nm else -1
@@ -255,15 +243,11 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
     tail = max(4, int(STEADY_SHARE * speed.size))
     steady = float(speed[-tail:].mean())
     settled = abs(float(speed[-1] - speed[-tail])) < 2e-3 * abs(steady)
-    found_current = abs(float(run.current_A[-tail:].mean())) if design.motor.has_electrical_dynamics else None
-    return Capability(
-        figures,
-        steady if settled else None,
-        _acceleration(design, load, direction, rate, push),
-        found_current if settled else None,
-        ratio,
-        duty,
-    )
+    found = replace(found, simulated_acceleration_rad_s2=_acceleration(design, load, direction, rate, push))
+    if not settled:
+        return found
+    drawn = abs(float(run.current_A[-tail:].mean())) if design.motor.has_electrical_dynamics else None
+    return replace(found, simulated_rate_rad_s=steady, simulated_current_A=drawn)
 
 
 def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:

@@ -101,7 +101,6 @@ class Sampler:
 
     @property
     def dimensions(self) -> int:
-        """Coordinates of a point."""
         return len(self.factors) + (self.table is not None)
 
     def points(self, first: int, count: int) -> np.ndarray:

@@ -133,7 +133,6 @@ class Study:
 
     @property
     def all(self) -> tuple[Variant, ...]:
-        """The base, then the variants."""
         return (self.base, *self.variants)
 
 
@@ -242,8 +241,6 @@ def _required(design: Design, extra: list[Tree], where: str) -> Design:
 
 @dataclass(frozen=True)
 class _Maker:
-    """Makes variants of a base."""
-
     base: Design
     where: str
     folder: Path
@@ -269,7 +266,6 @@ class _Maker:
             yield from self._points(table, table.tables("axes"))
 
     def _points(self, table: Table, axes: list[Table]) -> Iterator[Variant]:
-        """Every combination of the values of some axes."""
         if not axes:
             raise InputError(f"{table.path}.axes: no axis; allowed: 1 to {GRID_AXES.most}", self.where)
         GRID_AXES.check(len(axes), self.where, name=f"{table.path}.axes")

@@ -74,10 +74,11 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     program = Program(problem, lambda x: problem.rows(x, working) - MET)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
+    met = {"type": "ineq", "fun": lambda x: program.model(x)[0], "jac": lambda x: program.model(x)[1]}
     try:
         result = minimize(
             lambda x: float(problem.change(problem.values(x)[None, :])[0]),
-            begin, method="SLSQP", bounds=[*zip(low, high, strict=True)], constraints=program.constraints,
+            begin, method="SLSQP", bounds=[*zip(low, high, strict=True)], constraints=met,
             options={"maxiter": 60, "ftol": 1e-10},
         ).x  # fmt: skip
     except Spent:

@@ -19,7 +19,7 @@ from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
-from analyses.tuning.start import Variable, allowed_range, change
+from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
 GAINS = (
     "control.current.gain",
@@ -39,12 +39,13 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 class Problem:
     """Requirements on the loops of a design, over the corners of its tolerances.
 
-    ``most`` designs may be looked at by a search, ``evaluations`` were so far.
+    ``most`` designs may be looked at by a search, ``evaluations`` were so far. ``elements`` were added.
     """
 
     design: Design
     requirements: tuple[Requirement, ...]
     variables: tuple[Variable, ...]
+    elements: tuple[Element, ...] = ()
     most: int = MOST_DESIGNS
     evaluations: int = 0
     # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
@@ -189,14 +190,14 @@ def problem_of(
     design: Design,
     requirements: tuple[Requirement, ...],
     start: Mapping[str, float],
-    placed: tuple[Variable, ...] = (),
+    elements: tuple[Element, ...] = (),
     most: int = MOST_DESIGNS,
 ) -> Problem:
-    """Set the problem up: which gains the design has, where they may lie.
+    """Set the problem up: which gains the design has, where they may lie, with the variables of new elements.
 
-    The search starts from ``start`` (by rules, SI); another gain of the design starts where it is. ``placed``
-    are the variables of added elements.
+    The search starts from ``start`` (by rules, SI); another gain of the design starts where it is.
     """
+    design, placed = place(design, elements)
     variables = []
     for path in (path for path in GAINS if path in set(paths_of(design))):
         home = parameter_value(design, path)
@@ -204,7 +205,7 @@ def problem_of(
         least, largest = allowed_range(design, path)
         low, high = max(min(begin, home) / SPAN, least), min(max(begin, home) * SPAN, largest)
         variables.append(Variable(path, begin, min(low, high), max(low, high), home))
-    return Problem(design, requirements, (*variables, *placed), most)
+    return Problem(design, requirements, (*variables, *placed), elements, most)
 
 
 _FORM = re.compile(r"\s*([a-z]+)\.([a-z_0-9]+)\s*(>=|<=)\s*(.+?)\s*")

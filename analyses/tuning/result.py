@@ -78,20 +78,6 @@ class NonlinearCheck:
     final_error_percent: float
     limited: str
 
-    @classmethod
-    def of(cls, corner: str, amplitude_rad: float, seen: Mapping[str, float]) -> NonlinearCheck:
-        """From the figures of a step (`analyses.monte_carlo.task.step_units`)."""
-        shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
-        return cls(
-            corner=corner,
-            amplitude_rad=amplitude_rad,
-            rise_time_s=finite(seen["rise_time"]),
-            overshoot_percent=float(seen["overshoot"]),
-            settling_time_s=finite(seen["settling_time"]),
-            final_error_percent=float(seen["final_error"]),
-            limited=", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0),
-        )
-
 
 @dataclass(frozen=True)
 class TuningResult:
@@ -156,10 +142,14 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tup
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]].T
     values = {f.path: column for f, column in zip(problem.factors, points, strict=True)}
-    population = Population(tuned, values, len(names))
-    return tuple(
-        NonlinearCheck.of(corner, size, {name.partition(".")[2]: v[k] for name, v in columns.items()})
-        for size in (0.05 * plan.deflection_rad, plan.deflection_rad)
-        for columns in [step_columns(StepCheck(size, plan.duration_s), population)]
-        for k, corner in enumerate(names)
-    )
+    population, made = Population(tuned, values, len(names)), []
+    for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
+        columns = step_columns(StepCheck(size, plan.duration_s), population)
+        for k, corner in enumerate(names):
+            seen = {name.partition(".")[2]: float(column[k]) for name, column in columns.items()}
+            shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+            limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
+            rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
+            overshoot, error = seen["overshoot"], seen["final_error"]
+            made.append(NonlinearCheck(corner, size, rise, overshoot, settling, error, limited))
+    return tuple(made)

@@ -21,20 +21,9 @@ from analyses.tuning.least import least_change
 from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
 from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
-from analyses.tuning.start import (
-    Element,
-    Placed,
-    RuleGains,
-    checked,
-    neighbours,
-    object_of,
-    place,
-    rule_gains,
-    step_of_gain,
-)
+from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
 Progress = Callable[[int, int], None]
-Tried = tuple[Placed, Problem, Solution]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
 
 
@@ -70,11 +59,11 @@ def tune(
     tell = progress or (lambda done, total: None)
     tell(0, stages)
     rules = rule_gains(design)
-    tried: list[Tried] = []
+    tried: list[tuple[Problem, Solution]] = []
     for one in _tried(design, wanted, choices, rules, settings.aim):
         tried.append(one)
         tell(len(tried), stages)
-    placed, problem, solution = max(tried, key=lambda one: one[2].slack)
+    problem, solution = max(tried, key=lambda one: one[1].slack)
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
     result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     moved = {  # what did not move keeps its text and source
@@ -100,10 +89,10 @@ def tune(
         corners=len(problem.all_corners),
         checks=checks,
         trade_off=curve,
-        evaluations=sum(one.evaluations for _, one, _ in tried),
+        evaluations=sum(one.evaluations for one, _ in tried),
         notes=tuple(_notes(problem, gains, result, confirmed)),
         aim=settings.aim,
-        placed=placed.elements,
+        placed=problem.elements,
         confirmed=confirmed,
     )
 
@@ -114,16 +103,16 @@ def _tried(
     choices: Sequence[tuple[Element, ...]],
     rules: RuleGains,
     aim: Aim,
-) -> Iterator[Tried]:
+) -> Iterator[tuple[Problem, Solution]]:
     """What each choice of elements comes to, up to the first that does."""
     seek, left = least_change if aim == "least-change" else solve, MOST_DESIGNS
     for elements in choices:
-        placed, last = place(design, elements), elements == choices[-1]
+        last = elements == choices[-1]
         most = max(left if last else left // 2, MOST_DESIGNS // 12)  # designs that it may look at
-        problem = problem_of(placed.design, wanted, rules.values, placed.variables, most)
+        problem = problem_of(design, wanted, rules.values, elements, most)
         solution = seek(problem, give_up=not last)
         left -= problem.evaluations
-        yield placed, problem, solution
+        yield problem, solution
         if solution.slack >= 0.0:
             return
 

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -140,11 +139,6 @@ class Program:
             self._last = (values[0], slopes.T)
             self.seen.append((x.copy(), float(values[0].min())))
         return self._last
-
-    @property
-    def constraints(self) -> dict[str, Any]:
-        """Every function at least 0, as `scipy.optimize.minimize` takes it."""
-        return {"type": "ineq", "fun": lambda x: self.model(x)[0], "jac": lambda x: self.model(x)[1]}
 
     @property
     def best(self) -> np.ndarray:

@@ -162,15 +162,6 @@ class Variable:
     per: str = ""
 
 
-@dataclass(frozen=True)
-class Placed:
-    """A design with neutral elements, and their variables."""
-
-    design: Design
-    variables: tuple[Variable, ...]
-    elements: tuple[Element, ...]
-
-
 def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
     """What may be placed in a design; an unknown word, or what the drive has no place for, is refused."""
     control, name = design.controller, design.name
@@ -186,8 +177,8 @@ def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
     return tuple(item for item in ELEMENTS if item in wanted)
 
 
-def place(design: Design, elements: tuple[Element, ...]) -> Placed:
-    """A design with neutral elements in its velocity loop."""
+def place(design: Design, elements: tuple[Element, ...]) -> tuple[Design, list[Variable]]:
+    """A design with neutral elements in its velocity loop, and their variables."""
     variables: list[Variable] = []
     for element in elements:
         if element == "feedforward":
@@ -200,7 +191,7 @@ def place(design: Design, elements: tuple[Element, ...]) -> Placed:
         control = replace(design.controller, velocity=replace(velocity, filters=filters))
         design, path = replace(design, controller=control), f"control.velocity.filter.{len(filters)}."
         variables += [replace(v, path=path + v.path, per=path + v.per if v.per else "") for v in own]
-    return Placed(design, tuple(variables), elements)
+    return design, variables
 
 
 def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:

@@ -147,13 +147,16 @@ class Validation:
         """Whether every prediction was judged and met, and the drive comes to rest where it is sent."""
         return self.verdict is Verdict.MET
 
-    @property
-    def words(self) -> str:
+    def sentences(self) -> list[str]:
         """The verdict in words: rows counted, and what the drive does that it must not."""
         said = [self.tally.words("predictions"), *self.failures]
         said += [f"stability of the {name} loop not known" for name in self.undecided]
-        said += [self.rest_words] if self.rest is not Verdict.NOT_MET else []
-        return "; ".join(filter(None, said))
+        return said + [self.rest_words] * (bool(self.rest_words) and self.rest is not Verdict.NOT_MET)
+
+    @property
+    def words(self) -> str:
+        """Its sentences in one line."""
+        return "; ".join(self.sentences())
 
     def __str__(self) -> str:
         return f"{self.design.name}: {self.words}"

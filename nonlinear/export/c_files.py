@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
@@ -33,32 +32,18 @@ Floats = npt.NDArray[np.float64]
 SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 
 
-@dataclass(frozen=True)
-class ExportedDesign:
-    """What an export knows of a design.
-
-    ``row``: parameters of a run: the design at rest, its load torque an input.
-    ``p``, ``s``: the row with all that follows from it, and the state at the start.
-    """
-
-    design: Design
-    row: Floats
-    p: Floats
-    s: Floats
-
-
-def exported(design: Design) -> ExportedDesign:
-    """The rows of a design whose load torque comes from outside."""
+def exported_row(design: Design) -> Floats:
+    """Parameters of a run: the design at rest, its load torque an input."""
     row = design_row(design)
-    row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at: it is an input
-    return ExportedDesign(design, row, *parameters(row))
+    row[at.LOAD_TABLE_LENGTH] = 1.0  # the load of a tick is looked at
+    return row
 
 
-def spare_parameters(ours: ExportedDesign) -> int:
+def spare_parameters(p: Floats) -> int:
     """Numbers to keep free in p so that a coupling may become ``4**SPARE_LEVELS`` times as stiff."""
-    if ours.row[at.ELASTIC_DRIVE] <= 0.0:
+    if p[at.ELASTIC_DRIVE] <= 0.0:
         return 0
-    modes = (ours.p.size - elastic.EL_MODES) // int(ours.p[elastic.EL_MODE_SIZE])
+    modes = (p.size - elastic.EL_MODES) // int(p[elastic.EL_MODE_SIZE])
     return SPARE_LEVELS * modes * (1 + elastic.STEP_SIZE)
 
 
@@ -84,14 +69,15 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
     refuse_prefix(prefix)
     if single_precision:
         _refuse_single(design)
-    ours = exported(design)
-    values = _values(ours)
+    row = exported_row(design)
+    p, s = parameters(row)
+    values = _values(design, row) | {"P": str(p.size), "S": str(s.size), "HASH": source_hash()}
     texts = {"drive.h": header_text(), "drive.c": source_text()}
     texts |= {f"{prefix}{name}": filled(name, values) for name in ("design.h", "design.c")}
     if single_precision:
         texts = {name: single(text) for name, text in texts.items()}
     texts["main.c"] = filled("main.c", {"REAL": "float" if single_precision else "double"})
-    texts["README.md"] = _readme(ours, single_precision)
+    texts["README.md"] = filled("README.md", values | _readme(design, p, s, single_precision))
     names = {"prefix": prefix, "PREFIX": prefix.upper()}
     return {name: replaced(text, names) for name, text in texts.items()}
 
@@ -133,19 +119,18 @@ def exporter_version() -> str:
         return "not installed"
 
 
-def _values(ours: ExportedDesign) -> dict[str, str]:
+def _values(design: Design, row: Floats) -> dict[str, str]:
     """What stands for the words of ``design.h`` and ``design.c``."""
-    design, known = ours.design, place_words()
+    known = place_words()
     lines = [
         f"    p[{place}] = {c_float(float(value))}; /* {plain(known[place])} */"
-        for place, value in enumerate(ours.row)
+        for place, value in enumerate(row)
         if value != 0.0 or place < at.COMMAND  # signals, probes and chains only where they are set
     ]
     return {
         "DESIGN": plain(design.name), "TITLE": plain(design.title),
         "NAME": c_text(design.name), "REVISION": c_text(design.revision or ""),
-        "DESIGN_HASH": design_hash(design), "HASH": source_hash(), "VERSION": exporter_version(),
-        "P": str(ours.p.size), "S": str(ours.s.size), "VALUES": "\n".join(lines),
+        "DESIGN_HASH": design_hash(design), "VERSION": exporter_version(), "VALUES": "\n".join(lines),
     }  # fmt: skip
 
 
@@ -159,25 +144,21 @@ def _seen(text: str) -> str:
     return "".join(c if c.isprintable() else " " for c in text)
 
 
-def _readme(ours: ExportedDesign, single_precision: bool) -> str:
-    design, row = ours.design, ours.row
+def _readme(design: Design, p: Floats, s: Floats, single_precision: bool) -> dict[str, str]:
+    """What stands for the words of the README, beside those of the design."""
     what, unit = stage_words(design)
-    number, step = 4 if single_precision else 8, spare_parameters(ours) // SPARE_LEVELS
+    number, step = 4 if single_precision else 8, spare_parameters(p) // SPARE_LEVELS
     longer = f" A stiffer coupling needs a longer p: {step} numbers more for each factor of four."
-    values = {
+    return {
         "NAME": _seen(design.name),
         "TITLE": _seen(design.title),
         "PRECISION": "single (float)" if single_precision else "double",
         "COMMAND": f"{what}, {unit}",
-        "PERIOD": f"{row[at.PERIOD]:g}",
-        "EVENTS": f"{int(row[at.MAX_EVENTS])}",
-        "SEGMENTS": "2" if row[at.DELAY_FRACTION] > 0.0 else "1",
-        "P": str(ours.p.size),
-        "S": str(ours.s.size),
+        "PERIOD": f"{p[at.PERIOD]:g}",
+        "EVENTS": f"{int(p[at.MAX_EVENTS])}",
+        "SEGMENTS": "2" if p[at.DELAY_FRACTION] > 0.0 else "1",
         "IO": str(at.IO_SIZE),
-        "BYTES": str(number * (ours.p.size + ours.s.size + at.IO_SIZE)),
+        "BYTES": str(number * (p.size + s.size + at.IO_SIZE)),
         "STIFFER": longer if step else "",
-        "HASH": source_hash(),
         "AXIS": "linear (m, N, kg)" if design.axis == "linear" else "rotary (rad, N m, kg m2)",
     }
-    return filled("README.md", values)

@@ -15,11 +15,12 @@ from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear.export import variables as of
-from nonlinear.export.c_files import c_export, exported, spare_parameters
+from nonlinear.export.c_files import c_export, exported_row, spare_parameters
 from nonlinear.export.model_description import MODEL, build_description, description
 from nonlinear.export.program import c_text, filled, template
 from nonlinear.export.relations import relation_functions
 from nonlinear.export.trace import KeyTrace, trace_keys
+from nonlinear.native import parameters
 
 Version = Literal[2, 3]
 PLATFORMS = ("linux64", "win64")
@@ -98,7 +99,7 @@ def refuse_unknown(version: int, platforms: Sequence[str]) -> None:
 def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str]:
     texts = c_export(design)
     sizes: dict[str, int | str] = {
-        "SPARE": spare_parameters(exported(design)),
+        "SPARE": spare_parameters(parameters(exported_row(design))[0]),
         "KEYS": len(trace.keys),
         "CONSTANTS": len(trace.constants),
         "TEXTS": len(of.texts_of(design)),
@@ -118,7 +119,7 @@ def _sources(design: Design, trace: KeyTrace, version: Version) -> dict[str, str
 def _source_values(design: Design, trace: KeyTrace) -> dict[str, str]:
     """What stands for the words of ``fmu_design.c``."""
     keys = [
-        f"    {{{c_float(key.value)}, {c_float(of.key_low(key))}, {c_float(key.high)}, {int(key.fixed)}, "
+        f"    {{{c_float(key.value)}, {c_float(key.low)}, {c_float(key.high)}, {int(key.fixed)}, "
         f"{int(key.whole)}}}, /* {key.path} */"
         for key in trace.keys
     ]

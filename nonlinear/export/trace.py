@@ -22,10 +22,6 @@ from nonlinear.export.statement import Statement, used
 from nonlinear.row.parameters import design_row
 
 
-class NotTraceable(TypeError):
-    """A value went into a function that the trace does not know."""
-
-
 @dataclass
 class Tape:
     """Statements in the order in which they were made.
@@ -117,22 +113,17 @@ class Traced:
     __sub__, __rsub__ = _binary("-", operator.sub)
     __mul__, __rmul__ = _binary("*", operator.mul)
     __truediv__, __rtruediv__ = _binary("/", operator.truediv)
+    __pow__, _ = _binary("pow", operator.pow)
+    __and__, _ = _binary("&&", lambda one, other: bool(one) and bool(other))  # of comparisons that are values
+    __or__, _ = _binary("||", lambda one, other: bool(one) or bool(other))
+    __rand__, __ror__ = __and__, __or__
     __lt__, __le__ = _compared("<", operator.lt), _compared("<=", operator.le)
     __gt__, __ge__ = _compared(">", operator.gt), _compared(">=", operator.ge)
     __eq__, __ne__ = _compared("==", operator.eq), _compared("!=", operator.ne)
     floor, ceil = _rounded("floor"), _rounded("ceil")  # numpy asks by these names
     __floor__, __ceil__ = floor, ceil
     tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
-
-    def __and__(self, other: Any) -> Any:
-        """Both; of comparisons that are values."""
-        return self.tape.value("&&", (self, other), bool(self.number) and bool(_number(other)))
-
-    def __or__(self, other: Any) -> Any:
-        """One at least."""
-        return self.tape.value("||", (self, other), bool(self.number) or bool(_number(other)))
-
-    __rand__, __ror__ = __and__, __or__
+    __abs__ = _function("fabs")
 
     def either(self, yes: Any, no: Any) -> Traced:
         """One value where this comparison holds, else the other."""
@@ -145,8 +136,9 @@ class Traced:
         kept = self.number if abs(self.number) >= _number(least) else 0.0
         return self.tape.value("zero_below", (self, least), kept)
 
-    def __pow__(self, power: Any) -> Traced:
-        return self.tape.value("pow", (self, power), self.number ** _number(power))
+    def __format__(self, form: str) -> str:
+        """Stands in a message for the value that it will have."""
+        return f"\x01{form or 'g'}\x02{self.name}\x03"
 
     def __mod__(self, other: Any) -> Traced:
         return self._remainder(self, other)
@@ -156,18 +148,11 @@ class Traced:
 
     def _remainder(self, of: Any, by: Any) -> Traced:
         if not self.tape.loose:
-            raise NotTraceable("a remainder")
+            raise TypeError("a remainder")
         return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
-
-    def __format__(self, form: str) -> str:
-        """Stands in a message for the value that it will have."""
-        return f"\x01{form or 'g'}\x02{self.name}\x03"
 
     def __neg__(self) -> Traced:
         return self.tape.value("-", (self,), -self.number)
-
-    def __abs__(self) -> Traced:
-        return self.tape.value("fabs", (self,), abs(self.number))
 
     def __bool__(self) -> bool:
         return self.tape.condition("!=", (self, 0.0), self.number != 0.0)
@@ -175,10 +160,10 @@ class Traced:
     def __float__(self) -> float:
         if self.tape.loose:
             return self.number
-        raise NotTraceable("a function of a floating-point number")
+        raise TypeError("a function of a floating-point number")
 
     def __int__(self) -> int:
-        raise NotTraceable("a whole number of a floating-point number")
+        raise TypeError("a whole number of a floating-point number")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -186,7 +171,7 @@ class Key:
     """One numeric key of a design as a parameter.
 
     ``path``: dotted path.
-    ``value``, ``low``, ``high``: SI; ``low_open`` makes the lower bound exclusive.
+    ``value``, ``low``, ``high``: SI.
     ``unit``: SI unit; ``"1"``: none.
     ``whole``: a count.
     ``fixed``: only before the run begins, because the state's shape or clock depends on it.
@@ -198,7 +183,6 @@ class Key:
     description: str
     low: float
     high: float
-    low_open: bool
     whole: bool = False
     fixed: bool = False
 
@@ -268,5 +252,5 @@ def _key(design: Design, path: str, *, fixed: bool) -> Key:
         unit=known.unit(Structure.of(design)),
         whole=known.kind == "integer" and value <= LARGEST_INTEGER,
         fixed=fixed,
-        **{name: getattr(known, name) for name in ("description", "low", "high", "low_open")},
+        **{name: getattr(known, name) for name in ("description", "low", "high")},
     )

@@ -160,14 +160,9 @@ def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
 def _of_key(key: Key, reference: int, causality: Causality, variability: str) -> Variable:
     return Variable(
         name=structured(key.path), reference=reference, causality=causality, variability=variability,
-        description=key.description, unit=key.unit, start=key.value, low=key_low(key), high=key.high,
+        description=key.description, unit=key.unit, start=key.value, low=key.low, high=key.high,
         kind="integer" if key.whole else "real", shown=SHOWN.get(key.unit, ""),
     )  # fmt: skip
-
-
-def key_low(key: Key) -> float:
-    """The lowest value that is allowed."""
-    return math.nextafter(key.low, math.inf) if key.low_open else key.low
 
 
 def structured(path: str) -> str:

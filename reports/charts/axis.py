@@ -48,7 +48,6 @@ class Axis:
         return [min(seen), max(seen)] if seen else []
 
     def written(self) -> Axis:
-        """Give what a document has to hold of it."""
         return replace(self, seen=self.shown())
 
     def span(self) -> tuple[float, float]:
@@ -78,7 +77,6 @@ class Axis:
         return np.asarray(1.0 - result if self.reversed else result)
 
     def named_ticks(self, room: int = 6) -> list[tuple[float, str]]:
-        """Give about ``room`` ticks with their labels."""
         low, high = self.span()
         if self.ticks is not None:
             slack = 1e-9 * (high - low)

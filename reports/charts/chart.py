@@ -176,7 +176,6 @@ class Panel:
         self.items.append(Shape(rings=made, look=_shade(look), label=label))
 
     def bar(self, row: float, start: float, stop: float, label: str = "", **look: Any) -> None:
-        """Draw a bar that lies along x."""
         half = 0.3
         self.x.see([start, stop])
         self.y.see([row - 0.6, row + 0.6])

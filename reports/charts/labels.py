@@ -101,7 +101,6 @@ class Room:
 
 
 def _around(at: tuple[float, float], size: tuple[float, float], over: bool) -> Iterator[Box]:
-    """Give places around a point, nearer ones first."""
     w, h = size
     if over:
         yield (at[0] - w / 2.0, at[1] - h / 2.0, at[0] + w / 2.0, at[1] + h / 2.0)

@@ -47,5 +47,4 @@ HATCH_PATHS = {
 
 
 def paint(colour: str, page: bool) -> str:
-    """Give a colour as a page or as paper needs it."""
     return f"var(--{colour},{COLOURS[colour]})" if page else COLOURS[colour]

@@ -173,7 +173,6 @@ LEADER = 26.0  # words further away from their point are tied to it by a line
 
 
 def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room) -> str:
-    """Write the words of a rule or note where they cover nothing."""
     w, h = text_box(item.words, NOTE)
     size = (w + 6.0, h + 2.0)
     if isinstance(item, Rule):
@@ -211,7 +210,6 @@ def _rule_words(
     item: Rule, panel: Panel, frame: Frame, pen: Pen, room: Room, size: tuple[float, float]
 ) -> str:
     w, h = size
-    note = Note(words=item.words, colour=item.look.colour)
     if item.across == "y":
         (at,), ends = frame.y(panel.y, [item.at]), (frame.top, frame.bottom)
         lefts = [frame.right - w - 4, frame.left + 4, (frame.left + frame.right - w) / 2]
@@ -224,4 +222,5 @@ def _rule_words(
         tied = f"{at:.2f} {frame.top:.1f}"
     if not ends[0] - 1 <= at <= ends[1] + 1:
         return ""
+    note = Note(words=item.words, colour=item.look.colour)
     return _boxed(note, room.first_free(boxes), pen, f' data-at="{tied}"' if pen.page else "")

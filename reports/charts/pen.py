@@ -49,7 +49,6 @@ class Pen:
     keys: Mapping[str, int]
 
     def within(self, k: int) -> Pen:
-        """Give a pen for the k-th part: its ids begin with another letter or number."""
         return replace(self, prefix=f"{self.prefix}-{k}")
 
     def style(self, **wanted: str) -> str:
@@ -74,7 +73,6 @@ class Pen:
         return f'<path{more} d="{path}" {self.stroke(look)}/>'
 
     def filled(self, path: str, look: Look, more: str = "") -> str:
-        """Write a filled outline, hatched where asked for."""
         fill = look.fill or look.colour
         opacity = "" if look.opacity == 1.0 else f"{look.opacity:g}"
         edge = {"stroke": "none"}
@@ -107,7 +105,6 @@ class Pen:
         self, words: str, x: float, y: float, *, size: float, anchor: str = "start", colour: str = "ink",
         bold: bool = False, more: str = "",
     ) -> str:  # fmt: skip
-        """Write text, its first base line at y."""
         lines = words.split("\n")
         weight = ' font-weight="600"' if bold else ""
         side = "" if anchor == "start" else f' text-anchor="{anchor}"'

@@ -48,6 +48,22 @@ def bound(panel: Panel, values: Iterable[float | None], *, span: float, top_room
     panel.y.limits(low - 0.04 * height, high + top_room * height)
 
 
+def decibels(values: np.ndarray) -> np.ndarray:
+    """Magnitude in dB; nothing is -inf, which a chart leaves out."""
+    with np.errstate(divide="ignore"):
+        return np.asarray(20.0 * np.log10(np.abs(values)))
+
+
+def phases(values: np.ndarray) -> np.ndarray:
+    return np.degrees(np.unwrap(np.angle(values)))
+
+
+def bode_axes(top: Panel, bottom: Panel, phase: Iterable[float | None]) -> None:
+    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    frequency(bottom)
+    phase_axis(bottom, phase)
+
+
 def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:
     """Set limits and ticks of a phase: multiples of 15, 45, 90, ... degrees."""
     bound(panel, values, span=span, top_room=0.08)
@@ -62,7 +78,6 @@ def multiples(step: float, low: float, high: float) -> list[tuple[float, str]]:
 
 
 def nyquist_plane(chart: Chart) -> Panel:
-    """Add the plane of L with its axes and the unit circle."""
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
     panel.rule_y(0.0)
@@ -72,7 +87,6 @@ def nyquist_plane(chart: Chart) -> Panel:
 
 
 def critical_point(panel: Panel) -> None:
-    """Mark -1, and show what lies about it."""
     panel.points([-1.0], [0.0], marker="+", colour=INK, size=14.0, read=False)
     panel.note("−1", (-1.0, 0.0))
     panel.x.limits(-1.0 - FRAME, FRAME - 0.35)

@@ -7,6 +7,7 @@ its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from itertools import accumulate
 
 from reports.charts.chart import Band, Chart, Column, Curve, Item, Note, Panel, Shape
@@ -22,12 +23,8 @@ KEY_ROW, KEY_GAP, SWATCH = 18.0, 18.0, 26.0
 
 def page_svg(chart: Chart, prefix: str, alt: str) -> str:
     """Write a chart for a page: a picture a column, and the legend as a list that can be worked."""
-    keys = _keys(chart)
-    total = sum(column.width for column in chart.columns)
     plots = []
-    for k, column in enumerate(chart.columns):
-        width = chart.width * column.width / total
-        pen = Pen(prefix=f"{prefix}{chr(97 + k)}", page=True, keys=keys)
+    for k, (column, width, pen) in enumerate(_columns(chart, prefix, page=True)):
         label = alt if k == 0 else f"{column.title or column.panels[0].title or 'continued'}, part {k + 1}"
         bounds = f"flex:{width:.0f} 1 {min(0.74 * width, 640):.0f}px;max-width:{1.4 * width:.0f}px"
         if width > 560:
@@ -45,20 +42,16 @@ def page_svg(chart: Chart, prefix: str, alt: str) -> str:
 
 def paper_svg(chart: Chart, prefix: str) -> str:
     """Write a chart as one picture with plain colours and its legend below."""
-    keys = _keys(chart)
-    total = sum(column.width for column in chart.columns)
     rows = _key_rows(chart)
     head = 18.0 if chart.title else 0.0
     foot = KEY_ROW * len(rows) + (6.0 if rows else 0.0)
     parts, left = [], 0.0
-    for k, column in enumerate(chart.columns):
-        width = chart.width * column.width / total
-        own = Pen(prefix=f"{prefix}{chr(97 + k)}", page=False, keys=keys)
-        body = _column(column, width, chart.height, own)
+    for column, width, pen in _columns(chart, prefix, page=False):
+        body = _column(column, width, chart.height, pen)
         parts.append(f'<g transform="translate({left:.1f} {head:g})">{body}</g>')
         left += width
     if chart.title:
-        pen = Pen(prefix="", page=False, keys=keys)
+        pen = Pen(prefix="", page=False, keys={})
         parts.append(pen.words(chart.title, 4.0, 13.0, size=TITLE, bold=True))
     for r, row in enumerate(rows):
         y = head + chart.height + 14.0 + KEY_ROW * r
@@ -74,8 +67,14 @@ def paper_svg(chart: Chart, prefix: str) -> str:
     )
 
 
+def _columns(chart: Chart, prefix: str, page: bool) -> Iterator[tuple[Column, float, Pen]]:
+    """Each column with its width and the pen that draws it."""
+    total, keys = sum(column.width for column in chart.columns), _keys(chart)
+    for k, column in enumerate(chart.columns):
+        yield column, chart.width * column.width / total, Pen(f"{prefix}{chr(97 + k)}", page, keys)
+
+
 def _column(column: Column, width: float, height: float, pen: Pen) -> str:
-    """Write the panels of a column on common edges."""
     above = [22.0 if panel.title else 8.0 for panel in column.panels]
     below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
     head = 16.0 if column.title else 0.0
@@ -129,7 +128,6 @@ def _shown(chart: Chart) -> list[tuple[str, Item]]:
 
 
 def _legend(chart: Chart, prefix: str) -> str:
-    """Write the legend as a list; the script makes switches of its items."""
     items = _shown(chart)
     if not items:
         return ""
@@ -144,7 +142,6 @@ def _legend(chart: Chart, prefix: str) -> str:
 
 
 def _key_rows(chart: Chart) -> list[list[tuple[str, Item, float]]]:
-    """Break the legend into lines of the chart's width."""
     rows: list[list[tuple[str, Item, float]]] = []
     x = math.inf
     for label, item in _shown(chart):

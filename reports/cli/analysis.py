@@ -75,7 +75,7 @@ def command(one: Analysis) -> Callable[..., None]:
 
 
 def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
-    asked = [(name, *each, getattr(one.request, name, None)) for name, each in _options(one).items()]
+    asked = [(name, *each, getattr(one.request, name, None)) for name, each in options(one.request).items()]
     needed = any(option.argument and default is None for _, _, option, default in asked)  # so is a design
     paged = one.page and not one.alone
     made: dict[str, tuple[Any, Any]] = {}
@@ -120,7 +120,6 @@ def answer(
     quiet: bool = False,
     **chosen: Any,
 ) -> None:
-    """Ask, then print the section or the result, and leave with the verdict."""
     from actuator_lti.design import warnings_of
     from analyses.isolation import isolated
     from reports import document as doc
@@ -132,7 +131,7 @@ def answer(
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values: dict[str, Any] = {}
-    for name, (_, option) in _options(one).items():
+    for name, (_, option) in options(one.request).items():
         of, value = f"--{option.flag or flag(name)}", chosen[name]
         values[name] = value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
     if one.written and (as_json or out is not None):
@@ -147,7 +146,7 @@ def answer(
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
         result = one.run(subject, *asked, **more)
-    if (text := one.shows("text", _nothing)(result)) is not None:
+    if (text := one.shows("text", lambda _: None)(result)) is not None:
         print_line(text)
         return
     parts = [*notices(missing, one.name), *one.sections(result)]
@@ -182,17 +181,12 @@ def _print(
 ) -> None:
     from reports.terminal import print_blocks, print_section, print_verdict
 
-    brief = one.shows("brief", _nothing)(result)
-    if brief is not None:
-        print_verdict(passed or False, f"{name}: {brief.words}")
-        print_blocks(brief.blocks, brief.notes)
+    if (made := one.shows("brief", lambda _: None)(result)) is not None:
+        print_verdict(passed or False, f"{name}: {made.words}")
+        print_blocks(made.blocks, made.notes)
         return
     for k, part in enumerate(parts):
         print_section(part, None if k else passed, name="" if k else name)
-
-
-def _options(one: Analysis) -> dict[str, tuple[Any, Option]]:
-    return {} if one.request is None else options(one.request)
 
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
@@ -203,7 +197,3 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
     made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)
-
-
-def _nothing(*_result: Any) -> None:
-    """What a section's module says that says nothing special."""

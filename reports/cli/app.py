@@ -15,15 +15,13 @@ from reports.analyses import ANALYSES, COMMANDS_IN, DESIGNS, EXPORTS, LINEAR, NO
 from reports.cli.analysis import command as declared
 
 _WHOLE_BITS = 63
-_APART = {DESIGNS: ("objects",), LINEAR: ("report", "pdf")}  # commands that are no declared analysis
-
-
-def _commands(panel: str) -> tuple[str, ...]:
-    declared = [one.name.split()[0] for one in ANALYSES if one.group == panel]
-    return tuple(dict.fromkeys([*declared, *_APART.get(panel, ())]))
-
-
-PANELS = {one: _commands(one) for one in (DESIGNS, LINEAR, NONLINEAR, RECORDS, EXPORTS, STUDIES)}
+# commands that are no declared analysis
+_APART: dict[str, tuple[str, ...]] = {DESIGNS: ("objects",), LINEAR: ("report", "pdf")}
+_APART |= dict.fromkeys((NONLINEAR, RECORDS, EXPORTS, STUDIES), ())
+PANELS = {
+    panel: tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == panel)) + apart
+    for panel, apart in _APART.items()
+}
 """Commands in the order in which the help lists them, by the panel that they stand in."""
 
 

@@ -42,7 +42,6 @@ _PLAIN = {  # what typer says, and what it means
 
 
 def leave_with(passed: bool) -> None:
-    """End the command with status 1 where a requirement or verdict failed."""
     if not passed:
         raise typer.Exit(VERDICT_FAILED)
 
@@ -73,7 +72,6 @@ def run(call: Callable[[], object], options: Callable[[], Mapping[str, str]] = d
 
 
 def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -> int:
-    """Run a command; the failures that were foreseen become their lines."""
     output = sys.stdout
     try:
         status = call()

@@ -62,12 +62,10 @@ def export(
     if per is not None:
         drive = replace(drive, objects=replace(drive.objects, velocity_gain_factor=calibration(per)))
     result = export_objects(drive, complete=complete or None)
-    xml = out is not None and out.suffix.lower() in (".xdc", ".xml")
-    homeless: tuple[str, ...] = ()
-    if xml or into is not None:
+    if into is not None or (out is not None and out.suffix.lower() in (".xdc", ".xml")):
         text, homeless = settings_xml(result.objects, into)
     else:
-        text = write_settings_toml(result.objects)
+        text, homeless = write_settings_toml(result.objects), ()
     write_new(out, text, force)
     notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
     notes += [f"no place for it in {into}: {label}" for label in homeless]

@@ -38,7 +38,6 @@ class Catalogue:
 
 
 def catalogue() -> Catalogue:
-    """Load every shipped design and list it."""
     from actuator_lti.design import load_design, shipped_designs
 
     return Catalogue(tuple(_listed(load_design(name)) for name in shipped_designs()))

@@ -89,7 +89,6 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
 
 
 def _suited(text: str, design: Design) -> str:
-    """The text with the load, limits, gains and requirements of that drive."""
     ratio, spring, current = design.total_ratio, design.coupling, design.limits.continuous_current_A
     motor = design.effective_motor
     k, resistance, inductance = motor.torque_constant_Nm_A, motor.resistance_ohm, motor.inductance_H

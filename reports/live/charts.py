@@ -88,13 +88,13 @@ def _sensitivity() -> Chart:
 
 def _difference() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    panels = chart.column(1.0, 1.0)
-    for panel, label in zip(panels, ("magnitude, dB", "phase, deg"), strict=True):
+    top, bottom = chart.column(1.0, 1.0)
+    for panel, label in ((top, "magnitude, dB"), (bottom, "phase, deg")):
         _empty(panel, "measured over model", colour=style.ORANGE, width=1.6)
         panel.rule_y(0.0, colour=style.INK)
         panel.y.label = label
         panel.y.limits(-10.0, 10.0)
-    style.frequency(panels[-1], HERTZ)
+    style.frequency(bottom, HERTZ)
     return chart
 
 

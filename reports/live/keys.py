@@ -119,7 +119,6 @@ def _slider(design: Design, path: str) -> Tree:
         "high": min(high, field.high),
         "least": field.low if math.isfinite(field.low) else None,
         "most": field.high if math.isfinite(field.high) else None,
-        "open": field.low_open,
         "allowed": field.allowed(field.unit(Structure.of(design))),
         "band": None if known is None or known.tolerance is None else _band(value, known.tolerance),
     }

@@ -5,7 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 
-from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
+from actuator_lti.asked.quantities import (
+    DRIVE_QUANTITIES,
+    LOOP_QUANTITIES,
+    LOOPS,
+    QUANTITIES,
+    Quantity,
+    judged_loops,
+)
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
@@ -14,7 +21,7 @@ from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRAC
 from analyses.large_signal.tones import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.relations import relation_statements
 from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
@@ -39,14 +46,15 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
     if not design.controller.stages:
         return {"refused": OPEN}
     try:
-        row = exported(design).row
+        row = exported_row(design)
     except InputError as refused:
         return {"refused": f"{refused}."}
-    limited = (item for item in design.requirements if item.quantity in DRIVE_QUANTITIES)
-    result = followed(design, [(item.quantity, item.load_Nm or 0.0) for item in limited])
+    limited = [one for one in design.requirements if one.quantity in DRIVE_QUANTITIES]
+    result = followed(design, [(one.quantity, one.load_Nm or 0.0) for one in limited])
     relations = relation_statements(design, {key["path"]: key["value"] for key in result.free})
     text, places = patches(design, result.free, source)
     requirements, apart = _judged(design, result.figures, held)
+    outer = page.EVERY_POSITION if design.controller.position else page.EVERY_VELOCITY
     return {
         "name": design.name,
         "axis": design.axis,
@@ -54,10 +62,7 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "fixed": result.fixed,
         "lines": result.lines,
         "row": [value if math.isfinite(value) else str(value) for value in map(float, row)],
-        "places": {
-            **page.PLACES,
-            "outer": page.EVERY_POSITION if design.controller.position else page.EVERY_VELOCITY,
-        },
+        "places": {**page.PLACES, "outer": outer},
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
@@ -66,7 +71,7 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "electrical": design.motor.has_electrical_dynamics,
         "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
         "quantities": list(LOOP_QUANTITIES),
-        "figures": _columns(),
+        "figures": [_column(each) for each in LOOP_QUANTITIES.values() if each.followed],
         "requirements": requirements,
         "apart": apart,
         "step": _step(design),
@@ -78,19 +83,16 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
     }
 
 
-def _columns() -> list[Tree]:
-    """Give the columns of the table of loops; ``factor`` is from the figure's own unit to that shown."""
-    made = []
-    for each in (one for one in LOOP_QUANTITIES.values() if one.followed):
-        about = {name: getattr(each, name) for name in ("name", "label", "timed")}
-        made.append({"unit": each.shown[0], "factor": each.shown[1], **about, "response": each.of_response})
-    return made
+def _column(of: Quantity) -> Tree:
+    """A column of the table of loops; ``factor`` is from the figure's own unit to that shown."""
+    unit, factor = of.shown
+    about = {name: getattr(of, name) for name in ("name", "label", "timed")}
+    return {"unit": unit, "factor": factor, **about, "response": of.of_response}
 
 
 def _point(design: Design, held: Collection[str]) -> str:
     """Say at which operating point the loops of the page are linear, where there is a choice."""
-    words = [CONTACT] if design.coupling is not None else []
-    words += [MAP] if design.friction.points else []
+    words = [CONTACT] * (design.coupling is not None) + [MAP] * bool(design.friction.points)
     words += [f"The load drives the {name} loop away by itself; the report judges it held." for name in held]
     return " ".join(words)
 
@@ -119,8 +121,7 @@ def _judged(
     for item in design.requirements:
         words, load = QUANTITIES[item.quantity].words, item.load_Nm or 0.0
         if item.quantity not in LOOP_QUANTITIES:
-            lines = figures.get((item.quantity, load))
-            if lines is None:
+            if (lines := figures.get((item.quantity, load))) is None:
                 apart.append({"id": item.id, "words": words})
             else:
                 followed.append({**_limit(item), "load": load, "lines": lines})
@@ -128,22 +129,20 @@ def _judged(
             which = "rotor locked" if item.rotor == "locked" else f"to the {item.to or 'command'}"
             apart.append({"id": item.id, "words": f"{words}, {which}"})
         else:
-            for loop in judged_loops(item.loop, stages):
-                if loop in held:
-                    apart.append({"id": item.id, "words": f"{words}, {loop} loop held"})
-                elif loop in stages:
-                    followed.append({**_limit(item), "loop": loop})
+            of = judged_loops(item.loop, stages)
+            apart += [{"id": item.id, "words": f"{words}, {loop} loop held"} for loop in of if loop in held]
+            followed += [{**_limit(item), "loop": loop} for loop in of if loop in stages and loop not in held]
     return followed, apart
 
 
 def _step(design: Design) -> Tree:
     """Give the command of the step (a tenth of the largest), and what it is a step of."""
-    linear_axis, limits = design.axis == "linear", design.limits
-    if design.controller.outermost == "position":
+    linear_axis, limits, outermost = design.axis == "linear", design.limits, design.controller.outermost
+    if outermost == "position":
         unit, factor = ("mm", 1e-3) if linear_axis else ("deg", math.pi / 180.0)
         size = 0.1 * design.validation.full_deflection_rad
         return {"size": size, "unit": unit, "factor": factor, "of": "output"}
-    if design.controller.outermost == "velocity":
+    if outermost == "velocity":
         largest = limits.speed_rad_s if math.isfinite(limits.speed_rad_s) else 100.0
         unit, size = "m/s" if linear_axis else "rad/s", 0.1 * largest / design.total_ratio
         return {"size": size, "unit": unit, "factor": 1.0, "of": "speed"}

@@ -7,7 +7,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from actuator_lti.bounds import JOB_MEMORY
+from actuator_lti.bounds import JOB_MEMORY, STUDY_SECONDS
 from actuator_lti.errors import InputError
 from analyses.request import OnMachines, Option, flag
 
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from analyses.studies.engine import Engine
 
 _ALLOWED = {
-    "workers": (1, 256), "time_limit_s": (1, inf), "memory_limit": (300, inf), "wait_s": (0, inf),
-    "keep": (1, inf),
+    "workers": (1, 256), "time_limit_s": (1, STUDY_SECONDS.most), "memory_limit": (300, inf),
+    "wait_s": (0, inf), "keep": (1, inf),
 }  # fmt: skip
 
 

@@ -82,7 +82,6 @@ class Apart:
         self._closed = False
 
     def build(self, task: Task) -> Answer:
-        """Build a task within its time."""
         late, start, limit_s = Event(), time.monotonic(), self._limits.time_limit_s * task.limits
 
         def too_late() -> None:

@@ -76,8 +76,7 @@ def believed(sections: Sequence[doc.Section]) -> str:
     tested = [block for part in sections if part["id"] == "validation" for block in doc.walk(part)]
     rows = [row for block in tested if block["kind"] == "table" for row in block["rows"]]
     relative = [row.get("error") for row in rows if row.get("predicted") is None and not row.get("unit")]
-    errors = [error for error in relative if isinstance(error, float)]
-    count = tally(checks)
+    errors, count = [error for error in relative if isinstance(error, float)], tally(checks)
     words = [f"Linear equals simulated to {power_above(max(errors))}"] if errors and max(errors) > 0.0 else []
     words += [f"{count.met} of {count.total} checks by simulation met"]
     words += [f"{count.not_met} not met"] if count.not_met else []
@@ -192,15 +191,16 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
         return []
     view = point.view if point else None
     name = view.loop if view and view.loop else list(figures)[-1]
-    result = figures[name]
-    there = view.found if view else None  # drawn where it crosses: in a gap nothing comes back at all
+    result, there = figures[name], view.found if view else None
+    # drawn where it crosses: in a gap nothing comes back at all
     seen = there if there and (there.margins.gain_margins or there.margins.phase_margins) else result
     own = seen is result
     title = LOOPS[name] if own or view is None else weakest_label(view)
     bode = loop_charts.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
-    if result.step is None:
-        return [bode]
-    return [bode, loop_section.step(LOOPS[name], result, None, name=name, small=True)]
+    step = (
+        [] if result.step is None else [loop_section.step(LOOPS[name], result, None, name=name, small=True)]
+    )
+    return [bode, *step]
 
 
 def unchecked() -> doc.Finding:

@@ -48,12 +48,10 @@ def residual_figure(fit: SurfaceFit) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=310.0)
     named = {o.run for o in fit.outliers}
     y, std = 1e6 * fit.own_residuals_Nm, 1e6 * fit.residual_stds_Nm
-    for x, label in (
-        ([p.speed_rad_s for p in fit.points], "motor speed, rad/s"),
-        ([p.load_Nm for p in fit.points], "load torque, N m"),
-    ):
+    for quantity, label in (("speed_rad_s", "motor speed, rad/s"), ("load_Nm", "load torque, N m")):
         panel = chart.panel(label, "residual, µN m")
         panel.rule_y(0.0)
+        x = [getattr(point, quantity) for point in fit.points]
         for at, middle, width in zip(x, y, std, strict=True):
             ends = [middle - 2.0 * width, middle + 2.0 * width]
             panel.curve([at, at], ends, colour=style.MUTED, width=0.9, read=False)
@@ -102,10 +100,8 @@ def _ellipse(
 def window_figures(result: CampaignResult) -> list[doc.Block]:
     """The first, the middle and the last run with their steady part marked; the others on demand."""
     runs = {run.id: run for run in result.imported.runs}
-    points = result.fit.points
-    chosen = dict.fromkeys((len(points) - 1, 0, len(points) // 2))
-    figures = []
-    for k in chosen:
+    points, figures = result.fit.points, []
+    for k in dict.fromkeys((len(points) - 1, 0, len(points) // 2)):
         run, window = points[k].run, points[k].window
         chart = _window(runs[run].record, window.start_s, window.stop_s)
         caption = f"Run {run}, the steady part marked: slope at most {window.limit_rad_s2:.3g} rad/s²"

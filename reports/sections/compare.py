@@ -17,6 +17,7 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.as_json import as_json
+from reports.html import show_signed
 from reports.numbers import capital, row_time_unit, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number
@@ -49,9 +50,16 @@ def brief(comparison: Comparison) -> Brief:
     shown = compare_best.choice(comparison)
     kept = ("design", "met", "missed", "unproven")
     block = doc.with_columns(compare_best.designs(shown, note=""), kept)
+    names = [
+        name
+        for name in shown.names
+        if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
+        if any(name.key in one.differences for one in shown.variants)
+    ]
+    loops = _of_figures("Loops", names, _OF_GROUP, shown, batches(shown)[:1], _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
-    return Brief(result(comparison), [block, *_moved_loops(shown)], notes)
+    return Brief(result(comparison), [block, *loops], notes)
 
 
 def data(comparison: Comparison) -> Tree:
@@ -96,10 +104,10 @@ def verdicts(comparison: Comparison) -> doc.Section:
     for one in comparison.all:
         named: list[doc.VerdictItem] = [{**item(v), "id": f"{one.variant.slug}/{v.id}"} for v in one.verdicts]
         blocks += [doc.details(f"Verdicts of {one.variant.name}", [doc.verdicts(named)])] if named else []
-    refused, more = comparison.refused, len(comparison.refused) - compare_best.MANY
-    blocks += [doc.text(f"{one.name}: no design. {one.error}") for one in refused[: compare_best.MANY]]
-    blocks += [doc.text(f"{more} more have no design.")] if more > 0 else []
-    status: doc.Status = "fail" if comparison.refused else comparison.tally.role
+    refused, most = comparison.refused, compare_best.MANY
+    blocks += [doc.text(f"{one.name}: no design. {one.error}") for one in refused[:most]]
+    blocks += [doc.text(f"{len(refused) - most} more have no design.")] if len(refused) > most else []
+    status: doc.Status = "fail" if refused else comparison.tally.role
     words = result(comparison)
     return doc.section("verdicts", "Requirements side by side", blocks, result=words, status=status)
 
@@ -138,29 +146,28 @@ def _with_change(value: float, change: float) -> str:
     return (number(value) or "") + (f" ({_signed(change)})" if abs(change) > SEEN * abs(value) else "")
 
 
+def _signed(value: float) -> str:
+    return show_signed(value) if math.isfinite(value) else "unlimited"
+
+
 def figures(comparison: Comparison) -> doc.Section:
-    heads = [doc.of(lambda name: capital(name.label), "figure", "Figure"), _unit_of(comparison)]
+    head, parts = doc.of(lambda name: capital(name.label), "figure", "Figure"), batches(comparison)
     blocks: list[doc.Block] = []
     for group, title in GROUPS.items():
         if names := [name for name in comparison.names if name.group == group]:
-            blocks += _side_by_side(title, names, heads, batches(comparison), partial(_cell, comparison))
+            blocks += _of_figures(title, names, head, comparison, parts)
     variants = comparison.everything.variants
     moved = sum(bool(one.differences) for one in variants)
     result = f"{moved} of {len(variants)} variants change a figure of the base."
     return doc.section("figures", "Figures side by side", blocks, result=result, intro=_MARKS)
 
 
-def _moved_loops(comparison: Comparison) -> list[doc.Block]:
-    """The loops' main figures that a design beside the base has moved, of the designs that a screen holds."""
-    names = [
-        name
-        for name in comparison.names
-        if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
-        if any(name.key in one.differences for one in comparison.variants)
-    ]
-    heads, first = [_OF_GROUP, _unit_of(comparison)], batches(comparison)[:1]
-    made = _side_by_side("Loops", names, heads, first, partial(_cell, comparison), _MARKS)
-    return made if names else []
+def _of_figures(
+    title: str, names: Sequence[FigureName], head: doc.Shown, of: Comparison,
+    parts: Sequence[Sequence[Compared]], note: str = "",
+) -> list[doc.Block]:  # fmt: skip
+    unit = doc.of(lambda name: _scaled(of, name)[1], "unit", "Unit")
+    return _side_by_side(title, names, [head, unit], parts, partial(_cell, of), note)
 
 
 def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None:
@@ -173,10 +180,6 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
     if ends is not None and value in ends:
         words += " ▲" if value == ends[0] else " ▽"
     return words
-
-
-def _unit_of(comparison: Comparison) -> doc.Shown:
-    return doc.of(lambda name: _scaled(comparison, name)[1], "unit", "Unit")
 
 
 def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:
@@ -199,8 +202,9 @@ def differences(comparison: Comparison) -> doc.Section:
         "explain is their interaction. Large-signal figures are not taken apart."
     )
     variants = comparison.everything.variants
-    changed = sum(bool(one.changed) for one in variants)
-    result = f"{changed} of {len(variants)} variants change a key of the base."
+    result = (
+        f"{sum(bool(one.changed) for one in variants)} of {len(variants)} variants change a key of the base."
+    )
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 
@@ -225,12 +229,6 @@ def _moved_table(one: Compared, comparison: Comparison) -> doc.Block:
     ]
     names = [name for name in comparison.names if name.key in one.differences]
     return doc.listing(f"{one.variant.name} against the base", names, columns)
-
-
-def _signed(value: float) -> str:
-    if not math.isfinite(value):
-        return "unlimited"
-    return ("+" if value > 0 else "") + significant(value, 3)
 
 
 ROUNDING = 1e-9  # of a value

@@ -7,8 +7,9 @@ and figure, those with the most and the least room.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import cast
 
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Verdict
@@ -25,37 +26,28 @@ _NOTE = "Gains and losses are changes of the distance to the limit, in percent o
 
 
 def section(comparison: Comparison) -> doc.Section:
-    """Make the section: the best design of each requirement, and each variant's gains and losses."""
-    wanted = comparison.base.verdicts
-    if not wanted:
-        return doc.section("best", "Which variant for what", [], result="The base states no requirement.")
+    id, title = "best", "Which variant for what"
+    if not comparison.base.verdicts:
+        return doc.section(id, title, [], result="The base states no requirement.")
     everything = comparison.everything
-    blocks = [designs(comparison), _best(everything)]
     met = [one for one in everything.all if failed(one) == 0]
+    words = f"None of the {len(everything.all)} designs meets every requirement."
+    if met:
+        best = max(met, key=lambda one: weakest(one)[0])
+        near, verdict = weakest(best)
+        room = "" if verdict is None else f": {100.0 * near:.0f} % to its nearest limit ({label(verdict)})"
+        words = f"{len(met)} of {len(everything.all)} designs meet every requirement; "
+        words += f"{best.variant.name} has the most room{room}."
+    intro = (
+        "Distance is what is left to the limit, as part of the limit; of a margin, as part of the "
+        "distance from -1 that the limit keeps."
+    )
     missed = len(met) < len(everything.all) or bool(everything.refused)
-    return doc.section(
-        "best", "Which variant for what", blocks, result=_result(everything, met),
-        intro=(
-            "Distance is what is left to the limit, as part of the limit; of a margin, as part of the "
-            "distance from -1 that the limit keeps."
-        ),
-        status="fail" if missed else "pass",
-    )  # fmt: skip
-
-
-def _result(comparison: Comparison, met: Sequence[Compared]) -> str:
-    count = len(comparison.all)
-    if not met:
-        return f"None of the {count} designs meets every requirement."
-    best = max(met, key=lambda one: weakest(one)[0])
-    near, verdict = weakest(best)
-    room = "" if verdict is None else f": {100.0 * near:.0f} % to its nearest limit ({label(verdict)})"
-    most = f"{best.variant.name} has the most room{room}"
-    return f"{len(met)} of {count} designs meet every requirement; {most}."
+    blocks, status = [designs(comparison), _best(everything)], "fail" if missed else "pass"
+    return doc.section(id, title, blocks, result=words, intro=intro, status=cast(doc.Status, status))
 
 
 def failed(one: Compared) -> int:
-    """Number of requirements that a design does not meet, or that are not proven of it."""
     return sum(not v.passes for v in one.verdicts)
 
 
@@ -102,14 +94,9 @@ def _those(one: Compared, word: Verdict) -> str:
 def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
     """Say what a variant gains (+1) or loses (-1) of each distance, the most first."""
     base = {v.id: nearness(v) for v in comparison.base.verdicts}
-    moved = [
-        (label(v), near - before)
-        for v in one.verdicts
-        if (near := nearness(v)) is not None
-        and (before := base.get(v.id)) is not None
-        and sign * (near - before) > SEEN
-    ]
-    moved.sort(key=lambda pair: -abs(pair[1]))
+    known = [(label(v), nearness(v), base.get(v.id)) for v in one.verdicts]
+    moved = [(name, now - before) for name, now, before in known if now is not None and before is not None]
+    moved = sorted((pair for pair in moved if sign * pair[1] > SEEN), key=lambda pair: -abs(pair[1]))
     words = [f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST]]
     words += [f"{len(moved) - _MOST} more"] if len(moved) > _MOST else []
     return "; ".join(words) or "nothing"
@@ -130,18 +117,16 @@ def _best(comparison: Comparison) -> doc.Block:
     rows = []
     for wanted in comparison.base.verdicts:
         found = [(nearness(v), one.variant.name, v) for one, v in _judged(comparison, wanted)]
-        ranked = [(near, name, v) for near, name, v in found if near is not None]
+        ranked = [(near, name, number(v.value)) for near, name, v in found if near is not None]
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
             seen = SEEN * max(abs(high[0]), 1e-9)
+            first, *alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
             same = high[0] - low[0] <= seen
-            alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
-            row |= {
-                "best": "all alike" if same else alike[0] + f"; {len(alike) - 1} alike" * (len(alike) > 1),
-                "value": number(high[2].value),
-                "worst": "" if same else f"{low[1]}: {number(low[2].value)}",
-            }
+            best = first + f"; {len(alike)} alike" * bool(alike)
+            row |= {"best": "all alike" if same else best, "value": high[2]}
+            row["worst"] = "" if same else f"{low[1]}: {low[2]}"
         rows.append(row)
     return doc.table("Best design of each requirement", columns, rows)
 
@@ -224,15 +209,13 @@ def table_text(comparison: Comparison) -> str:
     header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]
-    return csv_text(header, (_row(one, comparison) for one in comparison.all))
-
-
-def _row(one: Compared, comparison: Comparison) -> list[object]:
-    near, verdict = weakest(one)
-    values, count = {v.id: v.value for v in one.verdicts}, tally(one.verdicts)
-    least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
-    return [
-        *(one.variant.name, count.met, count.not_met, count.not_proven, *least),
-        *(one.figures.get(name.key) for name in comparison.names),
-        *(values.get(wanted.id) for wanted in comparison.base.verdicts),
-    ]
+    rows: list[list[object]] = []
+    for one in comparison.all:
+        (near, verdict), count = weakest(one), tally(one.verdicts)
+        values = {v.id: v.value for v in one.verdicts}
+        least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
+        figures = [one.figures.get(name.key) for name in comparison.names]
+        asked = [values.get(wanted.id) for wanted in comparison.base.verdicts]
+        counts = (count.met, count.not_met, count.not_proven)
+        rows.append([one.variant.name, *counts, *least, *figures, *asked])
+    return csv_text(header, rows)

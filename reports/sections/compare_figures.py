@@ -26,7 +26,6 @@ def sections(comparison: Comparison) -> list[doc.Section]:
 
 
 def overlays(comparison: Comparison) -> doc.Section:
-    """Open-loop Bode, closed-loop Bode and step of every loop, one design over the other."""
     drawn = comparison.all[:MOST_CURVES]
     blocks: list[doc.Block] = []
     for name, title in LOOPS.items():
@@ -40,13 +39,11 @@ def overlays(comparison: Comparison) -> doc.Section:
 
 
 def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> list[doc.Block]:
-    which = "closed loop" if closed else "open loop"
-    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
-    top, bottom = chart.column(1.0, 1.0)
     known = [(one, one.loops[name]) for one in drawn if name in one.loops]
     known = [(one, result) for one, result in known if result.stable or not closed]
     if not known:
         return []
+    which = "closed loop" if closed else "open loop"
     lowest = min(frequency_grid(result, 140)[0] for _, result in known)
     curves = []
     for one, result in known:
@@ -56,10 +53,10 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         band = result.bandwidth if closed else None
         values = response.values / abs((band and band.dc_gain) or 1.0)  # in any unit it starts at 0 dB
         curves.append((one.variant.name[:60], replace(response, values=values)))
+    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
-    both(curves, None, top, bottom, span=whole, phase_span=whole, look=_look)
-    caption = f"{title}, {which}: the base and its variants."
-    return [doc.figure("overlay", chart, caption)]
+    both(curves, None, *chart.column(1.0, 1.0), span=whole, phase_span=whole, look=_look)
+    return [doc.figure("overlay", chart, f"{title}, {which}: the base and its variants.")]
 
 
 def _look(k: int) -> style.Style:
@@ -68,20 +65,19 @@ def _look(k: int) -> style.Style:
 
 
 def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]:
-    steps = [(one, one.loops[name].step) for one in drawn if name in one.loops]
-    shown = [(one.variant.name[:60], step) for one, step in steps if step is not None]
+    steps = [(one.variant.name[:60], one.loops[name].step) for one in drawn if name in one.loops]
+    shown = [(label, step) for label, step in steps if step is not None]
     if not shown:
         return []
     chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
     panel = chart.panel(y="response to a unit step")
     scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
     for k, (label, step) in enumerate(shown):
-        keep = np.unique(np.linspace(0, len(step.time_s) - 1, min(len(step.time_s), 240)).astype(int))
-        response = np.asarray(step.response)[keep] / step.final_value
-        panel.curve(np.asarray(step.time_s)[keep] * scale, response, label, **_look(k))
+        time, response = np.asarray(step.time_s), np.asarray(step.response)
+        keep = np.unique(np.linspace(0, len(time) - 1, min(len(time), 240)).astype(int))
+        panel.curve(time[keep] * scale, response[keep] / step.final_value, label, **_look(k))
     panel.x.limits(0.0)
-    caption = f"{title}, unit step: the base and its variants."
-    return [doc.figure("overlay", chart, caption)]
+    return [doc.figure("overlay", chart, f"{title}, unit step: the base and its variants.")]
 
 
 def tornadoes(comparison: Comparison) -> doc.Section:

@@ -21,11 +21,8 @@ def section(result: Corners) -> doc.Section:
     named = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
     caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
     alt = f"{caption} The figures stand in the table of every loop at every corner."
-    blocks = [
-        _summary_table(result),
-        doc.figure("corners", chart(result), caption=caption, alt=alt),
-        doc.details("Every loop at every corner", [_loop_table(result), *named]),
-    ]
+    details = doc.details("Every loop at every corner", [_loop_table(result), *named])
+    blocks = [_summary_table(result), doc.figure("corners", chart(result), caption, alt=alt), details]
     told: doc.Severity = "info" if result.passed else "warn"
     words = summary(result)
     return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=told, told=told)
@@ -35,14 +32,14 @@ def summary(result: Corners) -> str:
     failed = [corner.name for corner in result.corners if not corner.passed]
     open_ones = [one.id for one in result.left_out if not one.passes]
     more = f" Not judged at corners: {', '.join(open_ones)}." if open_ones else ""
+    count = len(result.corners)
     if not failed:
         every = "every other requirement" if more else "every requirement"
-        return f"Every loop is stable and {every} met at all {len(result.corners)} corners.{more}"
-    everywhere = len(failed) == len(result.corners)
-    where = f"all {len(failed)}" if everywhere else f"{len(failed)} of {len(result.corners)}"
-    names = "" if everywhere else f" ({'; '.join(failed)})"
+        return f"Every loop is stable and {every} met at all {count} corners.{more}"
+    where = f"{len(failed)} of {count} corners ({'; '.join(failed)})"
+    where = f"all {count} corners" if len(failed) == count else where
     what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))
-    return f"The drive fails at {where} corners{names}: {', '.join(what)}.{more}"
+    return f"The drive fails at {where}: {', '.join(what)}.{more}"
 
 
 def _failings(corner: Corner) -> list[str]:
@@ -60,7 +57,6 @@ def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:
 
 
 def chart(result: Corners) -> style.Chart:
-    """Draw for each figure and corner a line from nominal to the corner, one a loop; and the limit."""
     made = style.Chart(width=style.WIDE, height=96.0 + 38.0 * len(result.corners), legend=True)
     nominal = result.corners[0]
     for quantity in (QUANTITIES[name] for name in CORNERED):

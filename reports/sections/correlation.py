@@ -29,19 +29,16 @@ def _named(signal: str) -> str:
     return NAMES.get(signal, signal)
 
 
-def record_section(
-    result: CorrelationResult, number: int = 1, *, error_limit: float | None = None
-) -> doc.Section:
-    """Make the section of one record; ``error_limit`` is the largest relative error allowed."""
+def _of_record(result: CorrelationResult, number: int, error_limit: float | None) -> doc.Section:
     active = [(name, 100.0 * share) for name, share in result.limits.items() if share > 0.0]
     limits = ", ".join(f"{name} {share:.1f} % of the time" for name, share in active) or "none"
     intro = f"Model {result.design} with the command of {result.record}; {result.counts}."
     blocks = [
         comparison_table(result),
-        *[signal_figure(signal) for signal in result.signals.values()],
+        *map(signal_figure, result.signals.values()),
         input_table(f"Inputs: {result.record}", result.inputs),
         finding_table(result.record, result.findings),
-        *[doc.remark(note) for note in result.notes],
+        *map(doc.remark, result.notes),
     ]
     return doc.section(
         f"correlation-{number}", f"Model against {result.record}", blocks,
@@ -67,13 +64,13 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
     far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
-    if error_limit is None and not wrong:
-        one = "The record contradicts" if len(results) == 1 else "The records contradict"
-        parts.append(f"{one} neither {'itself' if len(results) == 1 else 'themselves'} nor the design.")
-    elif error_limit is not None:
-        over = far.share_of_motion > error_limit
-        side = "Above" if over else "Within"
+    if error_limit is not None:
+        side = "Above" if far.share_of_motion > error_limit else "Within"
         parts.append(f"{side} the limit of {100.0 * error_limit:g} %: {far.name} {_share(far)}.")
+    elif not wrong and len(results) == 1:
+        parts.append("The record contradicts neither itself nor the design.")
+    elif not wrong:
+        parts.append("The records contradict neither themselves nor the design.")
     return " ".join(parts)
 
 
@@ -81,8 +78,7 @@ def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
 
 
-def summary_section(results: Sequence[CorrelationResult], *, error_limit: float | None = None) -> doc.Section:
-    """Make the section of all records together: a table with a row for all, and the worst one's figure."""
+def _summary(results: Sequence[CorrelationResult], error_limit: float | None) -> doc.Section:
     rows: list[tuple[str, SignalComparison | SignalSummary]] = []
     for name, one in summarise(results).items():
         rows += [(result.record, result[name]) for result in results if name in result.signals]
@@ -149,8 +145,5 @@ def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
 
 
 def section(result: Correlation) -> list[doc.Section]:
-    limit = result.limit
-    made = [record_section(one, k, error_limit=limit) for k, one in enumerate(result.records, 1)]
-    if len(made) > 1:
-        made.insert(0, summary_section(result.records, error_limit=limit))
-    return made
+    made = [_of_record(one, k, result.limit) for k, one in enumerate(result.records, 1)]
+    return [_summary(result.records, result.limit), *made] if len(made) > 1 else made

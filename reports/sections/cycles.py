@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
 from reports import document as doc
-from reports.sections.names import fine_unit, load_unit
+from reports.sections.names import Unit, fine_unit, load_unit
 
 CAUSES = {
     "play": "play",
@@ -18,7 +16,7 @@ CAUSES = {
 
 
 def section(result: LimitCycles) -> doc.Section:
-    fine, small = fine_unit(result.design.axis)
+    fine = fine_unit(result.design.axis)
     intro = (
         "Play acts for a sinusoidal twist as a softer coupling, a sensor's count for a small swing about its "
         "edge as a relay. A cycle is predicted where the sampled loop with that gain keeps an oscillation's "
@@ -27,20 +25,20 @@ def section(result: LimitCycles) -> doc.Section:
     )
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
-    predicted = _predicted(result, fine, small) if result.confirmations else none
+    predicted = _predicted(result, fine) if result.confirmations else none
     told: doc.Severity = "info" if verdict_of(result.design, result.hunting) is Verdict.MET else "warn"
-    blocks, words = [predicted, _rests(result, fine, small)], summary(result)
+    blocks, words = [predicted, _rests(result, fine)], summary(result)
     return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, status=told, told=told)
 
 
 def summary(result: LimitCycles) -> str:
-    fine, small = fine_unit(result.design.axis)
+    fine = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
     tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; no cycle is predicted"
     if swing is None:
         left = [one for one in result.rests if one.hunting or one.swing_rad]  # too small, or not long enough
-        ends = (f"{fine * one.amplitude_rad:.3g} {small} it {words(one.rest, fine, small)}" for one in left)
+        ends = (f"{fine.of(one.amplitude_rad)} it {words(one.rest, *fine)}" for one in left)
         still = f", but after {', after '.join(ends)}" if left else ""
         return f"The drive as it is comes to rest after every step{still}{tail}."
     does = {
@@ -49,11 +47,11 @@ def summary(result: LimitCycles) -> str:
         Verdict.NOT_PROVEN: "is not known to come to rest",
     }[verdict_of(result.design, swing)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
-    return f"The drive as it is {does}: {words(swing.rest, fine, small)} under {at}{tail}."
+    return f"The drive as it is {does}: {words(swing.rest, *fine)} under {at}{tail}."
 
 
-def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
-    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
+def _predicted(result: LimitCycles, fine: Unit) -> doc.Block:
+    size = fine.column()
     columns = [
         doc.of(lambda one: CAUSES[one.cycle.cause], "cause", "Cause"),
         doc.of(lambda one: "in it" if one.cycle.with_friction else "left out", "friction", "Dry friction"),
@@ -71,18 +69,17 @@ def _predicted(result: LimitCycles, fine: float, small: str) -> doc.Block:
     return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
 
 
-def _end(one: Settling) -> str:
-    stands = one.rest.verdict == "still moving" and not one.swing_rad
-    words = "stands still, not known for how long" if stands else one.rest.verdict
-    return words + ", a limit acting" * bool(one.rest.limited)
+def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
+    def end(one: Settling) -> str:
+        stands = one.rest.verdict == "still moving" and not one.swing_rad
+        words = "stands still, not known for how long" if stands else one.rest.verdict
+        return words + ", a limit acting" * bool(one.rest.limited)
 
-
-def _rests(result: LimitCycles, fine: float, small: str) -> doc.Block:
-    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
+    size = fine.column()
     columns = [
         doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("amplitude_rad", "step", "Step", **size),
-        doc.of(_end, "end", "Ends"),
+        doc.of(end, "end", "Ends"),
         doc.of(lambda one: one.rest.amplitude or None, "size", "Output, peak", **size, better=-1),
         doc.of(lambda one: one.rest.motor_amplitude or None, "motor", "Motor, at the output", **size),
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),

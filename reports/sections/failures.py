@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
 from analyses.failures.run import Failures
 from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
-from reports.sections.names import load_unit, output_unit
+from reports.sections.names import Unit, load_unit, output_unit, push_words
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -29,30 +28,25 @@ _SHOWN = 400
 
 
 def section(result: Failures) -> doc.Section:
-    scale, unit = output_unit(result.design.axis)
-    load, asked = load_unit(result.design), result.asked
-    stop, near = f"{scale * asked.stop_rad:.4g} {unit}", f"{scale * asked.deflection_rad:.4g} {unit}"
-    detected = f"{1e3 * asked.detection_s:.4g} ms"
-    swing = noticed(result.design, result.before)
+    out, asked = output_unit(result.design.axis), result.asked
     held = "has come to rest"
-    if swing is not None:
-        held = f"does not come to rest, {told(result.design, swing, scale, unit)},"
+    if (swing := noticed(result.design, result.before)) is not None:
+        held = f"does not come to rest, {told(result.design, swing, *out)},"
     intro = (
-        f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} {load} (positive "
-        f"pushes forward). Deflection counts from where the output was; the stop is {stop} away, and "
-        f"detection takes {detected}. The torque is that in the coupling; in a rigid train the motor's "
-        "torque times the reduction."
+        f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} "
+        f"{load_unit(result.design)} (positive pushes forward). Deflection counts from where the output was; "
+        f"the stop is {out.of(asked.stop_rad, 4)} away, and detection takes {1e3 * asked.detection_s:.4g} "
+        "ms. The torque is that in the coupling; in a rigid train the motor's torque times the reduction."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
-    blocks = [_table(result, scale, unit, near), _figure(result, scale, unit, load), *map(doc.text, left)]
+    blocks = [_table(result, out), _figure(result, out), *map(doc.text, left)]
     told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
     words = summary(result)
     return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, told=told_as)
 
 
 def summary(result: Failures) -> str:
-    scale, unit = output_unit(result.design.axis)
-    detection = result.asked.detection_s
+    out, detection = output_unit(result.design.axis), result.asked.detection_s
     stopped = {case.name: case.to_stop_s for case in result.cases if case.to_stop_s is not None}
     worst = min(
         result.cases, key=lambda case: (min(stopped.get(case.name, inf), detection), -case.at_detection_rad)
@@ -61,26 +55,26 @@ def summary(result: Failures) -> str:
     if reached is not None and reached <= detection:
         words = f"reaches the stop first, {seconds(reached)} after it occurs; detection takes {when}"
     else:
-        size = short(scale * worst.at_detection_rad, 3)
-        words = f"moves the output most until it is detected: {size} {unit} in {when}"
+        size = f"{short(out.scale * worst.at_detection_rad, 3)} {out.unit}"
+        words = f"moves the output most until it is detected: {size} in {when}"
         words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
     if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
         words += "; the drive does not come to rest before it"
     return f"{NAMES[worst.name]} {words}."
 
 
-def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
-    time: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
+def _table(result: Failures, out: Unit) -> doc.Block:
+    time, near = Unit(1e3, "ms").column("ms:3"), out.of(result.asked.deflection_rad, 4)
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
-    has_current = result.design.motor.has_electrical_dynamics
-    current = "peak_current_A" if has_current else lambda _case: None
+    push, load = push_words(result.design), load_unit(result.design)
+    current = "peak_current_A" if result.design.motor.has_electrical_dynamics else lambda _case: None
     columns = [
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
         doc.of("to_deflection_s", "near", f"To {near}", **time),
         doc.of("to_stop_s", "stop", "To the stop", **time),
-        doc.of("at_detection_rad", "seen", "Until detected", unit, scale=scale, **most),
+        doc.of("at_detection_rad", "seen", "Until detected", **out.column(better=-1)),
         doc.of(current, "current", "Peak current", "A", **most),
-        doc.of("peak_moment_Nm", "moment", f"Peak {_push(result.design)}", load_unit(result.design), **most),
+        doc.of("peak_moment_Nm", "moment", f"Peak {push}", load, **most),
         doc.of("protected_s", "protected", "I²t acts at", **time),
         doc.of("words", "words", "What happens"),
     ]
@@ -88,11 +82,7 @@ def _table(result: Failures, scale: float, unit: str, near: str) -> doc.Block:
     return doc.listing("Failure cases", result.cases, columns, note)
 
 
-def _push(design: Design) -> str:
-    return "force" if design.axis == "linear" else "torque"
-
-
-def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
+def _figure(result: Failures, out: Unit) -> doc.Block:
     asked = result.asked
     stops = [case.to_stop_s for case in result.cases if case.to_stop_s is not None]
     last = min(asked.watched_s, 1.2 * max([2.0 * asked.detection_s, *stops]))
@@ -105,12 +95,13 @@ def _figure(result: Failures, scale: float, unit: str, load: str) -> doc.Block:
     for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
         keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))
         time = case.time_s[keep] * per_s
-        top.curve(time, scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
+        top.curve(time, out.scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
-    top.rule_y(scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
+    top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
-    top.y.label, bottom.y.label = f"deflection, {unit}", f"{_push(result.design)}, {load}"
+    push = push_words(result.design)
+    top.y.label, bottom.y.label = f"deflection, {out.unit}", f"{push}, {load_unit(result.design)}"
     bottom.x.limits(0.0, last * per_s)
-    both = f"Deflection of the output and {_push(result.design)}"
+    both = f"Deflection of the output and {push}"
     return doc.figure("failures", chart, f"{both} in the train after each failure but the oscillation.")

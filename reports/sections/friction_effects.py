@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
 from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.result import FrictionPoint, LimitCycles
+from analyses.friction_effects.result import FrictionPoint
+from analyses.limit_cycles.run import Confirmation
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
 from analyses.motion.settling import words as end_words
 from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import fine_unit, load_unit
+from reports.sections.names import Unit, fine_unit, load_unit
 from reports.verdict_summary import tally
 
 ROUNDING = 1e-9  # of the triangle's amplitude: a width that is none
@@ -22,75 +21,62 @@ LEFT = 1e-3  # of a step: an error that is spoken of
 
 
 def section(result: FrictionEffects) -> doc.Section:
-    title = "Dry friction at small signals"
+    id, title, design = "friction-effects", "Dry friction at small signals", result.design
     if not result.points:
-        return doc.section("friction-effects", title, [], result=f"Not applicable: {result.reason}.")
-    fine, small = fine_unit(result.design.axis)
-    load = load_unit(result.design)
-    items = [_cycle_verdict(result.design, point, fine, small, load) for point in result.points]
-    blocks = [
-        doc.verdicts(items, what="checks"),
-        _threshold_table(result, fine, small, load),
-        *_figure(result, fine, small, load),
-        _settling_table(result, fine, small, load),
-    ]
+        return doc.section(id, title, [], result=f"Not applicable: {result.reason}.")
+    fine, load = fine_unit(design.axis), load_unit(design)
+    items = [_cycle_verdict(design, point, fine, load) for point in result.points]
+    tables = [_threshold_table(result, fine, load), *_figure(result, fine, load)]
+    blocks = [doc.verdicts(items, what="checks"), *tables, _settling_table(result, fine, load)]
     intro = (
         "Dry friction has no small-signal gain: below a threshold nothing moves, and reversals lose motion. "
         "Friction alone: counts and noise of the sensors are left out."
     )
-    status, words = tally(items).role, _summary(result, fine, small)
-    severity: doc.Severity = "info" if status == "pass" else status
-    return doc.section(
-        "friction-effects", title, blocks, result=words, intro=intro, status=status, told=severity
-    )
+    status, words = tally(items).role, _summary(result, fine)
+    told: doc.Severity = "info" if status == "pass" else status
+    return doc.section(id, title, blocks, result=words, intro=intro, status=status, told=told)
 
 
-def _cycle_verdict(
-    design: Design, point: FrictionPoint, fine: float, small: str, load: str
-) -> doc.VerdictItem:
+def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) -> doc.VerdictItem:
     cycles, swing = point.cycles, noticed(design, point.cycles.settlings)
     slip = "none"
     if (one := cycles.stick_slip) is not None:
-        size, kind = fine * one.output_amplitude_rad, "" if one.stable else ", unstable"
-        slip = f"±{size:.3g} {small} at {one.frequency_hz:.3g} Hz{kind}"
-    predicted = f"{_predicted_words(cycles, fine, small)}; stick-slip analysis: {slip}"
+        size, kind = fine.of(one.output_amplitude_rad), "" if one.stable else ", unstable"
+        slip = f"±{size} at {one.frequency_hz:.3g} Hz{kind}"
     sizes = len(cycles.settlings)
     result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
-    result = result if swing is None else told(design, swing, fine, small)
+    result = result if swing is None else told(design, swing, *fine)
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
+    predicted = "; ".join(_predicted(item, fine) for item in cycles.confirmations) or "none"
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle of friction after steps at {point.load_Nm:g} {load}",
-        value=0.0 if swing is None else fine * swing.swing_rad,
-        limit=fine * accepted_rad(design),
-        unit=small,
+        value=0.0 if swing is None else fine.scale * swing.swing_rad,
+        limit=fine.scale * accepted_rad(design),
+        unit=fine.unit,
         passed={"met": True, "not met": False}.get(verdict_of(design, swing)),
         comparison="<=",
-        reason=f"{predicted}; simulated: {result}; {agree}",
+        reason=f"describing function of the whole loop: {predicted}; stick-slip analysis: {slip}; "
+        f"simulated: {result}; {agree}",
     )
 
 
-def _predicted_words(cycles: LimitCycles, fine: float, small: str) -> str:
-    parts = []
-    for item in cycles.confirmations:
-        one = item.cycle
-        kind = "stable" if one.stable else "unstable, the limit of what friction damps"
-        seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
-        hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
-        size = fine * one.output_rad
-        parts.append(f"±{size:.3g} {small} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})")
-    return "describing function of the whole loop: " + ("; ".join(parts) or "none")
+def _predicted(item: Confirmation, fine: Unit) -> str:
+    one = item.cycle
+    kind = "stable" if one.stable else "unstable, the limit of what friction damps"
+    seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
+    hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
+    return f"±{fine.of(one.output_rad)} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})"
 
 
-def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
-    torque, torque_scale = ("mN m", 1e3) if load == "N m" else ("N", 1.0)
-    size: dict[str, Any] = {"unit": small, "scale": fine, "format": "sig:3"}
-    wait: dict[str, Any] = {"unit": "ms", "scale": 1e3, "format": "ms:3"}
+def _threshold_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Block:
+    torque = Unit(1e3, "mN m") if load == "N m" else Unit(1.0, "N")
+    size, wait = fine.column(), Unit(1e3, "ms").column("ms:3")
     columns = [
         doc.of("load_Nm", "load", "Load", load, format="short:4"),
-        doc.of("dry_torque_Nm", "dry", "Dry friction, motor", torque, scale=torque_scale, format="sig:3"),
+        doc.of("dry_torque_Nm", "dry", "Dry friction, motor", **torque.column()),
         doc.of("threshold.static.forward_rad", "threshold", "Step that starts the motor at once", **size),
         doc.of("threshold.simulated_rad", "simulated", "simulated", **size),
         doc.of(lambda point: _wait(point, "predicted_s"), "wait", "Wait at half of it", **wait),
@@ -99,12 +85,13 @@ def _threshold_table(result: FrictionEffects, fine: float, small: str, load: str
         doc.of(lambda point: _lost(point, "predicted_rad"), "predicted", "predicted", **size),
         doc.of("hysteresis.largest_rad", "largest", f"Largest effect of {_cause(result)}", **size),
     ]
-    note = (
-        f"{_integrates(result)}: a step below the threshold {_below(result)}, and motion lost in front of "
-        f"its sensor is recovered{_behind(result)}. The effect is largest just after a reversal."
+    note = f"{_integrates(result)}: a step below the threshold {_below(result)}"
+    note += (
+        f", and motion lost in front of its sensor is recovered{_behind(result)}. The effect is largest just "
+        "after a reversal."
         if result.integrator
-        else f"{_integrates(result)}: a step below the threshold {_below(result)}. Each reversal loses the "
-        f"torque that sliding takes, both ways, over the stiffness{_behind(result)}."
+        else f". Each reversal loses the torque that sliding takes, both ways, over the stiffness"
+        f"{_behind(result)}."
     )
     if not any(point.threshold for point in result.points):
         note = "The smoothed law of friction creeps: it has no threshold, and holds no motion at a reversal."
@@ -160,18 +147,16 @@ def _lost(point: FrictionPoint, name: str) -> float | None:
     return width if abs(width) > ROUNDING * loop.amplitude_rad else 0.0
 
 
-def _settling_table(result: FrictionEffects, fine: float, small: str, load: str) -> doc.Block:
-    size: dict[str, Any] = {"unit": small, "scale": fine}
-
+def _settling_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Block:
     def error(one: Settling) -> float:
         return one.rest.error if abs(one.rest.error) > 1e-6 * one.amplitude_rad else 0.0
 
     columns = [
         doc.of(lambda pair: pair[0], "load", "Load", load, format="short:4"),
-        doc.of(lambda pair: pair[1].amplitude_rad, "step", "Step", **size, format="sig:3"),
+        doc.of(lambda pair: pair[1].amplitude_rad, "step", "Step", **fine.column()),
         doc.of(lambda pair: pair[1].rest.after_s, "wait", "Waited", "s", format="sig:2"),
-        doc.of(lambda pair: error(pair[1]), "error", "Remaining error", **size, format="sig:2"),
-        doc.of(lambda pair: end_words(pair[1].rest, fine, small), "end", "The drive"),
+        doc.of(lambda pair: error(pair[1]), "error", "Remaining error", **fine.column("sig:2")),
+        doc.of(lambda pair: end_words(pair[1].rest, *fine), "end", "The drive"),
     ]
     ends = [(point.load_Nm, one) for point in result.points for one in point.cycles.settlings]
     note = (
@@ -186,48 +171,46 @@ def _settling_table(result: FrictionEffects, fine: float, small: str, load: str)
     )  # fmt: skip
 
 
-def _figure(result: FrictionEffects, fine: float, small: str, load: str) -> list[doc.Block]:
+def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
     points = [(f"load {point.load_Nm:g} {load}", point) for point in result.points]
     loops = [(label, one.hysteresis) for label, one in points if one.hysteresis is not None]
-    known = [(label, one.threshold.waiting) for label, one in points if one.threshold]
-    waits = [(label, waiting) for label, waiting in known if waiting]
+    waits = [(label, one.threshold.waiting) for label, one in points if one.threshold]
+    waits = [(label, waiting) for label, waiting in waits if waiting]
     if not loops:
         return []
+    scale, small = fine
     chart = style.Chart(width=style.WIDE, height=330.0)
     title = "Position error over a slow triangle of the command"
     panel = chart.panel(f"command, {small}", f"output less command, {small}", title=title, by_point=True)
     for k, (label, loop) in enumerate(loops):
-        x, y = fine * loop.command_rad, fine * (loop.output_rad - loop.command_rad)
+        x, y = scale * loop.command_rad, scale * (loop.output_rad - loop.command_rad)
         panel.curve(np.append(x, x[0]), np.append(y, y[0]), label, **style.series(k))
     panel.rule_y(0.0)
-    if waits:
-        title = "Wait before a small step moves the output"
-        panel = chart.panel(f"step, {small}", "time to first motion, ms", "xy", title=title)
-    for k, (label, waiting) in enumerate(waits):
-        sizes = [fine * one.amplitude_rad for one in waiting]
-        seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
-        predicted = [1e3 * one.predicted_s for one in waiting]
-        panel.curve(sizes, predicted, f"{label}: predicted", **style.series(k))
-        panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
     caption = (
         f"Position error over a slow triangular command; without {_cause(result)} only a small lag is left."
     )
     if waits:
+        title = "Wait before a small step moves the output"
+        panel = chart.panel(f"step, {small}", "time to first motion, ms", "xy", title=title)
         caption += " Right: a step below the threshold waits until the speed integrator reaches breakaway."
+    for k, (label, waiting) in enumerate(waits):
+        sizes = [scale * one.amplitude_rad for one in waiting]
+        seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
+        panel.curve(
+            sizes, [1e3 * one.predicted_s for one in waiting], f"{label}: predicted", **style.series(k)
+        )
+        panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
     return [doc.figure("hysteresis", chart, caption)]
 
 
-def _summary(result: FrictionEffects, fine: float, small: str) -> str:
+def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
-    swing = noticed(result.design, settlings)
-    if swing is not None:
-        ends = told(result.design, swing, fine, small)
-        return f"Friction alone keeps the drive from rest after a step: {ends}."
-    left = [one for one in settlings if abs(one.rest.error) > LEFT * one.amplitude_rad]
-    if left:
+    if (swing := noticed(result.design, settlings)) is not None:
+        return f"Friction alone keeps the drive from rest after a step: {told(result.design, swing, *fine)}."
+    if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
-        size = f"{fine * abs(most.rest.error):.3g} {small}"
+        size = fine.of(abs(most.rest.error))
         return f"{_integrates(result)}; an error of up to {size} is left at rest{under}."
     if not result.integrator:
         return f"{_integrates(result)}; the steps leave no error at rest."

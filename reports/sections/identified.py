@@ -20,29 +20,17 @@ def judged(
     status: doc.Status = "pass" if found.passed else "fail"
     first = [doc.verdicts(map(_verdict, found.items), "bench checks")]
     if not found.passed:
-        said = (
-            "The design is written as it was accepted, a check failed"
-            if found.accepted
-            else "No design is written, as a check fails; --accept writes it all the same"
-        )
-        first.append(doc.remark(said))
-    words = verdict_words(found.items, result)
-    return doc.section(id, title, [*first, *blocks], result=words, intro=intro, status=status)
-
-
-def verdict_words(items: Sequence[Item], result: str) -> str:
-    """One sentence: what was found, or which checks fail and why."""
-    wrong = [item for item in items if item.passed is False]
-    if not wrong:
-        return result
-    first = wrong[0]
-    why = f": {first.reason}" if first.reason else ""
-    more = f" ({len(wrong) - 1} more of {len(items)} checks fail)" if len(wrong) > 1 else ""
-    return f"{first.label} fails{why}{more}. {result}"
+        said = "The design is written as it was accepted, a check failed"
+        otherwise = "No design is written, as a check fails; --accept writes it all the same"
+        first.append(doc.remark(said if found.accepted else otherwise))
+    if wrong := [item for item in found.items if item.passed is False]:
+        why = f": {wrong[0].reason}" if wrong[0].reason else ""
+        more = f" ({len(wrong) - 1} more of {len(found.items)} checks fail)" if len(wrong) > 1 else ""
+        result = f"{wrong[0].label} fails{why}{more}. {result}"
+    return doc.section(id, title, [*first, *blocks], result=result, intro=intro, status=status)
 
 
 def _verdict(item: Item) -> doc.VerdictItem:
-    """One item; shares in per cent."""
     value, limit = (None if share is None else 100.0 * share for share in (item.value, item.limit))
     return doc.verdict(
         item.id, item.label, value=value, limit=limit, unit="" if value is None else "%",
@@ -89,7 +77,6 @@ def parameter_table(
 
 
 def input_table(caption: str, inputs: Sequence[InputUse]) -> doc.Block:
-    """The columns of files: meaning, unit, range in SI, whether each is used and why not."""
     columns = [
         *([doc.of("file", "file", "File")] if any(one.file for one in inputs) else []),
         doc.of("column", "column", "Column"),
@@ -104,7 +91,6 @@ def input_table(caption: str, inputs: Sequence[InputUse]) -> doc.Block:
 
 
 def finding_table(record: str, findings: Sequence[Finding]) -> doc.Block:
-    """Whether a record agrees with itself and with the design's limits."""
     words = {True: "yes", False: "NO", None: "not told"}
     columns = [
         doc.of("subject", "subject", "Looked at"),

@@ -24,31 +24,27 @@ from reports.sections.measured import decibels_and_degrees
 
 
 def section(result: BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan) -> doc.Section:
-    if isinstance(result, Plan):
-        return _plan(result)
     if isinstance(result, BenchResult):
         return identify_records.section(result)
+    if isinstance(result, CampaignAnswer):
+        return identify_campaign.section(result)
     if isinstance(result, FrequencyResult):
         return _two_mass(result)
-    if isinstance(result, ResponseResult):
-        return _of_loop(result)
-    return identify_campaign.section(result)
+    return _plan(result) if isinstance(result, Plan) else _of_loop(result)
 
 
 def write(result: Identified | Plan, folder: Path | None) -> list[str]:
     """Write the identified design, where all checks pass or it was accepted; of a plan the command."""
-    if folder is None:
+    if folder is None or not (isinstance(result, Plan) or result.passed or result.accepted):
         return []
     if isinstance(result, Plan):
         path = folder / f"{result.design.name}-plan.csv"
         name = "position_reference_m" if result.design.axis == "linear" else "reference_rad"  # as in a record
         rows = zip(result.time_s.tolist(), result.command.tolist(), strict=True)
-        write_text(path, f"time_s,{name}\n" + "".join(f"{t:.3f},{value:.9g}\n" for t, value in rows))
-        return [str(path)]
-    if not (result.passed or result.accepted):
-        return []
-    path = folder / f"{result.design.name}-identified.toml"
-    write_text(path, result.text)
+        text = f"time_s,{name}\n" + "".join(f"{t:.3f},{value:.9g}\n" for t, value in rows)
+    else:
+        path, text = folder / f"{result.design.name}-identified.toml", result.text
+    write_text(path, text)
     return [str(path)]
 
 
@@ -59,7 +55,6 @@ def _plan(plan: Plan) -> doc.Section:
     axis = plan.design.axis
     unit, rate = ("m", "m/s") if axis == "linear" else ("rad", "rad/s")
     drive = "V" if plan.design.effective_motor.torque_constant_Nm_A is None else "A"
-    groups = [(next(same), 1 + sum(1 for _ in same)) for _, same in groupby(plan.segments, key=id)]
     columns = [
         doc.of(lambda row: row[1], "times", "Times", format="int"),
         doc.of(lambda row: row[0].shape, "shape", "Motion of 4 s"),
@@ -70,15 +65,13 @@ def _plan(plan: Plan) -> doc.Section:
     ]
     share = doc.of(plan.half_widths.get, "share", "Half interval", "%", scale=100.0, format="sig:3")
     note = "Half interval: over the value; of the offset over the dry friction."
-    lasts = len(plan.command) * 1e-3
+    lasts, within = f"{len(plan.command) * 1e-3:g} s of motion are", f"{100.0 * plan.within:g} %"
     worst = max(plan.half_widths, key=lambda name: plan.half_widths[name])
     found = f"{100.0 * plan.half_widths[worst]:.3g} % of the {parameter(worst, axis).label.lower()}"
-    words = (
-        f"{lasts:g} s of motion are expected to tell every value within {100.0 * plan.within:g} % (95 %); "
-        f"the least closely {found}."
-        if plan.passed
-        else f"{lasts:g} s of motion are not enough: {found} is told, {100.0 * plan.within:g} % asked."
-    )
+    words = f"{lasts} not enough: {found} is told, {within} asked."
+    if plan.passed:
+        words = f"{lasts} expected to tell every value within {within} (95 %); the least closely {found}."
+    groups = [(next(same), 1 + sum(1 for _ in same)) for _, same in groupby(plan.segments, key=id)]
     expected = "Intervals to be expected, at the design's values"
     blocks = [
         parameter_table(expected, plan.expected, note, axis=axis, more=[share]),
@@ -89,8 +82,7 @@ def _plan(plan: Plan) -> doc.Section:
         chart = style.Chart(width=style.WIDE, height=260.0)
         panel = chart.panel("time, s", f"command at the output, {unit}")
         panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
-        caption = "Command of all motions, one after the other"
-        blocks.append(doc.figure("plan", chart, caption))
+        blocks.append(doc.figure("plan", chart, "Command of all motions, one after the other"))
     intro = (
         f"Motions from rest to rest, as large as the limits of {plan.design.name} allow in simulation, "
         f"chosen one by one (A-optimal); recorded at 1 kHz with white noise {plan.noise:g} {drive} rms. "
@@ -101,25 +93,31 @@ def _plan(plan: Plan) -> doc.Section:
 
 
 def _two_mass(result: FrequencyResult) -> doc.Section:
-    fit = result.fit
-    blocks = [
-        parameter_table("Identified two-mass drive", result.found),
-        *_response_figures(result),
-        input_table(f"Inputs: {result.record.name}", result.inputs),
-        *(finding_table(name, rows) for name, rows in result.findings.items()),
-    ]
+    """Parameters, and motor angle (and load angle) over motor torque: measured lines and the model."""
+    fit, lines = result.fit, result.lines
+    blocks = [parameter_table("Identified two-mass drive", result.found)]
+    model = angle_responses(
+        lines.omega_rad_s, {name: fit[name] for name in NAMES}, fit.reduction, fit.reaction
+    )
+    hertz = lines.omega_rad_s / (2.0 * np.pi)
+    for k, label in enumerate(("motor angle", "load angle")[: len(lines.names) - 1], 1):
+        chart = style.Chart(width=style.WIDE, height=320.0)
+        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
+        panel.points(hertz, np.abs(response(lines, k)[0]), "measured", colour=style.BLUE)
+        panel.curve(hertz, np.abs(model[k - 1]), "two-mass model", **style.series(1))
+        caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
+        blocks.append(doc.figure("response", chart, caption))
+    blocks.append(input_table(f"Inputs: {result.record.name}", result.inputs))
+    blocks += [finding_table(name, rows) for name, rows in result.findings.items()]
     intro = (
-        f"{fit.lines} lines of a period of {result.period_s:g} s, means over {result.lines.periods} periods; "
+        f"{fit.lines} lines of a period of {result.period_s:g} s, means over {lines.periods} periods; "
         "two-mass drive by maximum likelihood with the noise of every line from the spectrum beside it. "
         f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
     )
     low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
     words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {value_words(fit, 'stiffness')}"
-    if result.play is not None:
-        words += f", play {2e3 * result.play.half_rad:.3g} mrad"
-    return judged(
-        "frequency-identification", "Two-mass drive", result, blocks, result=f"{words}.", intro=intro
-    )
+    words += "." if result.play is None else f", play {2e3 * result.play.half_rad:.3g} mrad."
+    return judged("frequency-identification", "Two-mass drive", result, blocks, result=words, intro=intro)
 
 
 SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
@@ -149,21 +147,3 @@ def _of_loop(result: ResponseResult) -> doc.Section:
     return judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )
-
-
-def _response_figures(result: FrequencyResult) -> list[doc.Block]:
-    """Motor angle (and load angle) over motor torque: measured lines and the model."""
-    lines, fit = result.lines, result.fit
-    own = {name: fit[name] for name in NAMES}
-    model = angle_responses(lines.omega_rad_s, own, fit.reduction, fit.reaction)
-    hertz = lines.omega_rad_s / (2.0 * np.pi)
-    figures = []
-    for k, label in enumerate(("motor angle", "load angle")[: len(lines.names) - 1], 1):
-        measured, _ = response(lines, k)
-        chart = style.Chart(width=style.WIDE, height=320.0)
-        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
-        panel.points(hertz, np.abs(measured), "measured", colour=style.BLUE)
-        panel.curve(hertz, np.abs(model[k - 1]), "two-mass model", **style.series(1))
-        caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
-        figures.append(doc.figure("response", chart, caption))
-    return figures

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import groupby
 
 import numpy as np
@@ -23,42 +24,26 @@ from reports.sections.identified import input_table, judged, parameter_table, va
 
 
 def section(answer: CampaignAnswer) -> doc.Section:
-    result = answer.result
-    fit = result.fit
-    blocks = [
-        coefficient_table(fit),
-        contribution_table(answer),
-        surface_figure(fit),
-        *([region_figure(fit)] if len(fit.told) > 1 else []),
-        residual_figure(fit),
-        *window_figures(result),
-        shared_table(fit),
-    ]
-    if result.laws is not None:
-        blocks.append(law_table(result.laws))
-    if answer.suggestion is not None:
-        blocks += suggestion_blocks(answer.suggestion)
+    result, fit = answer.result, answer.result.fit
+    blocks = [coefficient_table(fit), contribution_table(answer), surface_figure(fit)]
+    blocks += [region_figure(fit)] if len(fit.told) > 1 else []
+    blocks += [residual_figure(fit), *window_figures(result), shared_table(fit)]
+    blocks += [law_table(result.laws)] if result.laws is not None else []
+    blocks += suggestion_blocks(answer.suggestion) if answer.suggestion is not None else []
     blocks += [*account_blocks(result), input_table("Inputs of all runs", result.inputs)]
     blocks.append(doc.details("Every run", [run_table(result)]))
-    found = ", ".join(f"{name} = {value_words(fit, name)}" for name in NAMES)
-    return judged(
-        "identification", "Identified friction", answer, blocks,
-        result=f"{found}, from {len(fit.points)} runs.", intro=_intro(result),
-    )  # fmt: skip
-
-
-def _intro(result: CampaignResult) -> str:
-    fit = result.fit
-    return (
+    intro = (
         f"{len(fit.points)} of {result.runs_listed} runs, {result.rows_in} rows in, {result.rows_out} out. "
         f"M = kM i with kM = {result.torque_constant_Nm_A:g} N m/A, averaged over the steady part of each "
         f"run ({result.criterion}), then M = C0 + Cv w + CM |M_ext| with errors in all variables."
         + "".join(f" {name} is not fitted: {one.reason}." for name, one in fit.fixed.items())
     )
+    found = ", ".join(f"{name} = {value_words(fit, name)}" for name in NAMES)
+    words = f"{found}, from {len(fit.points)} runs."
+    return judged("identification", "Identified friction", answer, blocks, result=words, intro=intro)
 
 
 def coefficient_table(fit: SurfaceFit) -> doc.Block:
-    """Values, standard errors, 95 % intervals, and how they go together."""
     random = np.diag(fit.random_covariance) / np.maximum(np.diag(fit.covariance), 1e-300)
     scatter = dict(zip(NAMES, (100.0 * random).tolist(), strict=True))
     more = [doc.of(scatter.get, "scatter", "Share of scatter", "%", format="fix:0")]
@@ -86,7 +71,6 @@ def contribution_table(answer: CampaignAnswer) -> doc.Block:
 
 
 def shared_table(fit: SurfaceFit) -> doc.Block:
-    """What the bound of each shared error does to each coefficient."""
     columns = [doc.column("name", "Systematic error, at its bound")]
     columns += [doc.column(name, name, "%", format="fix:3") for name in NAMES]
     rows = [
@@ -127,18 +111,19 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
         doc.column("load", "Load", "N m", format="fix:2"),
         doc.column("remaining", "Random variance remaining", "%", format="fix:1"),
     ]
-    rows: list[doc.Row] = []
-    for (speed, load), runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
+    rows: list[Sequence[object]] = []
+    for point, runs in groupby(suggestion.runs, key=lambda run: (run.speed_rad_s, run.load_Nm)):
         same = list(runs)  # the same point several times is one row
-        first, last = same[0].order, same[-1].order
-        order = str(first) if first == last else f"{first} to {last}"
-        rows.append({"order": order, "speed": speed, "load": load, "remaining": 100.0 * same[-1].remaining})
-    note = ""
+        ends = dict.fromkeys(str(run.order) for run in (same[0], same[-1]))
+        rows.append((" to ".join(ends), *point, 100.0 * same[-1].remaining))
+    goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
+    blocks = [doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows)]
     if suggestion.largest_shared is not None:
         note = (
             f"{100.0 * suggestion.shared_part:.0f} % of the margins' variance comes from errors that all "
             f"runs share and no further run reduces; the largest is the {suggestion.largest_shared}."
         )
+        blocks.append(doc.text(note))
     margins = [
         doc.of("label", "label", "Margin"),
         doc.of("value", "value", "Value", format="sig:4"),
@@ -146,14 +131,8 @@ def suggestion_blocks(suggestion: CampaignSuggestion) -> list[doc.Block]:
         doc.of("floor_std", "floor", "Systematic part", format="sig:2"),
         doc.of("unit", "unit", "Unit"),
     ]
-    goal = "the margins'" if suggestion.criterion == "margins" else "the coefficients'"
-    return [
-        doc.table(f"Runs that would shrink {goal} uncertainty most", columns, rows),
-        *([doc.text(note)] if note else []),
-        doc.listing(
-            "Margins and their uncertainty from the friction, slow motion", suggestion.margins, margins
-        ),
-    ]
+    title = "Margins and their uncertainty from the friction, slow motion"
+    return [*blocks, doc.listing(title, suggestion.margins, margins)]
 
 
 def account_blocks(result: CampaignResult) -> list[doc.Block]:
@@ -165,11 +144,10 @@ def account_blocks(result: CampaignResult) -> list[doc.Block]:
     ]
     aside = [doc.of("id", "run", "Run"), doc.of("reason", "reason", "Reason")]
     outliers, gone = result.fit.outliers, result.set_aside
+    kept, none = doc.text("No run is an outlier."), doc.text("No run was set aside.")
     return [
-        doc.listing("Outliers", outliers, outlier) if outliers else doc.text("No run is an outlier."),
-        doc.listing("Runs set aside", gone, aside, status=lambda _: "warn")
-        if gone
-        else doc.text("No run was set aside."),
+        doc.listing("Outliers", outliers, outlier) if outliers else kept,
+        doc.listing("Runs set aside", gone, aside, status=lambda _: "warn") if gone else none,
     ]
 
 

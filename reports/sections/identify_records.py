@@ -9,19 +9,20 @@ import numpy as np
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import DesignValue, given_constant
+from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import show
+from reports.numbers import capital, show
 from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
+from reports.sections.names import speed_unit
 
 
 def section(result: BenchResult) -> doc.Section:
     axis, model = result.design.axis, result.model
     blocks = [_parameters(model, axis)]
-    if result.design_values:
-        blocks.append(_against_design(result.design_values, axis))
+    blocks += [_against_design(result.design_values, axis)] if result.design_values else []
     if result.refined is not None:
         refined = result.refined
         note = (
@@ -36,10 +37,8 @@ def section(result: BenchResult) -> doc.Section:
         residual = 100.0 * result.electrical.relative_residual
         note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
         blocks.append(parameter_table("Voltage equation", result.electrical, note))
-    if result.laws:
-        blocks.append(law_table(result, axis))
-    if len(result.records) > 1:
-        blocks.append(scatter_table(model, axis))
+    blocks += [law_table(result, axis)] if result.laws else []
+    blocks += [scatter_table(model, axis)] if len(result.records) > 1 else []
     for part, record in zip(model.records, result.records, strict=True):
         blocks += [
             input_table(f"Inputs: {record.name}", result.inputs[record.name]),
@@ -61,18 +60,16 @@ def _result(result: BenchResult, axis: str) -> str:
     labels = {name: parameter(name, axis).label.partition(",")[0].lower() for name in main[:3]}
     parts = [f"{label} {value_words(model, name, axis)}" for name, label in labels.items()]
     if result.refined is not None:  # these are the design's
-        keys = result.refined.names[:3]
-        parts = [f"{key} {value_words(result.refined, key, axis)}" for key in keys]
+        parts = [f"{key} {value_words(result.refined, key, axis)}" for key in result.refined.names[:3]]
         parts[0] = f"refined by simulation: {parts[0]}"
-    given = given_constant(model)
-    if given is not None and parts:
+    if (given := given_constant(model)) is not None and parts:
         one = parameter(given, axis)
         name = one.label[:1].lower() + one.label[1:]
         parts[-1] += f", all at the design's {name}, {show(model[given], 'sig:4')} {one.unit}"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     words = f"{', '.join(parts)}. The written design meets {met} within"
-    return f"{words[0].upper()}{words[1:]} {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
 
 
 def _intro(result: BenchResult) -> str:
@@ -124,14 +121,12 @@ def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
 
 
 def law_table(result: BenchResult, axis: str) -> doc.Block:
-    unit = "m/s" if axis == "linear" else "rad/s"
+    def breaks(one: LawChoice) -> str:
+        return ", ".join(f"{speed:.4g}" for speed in one.breaks_rad_s) or "–"
+
     columns = [
         doc.of("name", "name", "Law"),
-        doc.of(
-            lambda one: ", ".join(f"{speed:.4g}" for speed in one.breaks_rad_s) or "–",
-            "breaks",
-            f"Break points, {unit}",
-        ),
+        doc.of(breaks, "breaks", f"Break points, {speed_unit(axis)}"),
         doc.of("parameters", "parameters", "Parameters", format="short:3"),
         doc.of("relative_residual", "residual", "Relative residual", "%", scale=100.0, format="sig:4"),
         doc.of("criterion", "criterion", "BIC difference", format="fix:1"),
@@ -162,11 +157,11 @@ def scatter_table(model: JointModel, axis: str) -> doc.Block:
 
 
 def residual_blocks(model: JointModel, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
-    """The tests of all records, and four pictures of each; those of further records on demand."""
-    made = [figure for part in model.records for figure in _figures(part, tests, axis)]
-    each = len(made) // len(model.records)
-    more = [doc.details("Residuals of the other records", made[each:])] if made[each:] else []
-    return [_residual_table(tests), *made[:each], *more]
+    """The tests of all records, and three pictures of each; those of further records on demand."""
+    first, *others = (_figures(part, tests, axis) for part in model.records)
+    more = [figure for each in others for figure in each]
+    folded = [doc.details("Residuals of the other records", more)] if more else []
+    return [_residual_table(tests), *first, *folded]
 
 
 def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
@@ -192,14 +187,13 @@ def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
 
 def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:
     own = [test for test in tests if test.record == part.name]
-    unit, rate = ("N", "m/s") if axis == "linear" else ("N m", "rad/s")
+    unit = "N" if axis == "linear" else "N m"
+    friction, correlation = _friction(part, unit, speed_unit(axis)), _correlation(own)
+    named = f"{part.name}: "
     return [
-        doc.figure(f"residual_{name}", chart, f"{part.name}: {words}")
-        for name, chart, words in (
-            ("time", _over_time(part, unit), "residual over time, and its spectrum"),
-            ("correlation", _correlation(own), "correlations of the residual, with bounds"),
-            ("friction", _friction(part, unit, rate), "friction over speed, rows and model"),
-        )
+        doc.figure("residual_time", _over_time(part, unit), f"{named}residual over time, and its spectrum"),
+        doc.figure("residual_correlation", correlation, f"{named}correlations of the residual, with bounds"),
+        doc.figure("residual_friction", friction, f"{named}friction over speed, rows and model"),
     ]
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import product
 
 import numpy as np
 
@@ -25,7 +26,6 @@ TESTED = "locked"  # how the rotor stands in the current loop that is put to the
 
 
 def sections(validation: Validation) -> list[doc.Section]:
-    """Make the section of the sweep and that of steps and margins, as far as there are any."""
     made = [_injection(list(validation.sweeps.values()))] if validation.sweeps else []
     return made + ([_in_time(validation)] if validation.steps or validation.margins else [])
 
@@ -43,17 +43,13 @@ def _injection(sweeps: Sequence[BenchSweep]) -> doc.Section:
 def _sweep(sweep: BenchSweep) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=400.0)
     top, bottom = chart.column(1.1, 1.0)
-    phase = np.degrees(np.unwrap(np.angle(sweep.linear)))
+    phase = style.phases(sweep.linear)
     seen = phase + np.degrees(np.angle(sweep.open_loop / sweep.linear))
-    for panel, linear, found in (
-        (top, 20.0 * np.log10(np.abs(sweep.linear)), 20.0 * np.log10(np.abs(sweep.open_loop))),
-        (bottom, phase, seen),
-    ):
+    size, size_seen = style.decibels(sweep.linear), style.decibels(sweep.open_loop)
+    for panel, linear, found in ((top, size, size_seen), (bottom, phase, seen)):
         panel.curve(sweep.frequency_hz, linear, "linear loop", colour=style.BLUE)
         panel.points(sweep.frequency_hz, found, "simulated", size=5.0, hollow=True, colour=style.ORANGE)
-    style.phase_axis(bottom, phase.tolist())
-    style.frequency(bottom)
-    top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
+    style.bode_axes(top, bottom, phase)
     caption = f"{loop_words(sweep.loop, TESTED)}, open: linear (line), simulated (circles)"
     caption += f"; largest difference {_largest([sweep]):.1e}."
     return doc.figure("injected_sweep", chart, caption)
@@ -64,41 +60,37 @@ def _largest(sweeps: Sequence[BenchSweep]) -> float:
 
 
 def _in_time(validation: Validation) -> doc.Section:
+    steps, margins, amplitudes = validation.steps, validation.margins, validation.amplitude_margins
     blocks: list[doc.Block] = []
     for name in validation.figures:
-        if name in validation.steps:
-            blocks.append(_step(validation.steps[name]))
-        if name in validation.margins:
-            blocks.append(_margin(validation.margins[name]))
-    amplitudes = validation.amplitude_margins
+        blocks += [_step(steps[name])] if name in steps else []
+        blocks += [_margin(margins[name])] if name in margins else []
     said = remarks(amplitudes)
     if amplitudes:
         blocks += [_amplitudes(amplitudes), *map(doc.text, said), _amplitude_table(amplitudes)]
-    findings = [doc.Finding(severity="warn", text=words, where="confirmation") for words in said]
-    rows = [shown.row for shown in validation.steps.values()]
-    rows += [row for shown in validation.margins.values() for row in shown.rows]
+    rows = [shown.row for shown in steps.values()] + [row for one in margins.values() for row in one.rows]
     met = sum(row.verdict is Verdict.MET for row in rows)
     intro = (
         "On the operating motion: one small step, sample by sample, and the drive started on its critical "
         "mode 1 % inside and 1 % outside of the gain margin, where it dies out or grows by the predicted "
         "factor."
     )
-    result = " ".join([f"{met} of {len(rows)} runs go as predicted.", *said[:1]])
     return doc.section(
-        "confirmation", "Predictions in time", blocks, result=result, intro=intro,
-        status="pass" if met == len(rows) else "fail", findings=findings,
+        "confirmation", "Predictions in time", blocks, intro=intro,
+        result=" ".join([f"{met} of {len(rows)} runs go as predicted.", *said[:1]]),
+        status="pass" if met == len(rows) else "fail",
+        findings=[doc.Finding(severity="warn", text=words, where="confirmation") for words in said],
     )  # fmt: skip
 
 
 def _step(shown: StepShown) -> doc.Block:
     chart = style.Chart(width=style.HALF, height=240.0)
     panel = chart.panel(y="response to a unit step")
-    scale = style.time_axis(panel, float(shown.time_s[-1]))
-    some = slice(None, None, max(1, shown.time_s.size // 400))
-    few = slice(None, None, max(1, shown.time_s.size // 40))
-    panel.curve(scale * shown.time_s[some], shown.linear[some], "linear", colour=style.BLUE)
+    time = shown.time_s * style.time_axis(panel, float(shown.time_s[-1]))
+    some, few = (slice(None, None, max(1, time.size // most)) for most in (400, 40))
+    panel.curve(time[some], shown.linear[some], "linear", colour=style.BLUE)
     look: style.Style = {"size": 4.5, "hollow": True, "colour": style.ORANGE}
-    panel.points(scale * shown.time_s[few], shown.simulated[few], "simulated", **look)
+    panel.points(time[few], shown.simulated[few], "simulated", **look)
     caption = (
         f"{loop_words(shown.place, TESTED)}: small step on the operating motion; largest difference "
         f"{shown.row.error:.1e} of its height, {shown.row.because.split(', of ')[-1]}."
@@ -114,15 +106,19 @@ def _margin(shown: MarginShown) -> doc.Block:
         look = style.series(k)
         panel.curve(scale * run.time_s, run.factor ** (run.time_s / run.time_s[-1]), words, **look)
         panel.points(scale * run.time_s, run.amplitude, f"{words}, simulated", **look | {"size": 4.0})
-    decibel = 20.0 * math.log10(shown.ratio)
+    decibel = gain_margin(20.0 * math.log10(shown.ratio), 2)
     caption = (
-        f"{loop_words(shown.place, TESTED)}: gain margin on the operating motion "
-        f"{gain_margin(decibel, 2)} dB at {shown.frequency_hz:.4g} Hz. The run inside dies "
-        "out, the run outside grows (circles), each by the predicted factor (lines)."
+        f"{loop_words(shown.place, TESTED)}: gain margin on the operating motion {decibel} dB at "
+        f"{shown.frequency_hz:.4g} Hz. The run inside dies out, the run outside grows (circles), each by the "
+        "predicted factor (lines)."
     )
     return doc.figure("margin_runs", chart, caption, layout="half")
 
 
+FRICTION: dict[bool, style.Style] = {
+    False: {"marker": "o"},
+    True: {"marker": "s", "hollow": True, "dash": 1},
+}
 KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 NEXT_TO_NOTHING = 0.01  # of the linear margin
 WORTH_SAYING = 0.9  # of the linear margin: what takes less is not said
@@ -144,14 +140,9 @@ def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
 
 def remark(item: AmplitudeMargin) -> str:
     value, linear = _text(item.value or 0.0, item), _text(item.linear, item)
-    if _already(item):
-        cause = "as designed"
-    elif item.kind == "gain":
-        cause = f"if its gain is raised by {value} or more"
-    else:
-        cause = f"if a delay of {value} or more is added"
-    scale, unit = output_unit(item.axis)
-    size = f" of {scale * item.output:.2g} {unit} at the output" if item.output > 0.0 else ""
+    varied = {"gain": f"its gain is raised by {value}", "delay": f"a delay of {value}"}[item.kind]
+    cause = "as designed" if _already(item) else f"if {varied} or more" + " is added" * (item.kind == "delay")
+    size = f" of {output_unit(item.axis).of(item.output, 2)} at the output" if item.output > 0.0 else ""
     quiet = "" if item.friction_on else ", without dry friction,"
     acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
@@ -174,15 +165,12 @@ def _amplitudes(items: Sequence[AmplitudeMargin]) -> doc.Block:
     panel = chart.panel("initial deviation", "margin over linear margin", "y", by_point=True)
     sizes = list(dict.fromkeys(item.size for item in items))
     keys = list(dict.fromkeys((item.loop, item.kind) for item in items))
-    for k, (loop, kind) in enumerate(keys):
-        for friction_on in (False, True):
-            own = [x for x in items if (x.loop, x.kind, x.friction_on) == (loop, kind, friction_on)]
-            x = [sizes.index(item.size) + 0.06 * (k - len(keys) / 2) for item in own]
-            y = [None if item.value is None else max(item.value / item.linear, LOWEST) for item in own]
-            look: style.Style = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4}
-            if friction_on:
-                look |= {"hollow": True, "dash": 1, "marker": "s"}
-            panel.curve(x, y, f"{loop}: {KINDS[kind]}", **({"marker": "o"} | look))
+    for (k, (loop, kind)), (friction_on, rough) in product(enumerate(keys), FRICTION.items()):
+        own = [x for x in items if (x.loop, x.kind, x.friction_on) == (loop, kind, friction_on)]
+        x = [sizes.index(item.size) + 0.06 * (k - len(keys) / 2) for item in own]
+        y = [None if item.value is None else max(item.value / item.linear, LOWEST) for item in own]
+        look: style.Style = {"colour": style.SERIES[k % 7], "size": 6.5, "width": 1.4, **rough}
+        panel.curve(x, y, f"{loop}: {KINDS[kind]}", **look)
     panel.rule_y(1.0)
     panel.x.ticks = [(float(k), words) for k, words in enumerate(sizes)]
     panel.x.limits(-0.4, len(sizes) - 0.6)

@@ -18,7 +18,7 @@ from analyses.large_signal.result import LargeSignals
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import hertz
+from reports.sections.names import Unit, hertz
 
 
 def section(design: Design, border: Onset) -> doc.Section:
@@ -38,9 +38,10 @@ def section(design: Design, border: Onset) -> doc.Section:
     blocks = [doc.figure("onset", _chart(design, border, scale, unit), caption)]
     blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
-    words = _result(rows, unit) if rows else _least(border, scale, unit)
-    title = "Validity of the linear model"
-    return doc.section("limits", title, blocks, result=words, intro=intro, told="info")
+    words = _result(rows, border, scale, unit)
+    return doc.section(
+        "limits", "Validity of the linear model", blocks, result=words, intro=intro, told="info"
+    )
 
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
@@ -71,22 +72,22 @@ def _full(design: Design) -> float:
     return design.validation.full_deflection_rad if design.controller.position is not None else 0.0
 
 
-def _result(rows: Sequence[_Linear], unit: str) -> str:
-    row = max(rows, key=lambda row: row.amplitude)
-    part = "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
-    size = f"{part} ({row.amplitude:.3g} {unit})"
-    if row.hz is None:
-        return f"A sine of {size} stays linear over the whole frequency range."
-    return f"A sine of {size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
-
-
-def _least(border: Onset, scale: float, unit: str) -> str:
+def _result(rows: Sequence[_Linear], border: Onset, scale: float, unit: str) -> str:
+    if rows:
+        row = max(rows, key=lambda row: row.amplitude)
+        part = (
+            "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
+        )
+        size = f"A sine of {part} ({row.amplitude:.3g} {unit}) stays linear"
+        if row.hz is None:
+            return f"{size} over the whole frequency range."
+        return f"{size} up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
     if not np.isfinite(border.amplitude_rad).any():
         return "No limit is reached by a sine command over the whole frequency range."
     k = int(np.argmin(border.amplitude_rad))
-    size, hz = scale * border.amplitude_rad[k], hertz(border.omega_rad_s[k])
-    limit = _noun(words_of(border.active[k]))
-    return f"Sines up to {size:.3g} {unit} stay linear; above, the {limit} acts first, at {hz:.3g} Hz."
+    size, limit = f"{scale * border.amplitude_rad[k]:.3g} {unit}", _noun(words_of(border.active[k]))
+    at = f"{hertz(border.omega_rad_s[k]):.3g} Hz"
+    return f"Sines up to {size} stay linear; above, the {limit} acts first, at {at}."
 
 
 def _noun(limiter: str) -> str:
@@ -110,11 +111,11 @@ class _Linear:
 def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
     rows: list[_Linear] = []
     for fraction in design.validation.amplitude_fractions if _full(design) else ():
-        amplitude = fraction * _full(design)
+        amplitude, up_to, limiter = fraction * _full(design), None, "none in this range"
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
-        first = int(reached[0]) if len(reached) else None
-        up_to = None if first is None else hertz(_crossing(border, first, amplitude))
-        limiter = "none in this range" if first is None else words_of(border.active[first])
+        if len(reached):
+            up_to = hertz(_crossing(border, int(reached[0]), amplitude))
+            limiter = words_of(border.active[int(reached[0])])
         rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
     return rows
 
@@ -131,15 +132,10 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
 LINES = {name: k for k, name in enumerate(LIMITERS)}
-COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED} | {
-    name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()
-}
-WORDS = {
-    "friction": "dry friction",
-    "stiction": "stiction",
-    "none": "linear",
-    "other": "play, gravity or counts",
-} | {name: limiter.words for name, limiter in LIMITERS.items()}
+COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED}
+COLOURS |= {name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()}
+WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"}
+WORDS |= {"other": "play, gravity or counts"} | {name: one.words for name, one in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},
@@ -151,21 +147,25 @@ GLYPHS: dict[str, style.Style] = {
 EVERY = 2  # a glyph in every second column
 
 
-def map_chart(result: LargeSignals, scale: float, unit: str) -> style.Chart:
+def map_chart(result: LargeSignals, out: Unit) -> style.Chart:
     title = "waveform; first reached, linear loop"
     made = style.Chart(width=style.WIDE, height=500.0, legend=True, legend_title=title)
-    panel, shown = made.panel("command frequency, Hz", f"command amplitude, {unit}", "xy"), result.map
+    panel = made.panel("command frequency, Hz", f"command amplitude, {out.unit}", "xy")
+    shown, scale = result.map, out.scale
     x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)
     panel.x.limits(xe[0], xe[-1])
     panel.y.limits(ye[0], ye[-1])
     panel.x.grid = panel.y.grid = False
     _regions(panel, shown.cause, xe, ye)
-    _glyphs(panel, shown.waveform, x, y)
+    for name, look in GLYPHS.items():  # in every second column; a sine has none
+        rows, columns = np.nonzero(shown.waveform[:, ::EVERY] == WAVEFORMS.index(name))
+        if len(rows):
+            panel.points(x[EVERY * columns], y[rows], name, colour=style.INK, read=False, **look)
     _onsets(panel, x, shown.onset_rad, scale)
     if (shift := result.shift) is not None and np.isfinite(shift.simulated_rad).any():
         sizes = scale * shift.simulated_rad / shift.command_gain
-        look: style.Style = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
+        look = {"colour": style.INK, "marker": "D", "size": 7.0, "hollow": True}
         panel.points(shift.frequency_hz, sizes, "simulated, with friction", **look)
     full = scale * result.design.validation.full_deflection_rad
     panel.rule_y(full, "full\ndeflection", dash=4, width=0.8)
@@ -191,16 +191,6 @@ def _regions(panel: style.Panel, cause: np.ndarray, xe: np.ndarray, ye: np.ndarr
     for name, rings in boxes.items():
         if name in COLOURS:
             panel.shape(rings, colour=COLOURS[name], opacity=0.28)
-
-
-def _glyphs(panel: style.Panel, waveform: np.ndarray, x: np.ndarray, y: np.ndarray) -> None:
-    """Mark the waveform in every second column; a sine has no mark."""
-    shown = np.zeros_like(waveform, dtype=bool)
-    shown[:, ::EVERY] = True
-    for name, look in GLYPHS.items():
-        rows, columns = np.nonzero((waveform == WAVEFORMS.index(name)) & shown)
-        if len(rows):
-            panel.points(x[columns], y[rows], name, colour=style.INK, read=False, **look)
 
 
 def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.ndarray], scale: float) -> None:

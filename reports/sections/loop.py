@@ -8,24 +8,15 @@ import numpy as np
 
 from actuator_lti.asked.quantities import AT_A_GLANCE
 from actuator_lti.design.model import Design
+from actuator_lti.loops.commanded import sampled_step
 from actuator_lti.step import StepFigures
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.responses import frequency_grid, response_at, sampled_step
+from analyses.linear.responses import frequency_grid, response_at
 from analyses.specification.asked_figures import said_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, fixed, gain_margin, seconds, to_minus
-from reports.sections import loop_charts
-from reports.sections.margins import (
-    MEANING,
-    by_itself_notes,
-    evidence_notes,
-    finite,
-    margin_row,
-    response_row,
-    shown,
-    worst_status,
-)
+from reports.sections import loop_charts, margins
 from reports.sections.names import LOOPS, hertz
 
 STEP_POINTS = 300
@@ -33,34 +24,43 @@ Response = tuple[str, np.ndarray, np.ndarray]  # label, time in s, response
 
 
 def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
-    locked = figures.locked
-    grid = frequency_grid(figures)
-    title, status = LOOPS[name], worst_status([figures.sound])
+    title, grid, locked = LOOPS[name], frequency_grid(figures), figures.locked
     blocks = [_facts(figures), loop_charts.open_bode(title, figures, grid, name=name)]
-    if figures.stable:
-        blocks.append(loop_charts.closed_bode(title, figures, grid, locked, name=name))
+    blocks += [loop_charts.closed_bode(title, figures, grid, locked, name=name)] if figures.stable else []
     blocks.append(loop_charts.nyquist(title, figures, grid))
-    if figures.peaks is not None:
-        blocks.append(sensitivity(title, design, name, figures, grid))
-    if figures.step is not None:
-        blocks.append(step(title, figures, locked, name=name))
+    blocks += [sensitivity(title, design, name, figures, grid)] if figures.peaks is not None else []
+    blocks += [step(title, figures, locked, name=name)] if figures.step is not None else []
     blocks.append(doc.details("Nichols chart", [loop_charts.nichols(title, figures, grid)]))
     corner = figures.bandwidth.minus3db_hz if name == "position" and figures.bandwidth else None
     said, known = said_of(design, corner), {title: figures}
-    notes = [*([said] if said else []), *by_itself_notes(known), *evidence_notes(known)]
-    blocks += [doc.remark(note) for note in (*notes, *figures.margins.notes, *figures.notes)]
-    words, intro = result(figures), _intro(name, figures)
+    notes = [*([said] if said else []), *margins.by_itself_notes(known), *margins.evidence_notes(known)]
+    blocks += map(doc.remark, (*notes, *figures.margins.notes, *figures.notes))
+    period, evidence = figures.loop.period_s, figures.margins.evidence
+    rate = "" if period is None else f", every {seconds(period)}"
+    inner = "no loop inside it" if name == "current" else "the loops inside it closed"
+    intro = (
+        f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}. The margins are {evidence}: "
+        f"{margins.MEANING[evidence]}."
+    )
+    words, status = result(figures), margins.worst_status([figures.sound])
     return doc.section(f"loop-{name}", title, blocks, result=words, intro=intro, status=status)
 
 
+def _facts(figures: LoopFigures) -> doc.Block:
+    items = []
+    for of in AT_A_GLANCE:
+        value = _short(margins.shown(of, figures), of.at_a_glance)
+        items.append(doc.fact(of.label, value, of.shown[0], better=of.direction))
+    crossover = _short(margins.margin_row(figures)["crossover_hz"], "sig:3")
+    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
+
+
 def result(figures: LoopFigures) -> str:
-    row, bandwidth = margin_row(figures), response_row(figures)["minus3db_hz"]
-    parts = [
+    row, bandwidth, words = margins.margin_row(figures), margins.response_row(figures)["minus3db_hz"], []
+    for name, value, unit, hz, write in (
         ("gain margin", row["gain_margin_db"], "dB", row["gain_margin_hz"], gain_margin),
         ("phase margin", row["phase_margin_deg"], "deg", row["crossover_hz"], fixed),
-    ]
-    words = []
-    for name, value, unit, hz, write in parts:
+    ):
         if value is not None:
             words.append(f"{name} {write(value, 1)} {unit}" + (f" at {style.hertz(hz)}" if hz else ""))
     if bandwidth is not None:
@@ -69,23 +69,6 @@ def result(figures: LoopFigures) -> str:
     rotor = "Rotor free, " if figures.loop.name == "current" else ""
     verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
     return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
-
-
-def _intro(name: str, figures: LoopFigures) -> str:
-    period = figures.loop.period_s
-    rate = "" if period is None else f", every {seconds(period)}"
-    inner = "no loop inside it" if name == "current" else "the loops inside it closed"
-    words = f"Cut at its error ({figures.loop.unit_in}){rate}, with {inner}."
-    return f"{words} The margins are {figures.margins.evidence}: {MEANING[figures.margins.evidence]}."
-
-
-def _facts(figures: LoopFigures) -> doc.Block:
-    items = []
-    for of in AT_A_GLANCE:
-        value = _short(shown(of, figures), of.at_a_glance)
-        items.append(doc.fact(of.label, value, of.shown[0], better=of.direction))
-    crossover = _short(margin_row(figures)["crossover_hz"], "sig:3")
-    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
 
 
 def _short(value: float | None, format: str) -> float | None:
@@ -97,7 +80,6 @@ def _short(value: float | None, format: str) -> float | None:
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
-    """Draw S and T, their peaks and the limit of a requirement."""
     peaks = figures.peaks
     assert peaks is not None
     asked = [one for one in design.requirements if one.quantity == "sensitivity_peak"]
@@ -110,7 +92,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         ("T", figures.loop.plain_closed, peaks.complementary_rad_s, peaks.complementary_db, style.BLUE),
     )
     for k, (letter, system, omega, peak, colour) in enumerate(drawn):
-        at, db = finite(hertz(omega)), finite(peak)
+        at, db = margins.finite(hertz(omega)), margins.finite(peak)
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"
@@ -137,7 +119,6 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
 def step(
     title: str, loop_figures: LoopFigures, locked: LoopFigures | None, *, name: str = "", small: bool = False
 ) -> doc.Block:
-    """Draw the step responses, as stairs where sampled, and the figures read from the first."""
     figures, end = loop_figures.step, None
     assert figures is not None
     drawn = {"rotor free" if locked else "closed loop": loop_figures}

@@ -29,19 +29,16 @@ def nyquist_hz(figures: LoopFigures) -> float | None:
 def open_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "", small: bool = False
 ) -> doc.Block:
-    """Draw magnitude and phase of the open loop, every margin where it is; ``small`` on the first screen."""
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 410.0)
     chart = style.Chart(width=width, height=height, loop=name)
     top, bottom = chart.column(1.15, 1.0)
-    drawn, margins = curve(figures.loop.plain_open, grid), figures.margins
+    drawn, margins, shown = curve(figures.loop.plain_open, grid), figures.margins, 1 if small else LABELLED
     both([("open loop", drawn)], nyquist_hz(figures), top, bottom, span=100.0)
     top.rule_y(0.0, colour=style.INK)
-    _gain_margins(drawn, margins, top, 1 if small else LABELLED)
-    _phase_margins(drawn, margins, top, bottom, 1 if small else LABELLED)
-    caption = (
-        f"{title}, open loop: gain margins at the phase crossovers (■), "
-        "phase margins at the gain crossovers (●)."
-    )
+    _gain_margins(drawn, margins, top, shown)
+    _phase_margins(drawn, margins, top, bottom, shown)
+    caption = f"{title}, open loop: gain margins at the phase crossovers (■), phase margins at the gain "
+    caption += "crossovers (●)."
     return doc.figure("bode", chart, caption, alt=margin_words(title, figures), layout="half")
 
 
@@ -54,7 +51,6 @@ def margin_words(title: str, figures: LoopFigures) -> str:
 
 
 def _gain_margins(curve: Curve, margins: StabilityMargins, top: style.Panel, shown: int) -> None:
-    """Draw each gain margin as the distance to 0 dB at its phase crossover."""
     first, last = curve.frequency_hz[[0, -1]]
     inside = [(-m.db, m.frequency_rad_s / (2.0 * math.pi)) for m in margins.gain_margins]
     low, high = top.y.span()
@@ -122,10 +118,8 @@ def closed_bode(
     other, band = figures.reference, figures.bandwidth
     first = "rotor free" if locked else "to the command" if other else "closed loop"
     curves = [(first, answer_curve(figures, grid))]
-    if other is not None:
-        curves.append(("to the reference", answer_curve(other, grid)))
-    if locked is not None and locked.stable:
-        curves.append(("rotor locked", curve(locked.plain_response, grid)))
+    curves += [("to the reference", answer_curve(other, grid))] if other is not None else []
+    curves += [("rotor locked", curve(locked.plain_response, grid))] if locked and locked.stable else []
     chart = style.Chart(width=style.HALF, height=410.0, loop=name)
     top, bottom = chart.column(1.0, 1.0)
     both(curves, nyquist_hz(figures), top, bottom, span=60.0, top_room=0.15)
@@ -133,15 +127,14 @@ def closed_bode(
     corner, lag = (finite(band.minus3db_hz), finite(band.minus90deg_hz)) if band else (None, None)
     if band is not None:
         dc_db = 20.0 * math.log10(abs(band.dc_gain))
-        level = dc_db - 20.0 * math.log10(math.sqrt(2.0))
+        level, peak = dc_db - 20.0 * math.log10(math.sqrt(2.0)), band.resonance_peak_db
         top.rule_y(level, dash=1)
         if corner is not None:
             _mark(top, (corner, level), "−3 dB", GREEN, "o")
         if lag is not None:
             _mark(bottom, (lag, -90.0), "−90°", style.PURPLE, "D")
-        if math.isfinite(band.resonance_peak_db) and band.resonance_hz and band.resonance_peak_db > 0.05:
-            words = f"peak {band.resonance_peak_db:.2f} dB"
-            _mark(top, (band.resonance_hz, band.resonance_peak_db + dc_db), words, ORANGE, "^")
+        if math.isfinite(peak) and band.resonance_hz and peak > 0.05:
+            _mark(top, (band.resonance_hz, peak + dc_db), f"peak {peak:.2f} dB", ORANGE, "^")
     what = "response to the command" if figures.loop.name == "position" else "closed loop"
     at = ["no frequency in the band" if hz is None else f"{hz:.4g} Hz" for hz in (corner, lag)]
     words = f"{title}, {what}: −3 dB at {at[0]}, −90° at {at[1]}."
@@ -171,9 +164,8 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
             (at,) = response_at(system, np.array([closest]))
             panel.curve([-1.0, at.real], [0.0, at.imag], width=1.3, **look)
             panel.points([at.real], [at.imag], marker="D", size=6.0, **look)
-    for m in margins.gain_margins:
-        if m.ratio > 0:
-            panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=ORANGE, size=6.0, read=False)
+    for m in (one for one in margins.gain_margins if one.ratio > 0):
+        panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=ORANGE, size=6.0, read=False)
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     for point in response_at(system, np.array(phases)) if phases else ():
         panel.points([point.real], [point.imag], colour=GREEN, size=6.5, read=False)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
@@ -16,11 +16,18 @@ from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
-from reports.sections.names import FORMS, LOOPS, figure_column, hertz, load_unit, loop_words, unit_words
+from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
 
+if TYPE_CHECKING:
+    from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
+
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
-EVIDENCE_STATUS: dict[str, doc.Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
+EVIDENCE: dict[str, doc.State] = {
+    "certified": {"text": "certified", "status": "pass"},
+    "checked": {"text": "checked", "status": "info"},
+    "withheld": {"text": "withheld", "status": "warn"},
+}
 MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
@@ -39,33 +46,24 @@ def _figure(quantity: str, key: str, format: str) -> doc.Shown:
     return figure_column(quantity, key, format=format), doc.of(of.reader, key, "", scale=of.shown[1])[1]
 
 
-def _at(name: str) -> Callable[[LoopFigures], float | None]:
-    return lambda figures: hertz(getattr(getattr(figures.margins, name), "frequency_rad_s", None))
-
-
 def _state(figures: LoopFigures) -> doc.State:
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
     return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
 
 
-def _evidence(figures: LoopFigures) -> doc.State:
-    return {"text": figures.margins.evidence, "status": EVIDENCE_STATUS[figures.margins.evidence]}
-
-
 def _samples(figures: LoopFigures) -> float | None:
-    delay = figures.margins.delay_margin
-    return delay.samples if delay and figures.margins.stable else None
+    return getattr(figures.margins.delay_margin, "samples", None) if figures.margins.stable else None
 
 
 HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
-    doc.of(_evidence, "evidence", "Margins are"),
+    doc.of(lambda figures: EVIDENCE[figures.margins.evidence], "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
-    doc.of(_at("gain_margin"), "gain_margin_hz", "at", **HERTZ),
+    doc.of("margins.gain_margin.frequency_hz", "gain_margin_hz", "at", **HERTZ),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
-    doc.of(_at("phase_margin"), "crossover_hz", "at", **HERTZ),
+    doc.of("margins.phase_margin.frequency_hz", "crossover_hz", "at", **HERTZ),
     _figure("delay_margin", "delay_margin_ms", "ms:3"),
     doc.of(_samples, "delay_margin_samples", "", "samples", format="sig:3", better=1),
     _figure("modulus_margin", "modulus_margin", "fix:3"),
@@ -87,15 +85,15 @@ LOOP = doc.column("loop", "Loop")
 MARGIN_COLUMNS = [LOOP, *(column for column, _ in MARGINS)]
 RESPONSE_COLUMNS = [LOOP, *(column for column, _ in RESPONSES)]
 CROSSING_COLUMNS = [
-    LOOP,
-    doc.column("kind", "Crossing"),
-    doc.column("value", "Margin", format="sig:5"),
-    doc.column("unit", "Unit"),
-    doc.column("rad_s", "at", "rad/s", format="sig:5"),
-    doc.column("hz", "at", "Hz", format="sig:4"),
-    figure_column("delay_margin", "delay_ms", format="ms:4"),
-    doc.column("samples", "", "samples", format="sig:4"),
-    doc.column("note", "Remark"),
+    doc.of("loop", "loop", "Loop"),
+    doc.of("kind", "kind", "Crossing"),
+    doc.of(lambda one: finite(one.value), "value", "Margin", format="sig:5"),
+    doc.of("unit", "unit", "Unit"),
+    doc.of(lambda one: finite(one.at.frequency_rad_s), "rad_s", "at", "rad/s", format="sig:5"),
+    doc.of(lambda one: finite(one.at.frequency_hz), "hz", "at", "Hz", format="sig:4"),
+    (figure_column("delay_margin", "delay_ms", format="ms:4"), doc.of("delay.seconds", "", "", scale=1e3)[1]),
+    doc.of("delay.samples", "samples", "", "samples", format="sig:4"),
+    doc.of("note", "note", "Remark"),
 ]
 
 
@@ -104,28 +102,26 @@ def section(result: Margins) -> list[doc.Section]:
     judged, known = requirements.section(result.requirements, load_unit(result.design)), _named(result)
     how = f"{FORMS[result.asked.form].capitalize()}; {_where(result)}. "
     made = _loops(known, result.operating_points, how)
-    made["blocks"] += [doc.text(note) for note in _notes(result, known)]
+    made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
     said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
-    said += _below_custom(result)
-    return [{**made, "result": said}, judged]
+    return [{**made, "result": said + _below_custom(result)}, judged]
 
 
 def brief(result: Margins) -> Brief:
-    first, judged = section(result)
-    known = _named(result)
+    (first, judged), known = section(result), _named(result)
     every, own = with_held(known), with_own_margins(with_held(known))
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
-    crossings = [crossing_table(own)] if max(counts, default=0) > 2 else []
+    more, told = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
     if result.measured is not None:
-        crossings += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
-    told = [] if result.measured is None else [measured.words(result.measured)]
+        more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
+        told.append(measured.words(result.measured))
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [SideBySide(head, tables), *crossings, *judged["blocks"]], notes)
+    return Brief(first["result"], [SideBySide(head, tables), *more, *judged["blocks"]], notes)
 
 
 def _named(result: Margins) -> dict[str, LoopFigures]:
@@ -138,10 +134,10 @@ def _below_custom(result: Margins) -> str:
     low = []
     for name, one in result.loops.items():
         for quantity, value in figures_of(one.judged.margins).items() if one.sound else ():
-            if value < CUSTOMARY[quantity]:
-                of, unit = QUANTITIES[quantity], f" {unit_words(QUANTITIES[quantity].unit)}".rstrip()
-                words = f"{of.words} {value:.3g}{unit} (of {CUSTOMARY[quantity]:g}{unit})"
-                low.append(f"{LOOPS[name].lower()}, {words}")
+            if value < (usual := CUSTOMARY[quantity]):
+                of = QUANTITIES[quantity]
+                unit = f" {unit_words(of.unit)}".rstrip()
+                low.append(f"{LOOPS[name].lower()}, {of.words} {value:.3g}{unit} (of {usual:g}{unit})")
     return f" Below what is customary: {'; '.join(low)}." if low and not result.requirements else ""
 
 
@@ -159,8 +155,11 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
     for words, sound in (("not stable", False), ("stability not known", None)):
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
-    apart = [(label, one.loop.name) for label, one in named.items() if one.held is not None]
-    held = [f"{label} with the {HELD[name]} (by itself, {OPEN[name]}, {AWAY})" for label, name in apart]
+    held = [
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
+        for label, one in named.items()
+        if one.held is not None
+    ]
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
 
 
@@ -177,16 +176,13 @@ def _elsewhere(result: Margins) -> str:
 def _cogging(result: Margins) -> str:
     """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
     away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
-    unstable = any(one.sound is False for one in result.loops.values())
     words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
-    return words if unstable and away else ""
+    return words * (away and any(one.sound is False for one in result.loops.values()))
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
-    """Make the section from the figures of the sampled, sliding loops, and those of the operating points."""
     how = "Sampled form: exact hold and computing delay, no approximation; sliding friction. "
-    made = _loops({LOOPS[name]: one for name, one in figures.items()}, points, how)
-    return {**made, "result": result(figures)}
+    return {**_loops({LOOPS[n]: one for n, one in figures.items()}, points, how), "result": result(figures)}
 
 
 def _loops(
@@ -216,7 +212,6 @@ def _loops(
 
 
 def result(figures: Mapping[str, LoopFigures]) -> str:
-    """Say whether all loops are stable, and which has the smallest margins."""
     doubts = [
         f"{words}: {', '.join(names)}."
         for words, sound in (("Not stable", False), ("Not known to be stable", None))
@@ -241,12 +236,11 @@ def result(figures: Mapping[str, LoopFigures]) -> str:
 
 def evidence_words(figures: Mapping[str, LoopFigures]) -> str:
     """Say how the margins of some loops are known: "certified", or which of them are not."""
-    others: dict[str, list[str]] = {}
+    kinds: dict[str, list[str]] = {}
     for name, one in figures.items():
-        others.setdefault(one.margins.evidence, []).append(LOOPS.get(name, name).lower())
-    if len(others) == 1:
-        return next(iter(others))
-    return ", ".join(f"{' and '.join(names)} {evidence}" for evidence, names in others.items())
+        kinds.setdefault(one.margins.evidence, []).append(LOOPS[name].lower())
+    said = (f"{' and '.join(names)} {kind}" if len(kinds) > 1 else kind for kind, names in kinds.items())
+    return ", ".join(said)
 
 
 def evidence_notes(named: Mapping[str, LoopFigures]) -> list[str]:
@@ -260,7 +254,7 @@ def margin_table(named: Mapping[str, LoopFigures]) -> doc.Block:
         "to 0°; all of them are listed below. A dash means that there is no such crossing, or that the loop "
         "is not stable and has no margins. Disk margin: α, balanced (S + T)."
     )
-    rows = [{"loop": name, **margin_row(loop_figures)} for name, loop_figures in named.items()]
+    rows = [{"loop": name, **margin_row(one)} for name, one in named.items()]
     note += DOWNWARDS if any((row["gain_margin_db"] or 0.0) < 0.0 for row in rows) else ""
     return doc.table("Stability margins", MARGIN_COLUMNS, rows, note)
 
@@ -272,12 +266,12 @@ def response_table(named: Mapping[str, LoopFigures]) -> doc.Block:
         "the output shaft, with what the drive has of feed-forward, jerk limit and filter of the command; to "
         "the reference: behind profile and filter."
     )
-    rows = [{"loop": name, **response_row(loop_figures)} for name, loop_figures in named.items()]
-    note += NONE_THERE if any(None in row.values() for row in rows) else ""
+    rows = [{"loop": name, **response_row(one)} for name, one in named.items()]
+    if any(None in row.values() for row in rows):
+        note += " A dash: the response never falls or peaks so far, or the loop is not stable."
     return doc.table("Closed-loop bandwidth, resonance and step", RESPONSE_COLUMNS, rows, note)
 
 
-NONE_THERE = " A dash: the response never falls or peaks so far, or the loop is not stable."
 SPREAD_COLUMNS = [
     LOOP,
     doc.column("gain", "Gain margin, operating points", "dB"),
@@ -286,7 +280,6 @@ SPREAD_COLUMNS = [
 
 
 def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, LoopFigures]) -> doc.Block:
-    """Make the table of the least and largest margins over the operating points that the drive has."""
     seen = [point for point in points if point.kind != "describing-function"]
     places = "; ".join(dict.fromkeys(point.place or "sliding" for point in seen))
     ranges, rows = spread(seen), list[doc.Row]()
@@ -314,9 +307,32 @@ def range_words(range_: Spread, quantity: str) -> str:
     return least if least == most else f"{least} ({range_.where}) to {most}"
 
 
+class _Crossing(NamedTuple):
+    loop: str
+    kind: str
+    value: float
+    unit: str
+    at: GainMargin | PhaseMargin
+    note: str
+    delay: DelayMargin | None = None
+
+
 def crossing_table(named: Mapping[str, LoopFigures]) -> doc.Block:
-    rows = [row for name, loop_figures in named.items() for row in _crossings(name, loop_figures)]
-    return doc.table("Every gain and phase crossover", CROSSING_COLUMNS, rows)
+    found, touches = list[_Crossing](), "touches, does not cross"
+    for name, m in ((name, one.margins) for name, one in named.items()):
+        for gain in m.gain_margins:
+            note = f"{'upper' if gain.ratio >= 1.0 else 'lower'} limit of the gain"
+            note += f", {touches}" * gain.tangent
+            found.append(_Crossing(name, "phase crossover", gain.db, "dB", gain, note))
+        delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
+        for phase in m.phase_margins:
+            more = touches * phase.tangent, delays.get(phase.frequency_rad_s)
+            found.append(_Crossing(name, "gain crossover", phase.deg, "deg", phase, *more))
+    loops = {words: key for key, title in LOOPS.items() for words in (title, loop_words(key))}
+    return doc.listing(
+        "Every gain and phase crossover", found, CROSSING_COLUMNS,
+        more=lambda one: {"_loop": loops.get(one.loop, ""), "_hz": finite(one.at.frequency_hz) or None},
+    )  # fmt: skip
 
 
 def margin_row(figures: LoopFigures) -> Tree:
@@ -338,10 +354,8 @@ def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
     for label, figures in named.items():
         free = figures.loop.name == "current" and (figures.locked or figures.held)
         every[f"{label}, rotor free" if free else label] = figures
-        if free:
-            every[f"{label}, rotor locked"] = free
-        elif figures.held is not None:
-            every[f"{label}, {HELD[figures.loop.name]}"] = figures.held
+        if other := free or figures.held:
+            every[f"{label}, {'rotor locked' if free else HELD[figures.loop.name]}"] = other
         if figures.reference is not None:
             every[f"{label}, to the reference"] = figures.reference
     return every
@@ -369,30 +383,8 @@ def response_row(figures: LoopFigures) -> Tree:
 
 def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
-    value = None if figures.margins.stable is False else quantity.raw(figures)
-    return times(value, quantity.shown[1])
-
-
-def _crossings(name: str, figures: LoopFigures) -> list[doc.Row]:
-    m, touches = figures.margins, "touches, does not cross"
-    rows: list[doc.Row] = []
-    for gain in m.gain_margins:
-        note = f"{'upper' if gain.ratio >= 1.0 else 'lower'} limit of the gain{f', {touches}' * gain.tangent}"
-        rows.append(_crossing(name, "phase crossover", gain.db, "dB", gain.frequency_rad_s) | {"note": note})
-    delays = {margin.frequency_rad_s: margin for margin in m.delay_margins}
-    for phase in m.phase_margins:
-        delay = delays.get(phase.frequency_rad_s)
-        more: doc.Row = {"delay_ms": delay.seconds * 1e3, "samples": delay.samples} if delay else {}
-        more["note"] = touches if phase.tangent else ""
-        rows.append(_crossing(name, "gain crossover", phase.deg, "deg", phase.frequency_rad_s) | more)
-    return rows
-
-
-def _crossing(name: str, kind: str, value: float, unit: str, omega_rad_s: float) -> doc.Row:
-    hz = finite(hertz(omega_rad_s))
-    loop = next((key for key in LOOPS if name in (LOOPS[key], loop_words(key))), "")
-    row = {"_loop": loop, "_hz": hz or None, "loop": name, "kind": kind, "value": finite(value), "unit": unit}
-    return {**row, "delay_ms": None, "samples": None, "rad_s": finite(omega_rad_s), "hz": hz}
+    value = None if figures.margins.stable is False else finite(quantity.raw(figures))
+    return None if value is None else value * quantity.shown[1]
 
 
 def worst_status(stable: Iterable[bool | None]) -> doc.Status:
@@ -403,8 +395,3 @@ def worst_status(stable: Iterable[bool | None]) -> doc.Status:
 
 def finite(value: float | None) -> float | None:
     return None if value is None or not math.isfinite(value) else float(value)
-
-
-def times(value: float | None, factor: float) -> float | None:
-    known = finite(value)
-    return None if known is None else known * factor

@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 
 def words(one: Measured) -> str:
-    """Say within what the model explains the measurement."""
     db, deg = np.abs(one.difference_db), np.abs(one.difference_deg)
     ends = f"{db.max():.2f} dB (at {one.frequency_hz[db.argmax()]:.4g} Hz) and {deg.max():.1f} deg"
     told = f"The model explains the measurement within {ends} (at {one.frequency_hz[deg.argmax()]:.4g} Hz)"
@@ -37,7 +36,6 @@ def section(one: Measured) -> doc.Section:
 
 
 def blocks(one: Measured) -> list[doc.Block]:
-    """Give verdict, margins, differences and charts."""
     made = [doc.text(words(one))]
     if one.margins is not None:
         made.append(_margins(one.margins))
@@ -62,44 +60,36 @@ def differences(one: Measured) -> doc.Block:
 
 def _margins(of: StabilityMargins) -> doc.Block:
     """Each margin of the measured loop with its range, where the points tell one."""
-    columns = [
-        doc.column("kind", "Measured margin"),
-        doc.column("value", "Value", format="sig:4"),
-        doc.column("low", "from", format="sig:4"),
-        doc.column("high", "to", format="sig:4"),
-        doc.column("unit", "Unit"),
-        doc.column("hz", "at", "Hz", format="sig:4"),
-    ]
-    none = (None, None)
     gains = [(m.db, m.ratio_range and 20.0 * np.log10(m.ratio_range), m) for m in of.gain_margins]
     found: list[tuple[str, float | None, Any, str, float | None]]
     found = [("Gain margin", db, range_, "dB", m.frequency_rad_s) for db, range_, m in gains]
     found += [("Phase margin", m.deg, m.deg_range, "deg", m.frequency_rad_s) for m in of.phase_margins]
     modulus = of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s
     found.append(("Modulus margin", *modulus))
-    rows = [
-        (kind, value, *(none if range_ is None else range_), unit, hertz(omega))
-        for kind, value, range_, unit, omega in found
+    columns = [
+        doc.of(lambda one: one[0], "kind", "Measured margin"),
+        doc.of(lambda one: one[1], "value", "Value", format="sig:4"),
+        doc.of(lambda one: None if one[2] is None else one[2][0], "low", "from", format="sig:4"),
+        doc.of(lambda one: None if one[2] is None else one[2][1], "high", "to", format="sig:4"),
+        doc.of(lambda one: one[3], "unit", "Unit"),
+        doc.of(lambda one: hertz(one[4]), "hz", "at", "Hz", format="sig:4"),
     ]
-    return doc.table("Margins of the measured loop", columns, rows)
+    return doc.listing("Margins of the measured loop", found, columns)
 
 
 def _bode(one: Measured) -> doc.Block:
     chart = style.Chart(width=style.WIDE, height=410.0)
     top, bottom = chart.column(1.15, 1.0)
-    top.x.log = bottom.x.log = True
     f, reach = one.frequency_hz, np.minimum(one.radius / np.abs(one.measured), 0.999)
     found, model = decibels_and_degrees(one.measured, one.model)
-    ends = 20.0 * np.log10(1.0 - reach), 20.0 * np.log10(1.0 + reach)
     around = np.degrees(np.arcsin(reach))
-    spread = (ends, (-around, around))
+    spread = ((20.0 * np.log10(1.0 - reach), 20.0 * np.log10(1.0 + reach)), (-around, around))
+    style.bode_axes(top, bottom, [*found[1], *model[1]])
     for panel, y, fitted, (low, high) in zip((top, bottom), found, model, spread, strict=True):
         panel.points(f, y, "measured", colour=style.BLUE)
         ring = np.concatenate([f, f[::-1]]), np.concatenate([y + low, (y + high)[::-1]])
         panel.shape([ring], "99 % of the measurement", colour=style.BLUE, opacity=0.15)
         panel.curve(f, fitted, "model", **style.series(1))
-    top.y.label, bottom.y.label, bottom.x.label = "magnitude, dB", "phase, deg", "frequency, Hz"
-    style.phase_axis(bottom, [*found[1], *model[1]])
     caption = f"{one.name}: measured {_place(one)} with its spread, and the model"
     return doc.figure("measured", chart, caption, alt="Measured and modelled open loop over frequency")
 
@@ -114,16 +104,12 @@ def decibels_and_degrees(
 
 
 def _nyquist(one: Measured) -> doc.Block:
-    chart = style.Chart(width=style.HALF, height=430.0)
+    chart, L = style.Chart(width=style.HALF, height=430.0), one.measured
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
-    turn = np.exp(2j * np.pi * np.arange(25) / 24)
-    rings = [
-        z + r * turn for z, r in zip(one.measured, one.radius, strict=True) if abs(z + 1.0) < 4.0 and r > 0.0
-    ]
-    if rings:
+    near = [(z, r) for z, r in zip(L, one.radius, strict=True) if abs(z + 1.0) < 4.0 and r > 0.0]
+    if rings := [z + r * style.TURN[::3] for z, r in near]:
         panel.shape([(ring.real, ring.imag) for ring in rings], "spread", colour=style.BLUE, opacity=0.15)
-    L = one.measured
     panel.points(L.real, L.imag, "measured", colour=style.BLUE, parameter=one.frequency_hz)
     panel.curve(one.model.real, one.model.imag, "model", parameter=one.frequency_hz, **style.series(1))
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)

@@ -29,15 +29,11 @@ def section(result: MonteCarloResult) -> doc.Section:
         id = f"tolerance/{one.id}"
         items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
     blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
-    if result.odds:
-        blocks.append(_odds_table(result))
-        blocks += _figures(result)
-    if result.drivers:
-        blocks.append(_driver_table(result))
+    blocks += [_odds_table(result), *_figures(result)] if result.odds else []
+    blocks += [_driver_table(result)] if result.drivers else []
     blocks.append(_figure_table(result.columns.values()))
-    if result.worst:
-        blocks.append(doc.details("Parameters of the worst cases", [_worst_table(result)]))
-    blocks += [doc.remark(note) for note in result.notes]
+    blocks += [doc.details("Parameters of the worst cases", [_worst_table(result)])] if result.worst else []
+    blocks += map(doc.remark, result.notes)
     blocks.append(doc.facts([doc.fact("Samples", result.samples), doc.fact("Seed", result.seed)]))
     blocks.append(doc.remark(f"Parameters that vary: {', '.join(result.paths)}."))
     intro = (
@@ -66,12 +62,12 @@ def _result(result: MonteCarloResult) -> str:
         said = words if result.left_out else "The design states no requirement"
         return f"{said}; {result.samples} samples were drawn."
     words += f"; {every.passed} of {every.count} samples meet every one"
-    words += " that is sampled" if result.left_out else ""
+    words += " that is sampled" * bool(result.left_out)
     weakest = min(each.values(), key=lambda odds: odds.probability, default=None)
-    if weakest is None or weakest.probability == 1.0:
-        return f"{words}."
-    share = f"{100.0 * weakest.probability:.3g} % meet it"
-    return f"{words}; the one missed most often is {weakest.label} ({share})."
+    if weakest is not None and weakest.probability < 1.0:
+        share = f"{100.0 * weakest.probability:.3g} % meet it"
+        words += f"; the one missed most often is {weakest.label} ({share})"
+    return f"{words}."
 
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
@@ -150,16 +146,9 @@ def _words(name: str) -> str:
 
 
 def _figures(result: MonteCarloResult) -> list[doc.Block]:
-    """Draw the distribution behind every requirement, at most three a figure, in rows of like length."""
-    shown = [
-        (odds, result.columns[name])
-        for odds in result.odds
-        if odds.id != "all"
-        for name in odds.columns
-        if len(result.columns[name].counts) >= 2  # the same in every sample: nothing to draw
-    ]
-    blocks = []
-    rows = -(-len(shown) // 3)
+    shown = [(odds, result.columns[n]) for odds in result.odds if odds.id != "all" for n in odds.columns]
+    shown = [pair for pair in shown if len(pair[1].counts) >= 2]  # the same in every sample: nothing to draw
+    blocks, rows = [], -(-len(shown) // 3)
     for row in range(rows):
         part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
         chart = style.Chart(width=style.WIDE, height=250.0, legend=True)
@@ -200,22 +189,22 @@ def _driver_table(result: MonteCarloResult) -> doc.Block:
     strongest: dict[str, list[Driver]] = {}
     for one in (each for each in result.drivers if each.swing != 0.0):
         strongest.setdefault(one.column, []).append(one)
-    places = [("first", "Driven most by"), ("second", "then by"), ("third", "then by")]
+
+    def driver(place: int, item: tuple[str, list[Driver]]) -> str:
+        if place >= len(item[1]):
+            return ""
+        one = item[1][place]
+        told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
+        return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
+
+    places = enumerate((("first", "Driven most by"), ("second", "then by"), ("third", "then by")))
     columns = [
         doc.of(lambda item: _words(item[0]), "figure", "Figure"),
-        *(doc.of(partial(_driver, k), key, label) for k, (key, label) in enumerate(places)),
+        *(doc.of(partial(driver, k), key, label) for k, (key, label) in places),
         doc.of(lambda item: unit_words(result.columns[item[0]].unit), "unit", "Unit"),
     ]
     note = "The figure with that parameter alone at the low and the high end of its tolerance."
     return doc.listing("Which tolerance drives which figure", strongest.items(), columns, note)
-
-
-def _driver(place: int, item: tuple[str, list[Driver]]) -> str:
-    if place >= len(item[1]):
-        return ""
-    one = item[1][place]
-    told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
-    return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
 
 
 def _worst_table(result: MonteCarloResult) -> doc.Block:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import QUANTITIES as REGISTRY
 from actuator_lti.design.model import Design
@@ -29,19 +30,46 @@ def figure_column(quantity: str, key: str, *, format: str, label: str = "") -> d
     return doc.column(key, label or of.heading, of.shown[0], format=format, better=of.direction)
 
 
-def output_unit(axis: str) -> tuple[float, str]:
-    """Scale and unit of a position at the output: degrees, or millimetres on a linear axis."""
-    return (1e3, "mm") if axis == "linear" else (math.degrees(1.0), "deg")
+class Unit(NamedTuple):
+    """A unit in which amounts are shown, and the factor to it from SI."""
+
+    scale: float
+    unit: str
+
+    def of(self, value: float, digits: int = 3) -> str:
+        """Write an amount in SI with its unit."""
+        return f"{self.scale * value:.{digits}g} {self.unit}"
+
+    def per(self, what: str) -> Unit:
+        return Unit(self.scale, f"{self.unit}/{what}")
+
+    def column(self, format: str = "sig:3", **more: Any) -> dict[str, Any]:
+        """What `reports.document.of` has to know of a column in it."""
+        return {**self._asdict(), "format": format, **more}
 
 
-def fine_unit(axis: str) -> tuple[float, str]:
+def output_unit(axis: str) -> Unit:
+    """Unit of a position at the output: degrees, or millimetres on a linear axis."""
+    return Unit(1e3, "mm") if axis == "linear" else Unit(math.degrees(1.0), "deg")
+
+
+def fine_unit(axis: str) -> Unit:
     """The same a thousand times finer."""
     scale, unit = output_unit(axis)
-    return 1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit]
+    return Unit(1e3 * scale, {"deg": "mdeg", "mm": "µm"}[unit])
+
+
+def speed_unit(axis: str) -> str:
+    """Unit of the motor's speed, or of the axis' own."""
+    return "m/s" if axis == "linear" else "rad/s"
 
 
 def load_unit(design: Design) -> str:
     return "N" if design.axis == "linear" else "N m"
+
+
+def push_words(design: Design) -> str:
+    return "force" if design.axis == "linear" else "torque"
 
 
 def unit_words(unit: str) -> str:

@@ -40,8 +40,8 @@ def section(design: Design, warnings: Sequence[str] = ()) -> doc.Section:
     assumed = sum("X" in item.grade for item in parameters)
     blocks: list[doc.Block] = [_derived(design)]
     if warnings:
-        rows = [{"warning": warning, "_status": "warn"} for warning in warnings]
-        blocks.append(doc.table("To be checked", [doc.column("warning", "Warning")], rows))
+        column = doc.of(str, "warning", "Warning")
+        blocks.append(doc.listing("To be checked", warnings, [column], status=lambda _: "warn"))
     if parameters:
         blocks.append(doc.listing("Values of the design file", parameters, COLUMNS))
     if design.facts:
@@ -92,7 +92,6 @@ def tolerance_words(item: Parameter) -> str:
 def provenance(
     design: Mapping[str, Any], head: Mapping[str, Any], findings: Sequence[doc.Finding] = ()
 ) -> doc.Section:
-    """Make the section of provenance from the document's own head."""
     rows = {
         "design": f"{design['name']}, revision {design['revision'] or 'none'}",
         "design file": design["origin"] or "none",

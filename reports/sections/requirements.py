@@ -17,18 +17,15 @@ if TYPE_CHECKING:
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
+    id, title = "verdicts", "Requirements"
     if not verdicts:
-        none = "The design states no requirements."
-        return doc.section("verdicts", "Requirements", [], result=none, status="info")
+        return doc.section(id, title, [], result="The design states no requirements.")
     intro = (
         "Requirements of the design file, judged on the sampled loops with sliding friction. "
         "Distance is what is left to the limit, negative where it is missed."
     )
-    items = [item(verdict, load_unit) for verdict in verdicts]
-    status: doc.Status = tally(verdicts).role
-    return doc.section(
-        "verdicts", "Requirements", [doc.verdicts(items)], result=result(verdicts), intro=intro, status=status
-    )
+    blocks, status = [doc.verdicts(item(one, load_unit) for one in verdicts)], tally(verdicts).role
+    return doc.section(id, title, blocks, result=result(verdicts), intro=intro, status=status)
 
 
 def result(verdicts: Sequence[RequirementVerdict]) -> str:

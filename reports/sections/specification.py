@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.model import Design
 from analyses.specification import Specification
 from analyses.specification.capability import Manoeuvre
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant
 from reports.sections.limits import words_of
-from reports.sections.names import load_unit, output_unit
+from reports.sections.names import Unit, load_unit, output_unit
 
 ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {
@@ -32,18 +30,24 @@ def section(result: Specification) -> doc.Section:
         "Closed form and simulation side by side, behind the profile of the command; manoeuvres and steps "
         "with it. Output side unless a column says motor."
     )
-    words, told = _result(result), _findings(result)
+    words, told = _result(result), list[doc.Finding]()
+    for one in result.capabilities:
+        if one.duty is not None and one.duty < 0.995:
+            load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
+            text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
+            told.append(doc.Finding(severity="warn", text=text, where="specification"))
     return doc.section("specification", "Actuator figures", blocks, result=words, intro=intro, findings=told)
 
 
 def _result(result: Specification) -> str:
-    scale, unit = output_unit(result.design.axis)
     one = max(result.capabilities, key=lambda one: one.figures.load_Nm, default=None)
     if one is None:
         return ""
+    scale, unit = output_unit(result.design.axis)
+    rate, push, limits = f"{unit}/s", f"{unit}/s²", result.design.command
     both = (
-        (one.figures.output_rate_rad_s, one.simulated_rate_rad_s, f"{unit}/s"),
-        (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, f"{unit}/s²"),
+        (one.figures.output_rate_rad_s, one.simulated_rate_rad_s, rate),
+        (one.figures.acceleration_rad_s2, one.simulated_acceleration_rad_s2, push),
     )
     parts = []
     for value, found, per in both:
@@ -52,31 +56,15 @@ def _result(result: Specification) -> str:
             also = f" (simulated {significant(scale * found)})" if found is not None and unlike else ""
             parts.append(f"{significant(scale * value)} {per}{also}")
     load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
-    return f"At {load} load the output reaches {' and '.join(parts)}.{_commanded(result.design)}"
-
-
-def _commanded(design: Design) -> str:
-    scale, unit = output_unit(design.axis)
-    limits = ((design.command.rate_rad_s, f"{unit}/s"), (design.command.acceleration_rad_s2, f"{unit}/s²"))
-    parts = [f"{significant(scale * value)} {per}" for value, per in limits if math.isfinite(value)]
-    return f" The profile of its command asks for at most {' and '.join(parts)}." if parts else ""
-
-
-def _findings(result: Specification) -> list[doc.Finding]:
-    made = []
-    for one in result.capabilities:
-        if one.duty is not None and one.duty < 0.995:
-            load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
-            text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
-            made.append(doc.Finding(severity="warn", text=text, where="specification"))
-    return made
+    words = f"At {load} load the output reaches {' and '.join(parts)}."
+    asked = ((limits.rate_rad_s, rate), (limits.acceleration_rad_s2, push))
+    most = [f"{significant(scale * value)} {per}" for value, per in asked if math.isfinite(value)]
+    return words + f" The profile of its command asks for at most {' and '.join(most)}." * bool(most)
 
 
 def _capability_table(result: Specification) -> doc.Block:
-    scale, unit = output_unit(result.design.axis)
-    rate: dict[str, Any] = {"unit": f"{unit}/s", "scale": scale, "format": "sig:4"}
-    push: dict[str, Any] = {"unit": f"{unit}/s²", "scale": scale, "format": "sig:4"}
-    share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "sig:3"}
+    out, share = output_unit(result.design.axis), Unit(100.0, "%").column()
+    rate, push = out.per("s").column("sig:4"), out.per("s²").column("sig:4")
     columns = [
         doc.of("figures.load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
         doc.of("figures.output_rate_rad_s", "rate", "Rate", **rate, better=1),
@@ -85,6 +73,10 @@ def _capability_table(result: Specification) -> doc.Block:
         doc.of("figures.acceleration_rad_s2", "push", "Acceleration", **push, better=1),
         doc.of("simulated_acceleration_rad_s2", "push_seen", "Simulated", **push),
     ]
+    note = (
+        "Acceleration in closed form is that of the largest torque from rest, at most the acceleration "
+        "limit; simulated, the mean over a tenth of the run-up, where controllers lag and overshoot."
+    )
     if result.design.motor.has_electrical_dynamics:
         at_rate = "Motor current at that rate"
         columns += [
@@ -93,11 +85,6 @@ def _capability_table(result: Specification) -> doc.Block:
             doc.of("current_ratio", "ratio", "of continuous", **share),
             doc.of("duty", "duty", "Duty", **share),
         ]
-    note = (
-        "Acceleration in closed form is that of the largest torque from rest, at most the acceleration "
-        "limit; simulated, the mean over a tenth of the run-up, where controllers lag and overshoot."
-    )
-    if result.design.motor.has_electrical_dynamics:
         note += " Duty is the share of the time that keeps the rms current at the continuous one."
     return doc.listing("Rate, acceleration and current at each load", result.capabilities, columns, note)
 
@@ -163,7 +150,7 @@ def _bound(
         panel.note(name, (float(speed[k]), float(torque[k])), colour=look["colour"])
 
 
-def _fastest(result: Specification, moves: list[Any]) -> float:
+def _fastest(result: Specification, moves: list[Manoeuvre]) -> float:
     """Speed that the frame must show: the bounds in reach, and the paths."""
     highest = max((float(np.max(np.abs(move.speed_rad_s))) for move in moves), default=1.0)
     bounds = {c.name: c.speed_rad_s for c in result.plane.bounds}
@@ -173,29 +160,26 @@ def _fastest(result: Specification, moves: list[Any]) -> float:
 
 
 def _manoeuvre_table(result: Specification) -> doc.Block:
-    columns = [
-        doc.of("name", "name", "Manoeuvre"),
-        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
-    ]
-    if result.design.motor.has_electrical_dynamics:
-        columns += [
-            doc.of("rms_current_A", "rms", "Current, rms", "A", format="sig:3"),
-            doc.of("peak_current_A", "peak", "peak", "A", format="sig:3"),
-            doc.of("duty", "duty", "Duty", "%", scale=100.0, format="sig:3"),
-        ]
-    else:
-        columns += [
-            doc.of("rms_torque_Nm", "rms_force", "Force, rms", "N", format="sig:3"),
-            doc.of("peak_torque_Nm", "peak_force", "peak", "N", format="sig:3"),
-        ]
-
     def limits(move: Manoeuvre) -> str:
         parts = [f"{words_of(name)} {short(100.0 * share, 2)} %" for name, share in move.limits.items()]
         return ", ".join(parts) or "none"
 
-    columns.append(doc.of(limits, "limits", "Limits that act"))
-    scale, unit = output_unit(result.design.axis)
-    full = f"{scale * result.design.validation.full_deflection_rad:.3g} {unit}"
+    of_current = [
+        doc.of("rms_current_A", "rms", "Current, rms", "A", format="sig:3"),
+        doc.of("peak_current_A", "peak", "peak", "A", format="sig:3"),
+        doc.of("duty", "duty", "Duty", "%", scale=100.0, format="sig:3"),
+    ]
+    of_force = [
+        doc.of("rms_torque_Nm", "rms_force", "Force, rms", "N", format="sig:3"),
+        doc.of("peak_torque_Nm", "peak_force", "peak", "N", format="sig:3"),
+    ]
+    columns = [
+        doc.of("name", "name", "Manoeuvre"),
+        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        *(of_current if result.design.motor.has_electrical_dynamics else of_force),
+        doc.of(limits, "limits", "Limits that act"),
+    ]
+    full = output_unit(result.design.axis).of(result.design.validation.full_deflection_rad)
     return doc.listing(f"Standard manoeuvres at {full}", result.manoeuvres, columns)
 
 

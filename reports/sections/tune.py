@@ -44,20 +44,17 @@ def summary(result: TuningResult) -> str:
         if not missed:
             return f"The search meets every requirement over {over}; certified margins do not confirm it."
         return f"No gains meet every requirement over {over}. The best compromise misses {missed}."
-    words = [f"Every requirement is met over {over}."]
-    if result.placed:
-        words.append(f"Gains alone do not do; added: {', '.join(result.placed)}.")
-    binding = [r for r in result.requirements if r.binds]
-    names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
+    words = f"Every requirement is met over {over}"
+    placed = f" Gains alone do not do; added: {', '.join(result.placed)}." if result.placed else ""
+    names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in result.requirements if r.binds)
     if result.aim == "least-change":
         if not changed(result):
-            return f"{words[0]} Nothing needs to change."
-        words += [f"This is the least change that does; binding: {names}."] if binding else []
-    elif binding:
-        words.append(f"Nothing better is possible because of {names}.")
-    else:
-        words[0] = f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
-    return " ".join(words)
+            return f"{words}. Nothing needs to change."
+        binding = f" This is the least change that does; binding: {names}." if names else ""
+        return f"{words}.{placed}{binding}"
+    if names:
+        return f"{words}.{placed} Nothing better is possible because of {names}."
+    return f"{words}, each with 30 % or more to spare; none binds.{placed}"
 
 
 def changed(result: TuningResult) -> bool:
@@ -112,10 +109,10 @@ def confirmed(result: TuningResult) -> doc.Block:
 
 
 def _curve(result: TuningResult) -> doc.Block:
-    limits = {(r.id, r.unit): r.limit for r in result.requirements}
+    limits = {(r.id, r.unit) for r in result.requirements}
     wanted = [q for q in result.before.requirements if (q.id, q.unit) in limits]
     width = [q.minimum for q in wanted if q.quantity == "bandwidth" and q.loop == "position"]
-    margin = [q.minimum for q in wanted if q.quantity == "phase_margin" and q.minimum is not None]
+    margin = style.known(q.minimum for q in wanted if q.quantity == "phase_margin")
     chart = style.Chart(width=style.WIDE, height=350.0, title="What the position loop can trade")
     panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
@@ -124,7 +121,7 @@ def _curve(result: TuningResult) -> doc.Block:
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
     ):
-        chosen = [(a, b) for a, b, p in zip(x, y, result.trade_off, strict=True) if p.feasible is ok]
+        chosen = [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]
         if chosen:
             xs, ys = zip(*chosen, strict=True)
             panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
@@ -138,10 +135,9 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
-    scale, unit = output_unit(result.design.axis)
     columns = [
         doc.of("corner", "corner", "Design"),
-        doc.of("amplitude_rad", "amplitude", "Step", unit, scale=scale, format="sig:3"),
+        doc.of("amplitude_rad", "amplitude", "Step", **output_unit(result.design.axis).column()),
         doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),

@@ -42,19 +42,14 @@ NOISE = 1e-9  # of the value: a smaller error changes with the order in which su
 
 
 def section(validation: Validation) -> list[doc.Section]:
-    made, axis = [summary(validation), *in_time.sections(validation)], validation.design.axis
-    if validation.rest_sweep is not None:
-        made += beyond.from_rest(validation.rest_sweep, axis)
-    if validation.conditional is not None:
-        made.append(beyond.large_commands(validation.conditional, axis))
-    if validation.counts:
-        made.append(beyond.counts(validation.counts, axis))
-    if validation.large_signals is not None:
-        made.append(large_signal.section(validation.large_signals))
-    if validation.friction is not None:
-        made.append(friction_effects.section(validation.friction))
-    if validation.specification is not None:
-        made.append(specification.section(validation.specification))
+    of, axis = validation, validation.design.axis
+    made = [summary(of), *in_time.sections(of)]
+    made += beyond.from_rest(of.rest_sweep, axis) if of.rest_sweep else []
+    made += [beyond.large_commands(of.conditional, axis)] if of.conditional else []
+    made += [beyond.counts(of.counts, axis)] if of.counts else []
+    made += [large_signal.section(of.large_signals)] if of.large_signals else []
+    made += [friction_effects.section(of.friction)] if of.friction else []
+    made += [specification.section(of.specification)] if of.specification else []
     return made
 
 
@@ -83,8 +78,7 @@ def _short_table(name: str, rows: Sequence[Check]) -> doc.Block:
 
 def summary(validation: Validation) -> doc.Section:
     blocks: list[doc.Block] = [doc.verdicts(verdict_items(validation), what="checks")]
-    wrong = [row for row in validation.rows if row.verdict is not Verdict.MET]
-    if wrong:
+    if wrong := _wrong(validation.rows):
         blocks.append(table(wrong, "Predictions that are not met, or not proven"))
     for name, rows in by_loop(validation.rows).items():
         blocks.append(doc.details(f"{loop_name(name)}: every prediction", [table(rows, loop_name(name))]))
@@ -95,41 +89,34 @@ def summary(validation: Validation) -> doc.Section:
         "then without dry friction and friction by load: its figures differ from those of sliding by that. "
         "What is large, starts from rest, or is shaken by counts is a finding of its own."
     )
+    words = " ".join(f"{capital(each)}." for each in validation.sentences())
     return doc.section(
-        "validation", "Predictions against simulation", blocks, result=result(validation), intro=intro,
+        "validation", "Predictions against simulation", blocks, result=words, intro=intro,
         status=validation.verdict.role(), findings=findings(validation),
     )  # fmt: skip
 
 
-def result(validation: Validation) -> str:
-    words = [validation.tally.words("predictions"), *validation.failures]
-    words += [f"stability of the {name} loop not known" for name in validation.undecided]
-    words += [validation.rest_words] if validation.rest is not Verdict.NOT_MET else []
-    return " ".join(f"{capital(each)}." for each in words if each)
+def _wrong(rows: Sequence[Check]) -> list[Check]:
+    return [row for row in rows if row.verdict is not Verdict.MET]
 
 
 def findings(validation: Validation) -> list[doc.Finding]:
-    def finding(severity: doc.Severity, text: str) -> doc.Finding:
-        return doc.Finding(severity=severity, text=text, where="validation")
-
-    made = [finding("fail", f"{loop_words(name)}: not stable.") for name in validation.unstable]
-    for row in validation.rows:
-        if row.verdict is not Verdict.MET:
-            grave = row.verdict is Verdict.NOT_MET
-            says = "is contradicted by the simulation" if grave else f"is not proven: {row.because}"
-            text = f"{loop_name(row.loop)}: {quantity_name(row)} {says}."
-            waived = validation.waived(f"{row.loop}/{row.name}")
-            made.append(finding("fail" if grave else "info" if waived else "warn", text))
+    said: list[tuple[str, str]] = []
     if validation.rest_words:
-        waived = validation.rest is Verdict.MET or waiver_of_rest(validation.design) is not None
-        grave = validation.rest is Verdict.NOT_MET
-        text = f"{capital(validation.rest_words)}."
-        made.insert(0, finding("fail" if grave else "info" if waived else "warn", text))
+        role = validation.rest.role(waived=waiver_of_rest(validation.design) is not None)
+        said.append(("info" if role == "pass" else role, f"{capital(validation.rest_words)}."))
+    said += [("fail", f"{loop_words(name)}: not stable.") for name in validation.unstable]
+    for row in _wrong(validation.rows):
+        contradicted = row.verdict is Verdict.NOT_MET
+        says = "is contradicted by the simulation" if contradicted else f"is not proven: {row.because}"
+        role = row.verdict.role(waived=validation.waived(f"{row.loop}/{row.name}"))
+        said.append((role, f"{loop_name(row.loop)}: {quantity_name(row)} {says}."))
+    made = [doc.Finding(severity=cast(doc.Severity, role), text=t, where="validation") for role, t in said]
     if validation.conditional is not None:
         made += beyond.findings_of(validation.conditional, validation.design.axis)
     if validation.design.coupling is None:
         text = "A rigid drive train is assumed: without a coupling no figure holds its resonance or play."
-        made.append(finding("info", text))
+        made.append(doc.Finding(severity="info", text=text, where="validation"))
     return made
 
 
@@ -140,8 +127,9 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
         items.append(_item("judged", "Predictions", None, "; ".join(validation.notes), value=0.0))
     for k, failure in enumerate(validation.failures):
         items.append(_item(f"drive-{k}", "Stable, and comes to rest", False, failure))
-    open_ones = [(f"stable-{name}", f"{loop_name(name)}: stable") for name in validation.undecided]
-    items += [_item(*one, None, "not known") for one in open_ones]
+    items += [
+        _item(f"stable-{n}", f"{loop_name(n)}: stable", None, "not known") for n in validation.undecided
+    ]
     if validation.rest is Verdict.NOT_PROVEN:
         waiver = waiver_of_rest(validation.design)
         item = _item("rest", "Comes to rest after a step", None, validation.rest_words)
@@ -151,8 +139,7 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
 
 def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> doc.VerdictItem:
     tally = replace(validation, rows=tuple(rows)).tally
-    wrong = [row for row in rows if row.verdict is not Verdict.MET]
-    words = [f"{quantity_name(row)}: {row.because or 'off'}" for row in wrong[:3]]
+    words = [f"{quantity_name(row)}: {row.because or 'off'}" for row in _wrong(rows)[:3]]
     share = max(row.error / (row.allowed or 1.0) for row in rows)
     open_ones = tally.not_proven + tally.waived
     passed = False if tally.not_met else None if open_ones else True
@@ -197,7 +184,6 @@ def table(rows: Sequence[Check], caption: str) -> doc.Block:
 
 
 def _scaled(row: Check) -> tuple[float, str]:
-    """Factor and unit of a row: seconds as ms, unless they are many."""
     return row_time_unit([row.predicted, row.found]) if row.unit == "s" else (1.0, unit_words(row.unit))
 
 

@@ -397,10 +397,10 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
         ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),
         ("[control]", '[control.position]\nKv = "40 V/rad"\n[control]', r"position.Kv = .* \(it is gain\)\Z"),
-        ("[load]", '[load]\nfriction = "6 N"', r"allowed: a table, \[load.friction\]"),
+        ("[load]", '[load]\nfriction = "6 N"', r"allowed: a table, \[load.friction\]; .* \[friction\]\Z"),
         ("[load]", '[load]\nmass = "6 kg"', r"inertia, in kg on a linear axis"),
         ('"48 V"', '"48 V"\nspeed = "2 m/s"', 'm/s with design.axis = "linear"'),
-        ('name = "first"', 'name = "GP 32 C"', 'no dot or space, as "GP-32-C"'),
+        ('name = "first"', 'name = "spur 272.5"', 'no dot, as "spur 272-5"'),
         ('name = "first"', "", 'name: missing; example: name = "planetary"'),
         ('"48 V"', '"48 V', "a quote that is opened in this line is not closed"),
         ('inductance = "0.082 mH"\n', "", "R times the electrical time constant"),
@@ -427,8 +427,7 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         ("resistance", "terminal_resistance", ("(it is resistance)",)),
         ('inductance = "0.082', 'rotor_L = "0.082 V', ("(it is inductance)", "line 6: motor.inductance = ")),
         ("[load]", '[load]\nmax_torque = "2 Nms"', ("(it is moment_max)", "load.moment_max = ")),
-        ("[control]", f'{CURRENT}gain = "40 Hz"\n[control]', ("251.327 rad/s becomes a gain times J/kM",)),
-        ("[control]", f'{CURRENT}vel_gain = "2 Nms/rad"\n[control]', ("(it is gain)", "over kM, and over")),
+        ("[control]", f'{CURRENT}vel_gain = "40 Hz"\n[control]', ("(it is gain)",)),
         ('[[gear]]\nname = "second"\nratio = 2\nefficiency = 0.9\n', "", ()),
         (
             'computing_delay = "0 s"\n',
@@ -448,7 +447,7 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
             + 'P_gain = "2 A"\nintegral_action_time = "9 ms"\n[control]',
             (
                 'Vp = "1 V/A": unknown key (it is gain)',
-                "it is integral_time = gain/integral gain",
+                "it is integral_time = gain/integral gain; of one in Hz 1/(2 pi f); here 0.1111 s",
                 "velocity.P_gain",
                 'velocity.gain = "2 A": wrong',
                 "(it is integral_time)",
@@ -460,6 +459,15 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         ("voltage = ", 'max_rate = "400 deg/s"\nvoltage = ', ("(it is speed, at the motor: that of",)),
         ("[control]", '[encoder]\nresolution = "5 um"\n[control]', ("one metre over a step",)),
         ("resistance", "resistance_line_to_line", ("(it is resistance)",)),
+        (
+            "[control]",
+            f'{CURRENT}gain = "180 1/s"\n[[control.velocity.filter]]\nkind = "notch"\nfrequency = "90 Hz"\n'
+            'bandwidth = "9 Hz"\n[control]',
+            (
+                "a bandwidth is written in Hz or rad/s",
+                'filter.1.bandwidth = "9 Hz": unknown key (it is width)',
+            ),
+        ),
         ("[load]", '[load]\ncoulomb_friction = "6 mNm"', ("dry_torque of [load.friction]",)),
         ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
     ],
@@ -475,3 +483,70 @@ def test_what_stands_under_a_sheets_own_word_is_read_too(old: str, new: str, wor
     told = str(caught.value).splitlines()
     assert len(told) == len(words)
     assert all(word in line for word, line in zip(words, told, strict=True))
+
+
+@pytest.mark.parametrize(  # kM over kE of the sheet, kM and L of the model over the sheet's (model.md)
+    ("constants", "over", "to_dc", "coil"),
+    [("dc", 1.0, 1.0, 1.0), ("rms-line", sqrt(3), 1 / sqrt(1.5), 1.0), ("peak-phase", 1.5, 2 / sqrt(3), 2.0)],
+)
+def test_a_gain_may_be_stated_by_what_it_does(constants: str, over: float, to_dc: float, coil: float) -> None:
+    """By hand: a P velocity loop alone crosses over at gain kM/J, a P current loop at gain/L."""
+    kM, J = 0.0302 * to_dc, 142e-7 + 1e-3 / 86**2
+    text = SHEET.replace("317 rpm/V", f"{0.0302 / over} V*s/rad")
+    text = text.replace("[motor]", f'[motor]\nconstants = "{constants}"')
+    text += '[control.current]\ngain = "500 Hz"\n[control.velocity]\n'
+    for stated, gain in (
+        ("40 Hz", 80 * pi * J / kM),
+        ("251.32741228718345 rad/s", 80 * pi * J / kM),
+        ("0.1 Nm/(rev/s)", 0.1 / (2 * pi) / kM),
+    ):
+        drive = read_design_text(
+            f'{text}gain = {{ value = "{stated}", source = "tuned", tolerance = "10 %" }}'
+        )
+        kept = drive.parameters["control.velocity.gain"]
+        assert drive.controller.velocity.gain == pytest.approx(gain, rel=1e-12) == kept.value
+        assert kept.source == f"from {stated}; tuned"
+        assert kept.tolerance.half_width == pytest.approx(0.1 * gain)
+        assert drive.controller.current.gain_V_A == pytest.approx(1000 * pi * 0.082e-3 * coil, rel=1e-12)
+        # in amperes from there on: the controller does not follow another load
+        other = with_overrides(drive, {"load.inertia": "0 kg*m^2"})
+        assert other.controller.velocity.gain == drive.controller.velocity.gain
+
+
+def test_a_velocity_gain_without_a_current_loop_is_in_volts() -> None:
+    drive = read_design_text(f'{SHEET}[control.velocity]\ngain = "0.01 N*m*s/rad"\n')
+    assert drive.controller.velocity.gain == pytest.approx(0.01 * 0.299 / 0.0302, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "only"),
+    [
+        (
+            'efficiency = "80 %"',
+            'efficiency = "80 %"\n[coupling]\nstiffness = "9 N*m/rad"\nafter = "x"',
+            "coupling.after",
+        ),
+        ('ratio = "43:1"', 'ratio = "43 kg"', "gear.first.ratio"),
+        ("resistance = ", "# resistance = ", "motor.resistance: missing"),
+        ("[control]", "[control]", 'control.velocity.gain = "0 Hz": allowed: above 0'),
+    ],
+)
+def test_a_stated_gain_that_cannot_be_taken_over_hides_nothing(old: str, new: str, only: str) -> None:
+    gain = "0 Hz" if old == new else "40 Hz"
+    text = f'{SHEET.replace(old, new, 1)}{CURRENT}gain = "{gain}"\n'
+    with pytest.raises(InputError) as caught:
+        read_design_text(text, "sheet")
+    assert only in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["GP 42 C 43:1", "32/3R", "PLE+80 (i8)"])
+def test_a_gear_is_named_as_its_maker_names_it(name: str) -> None:
+    """A sheet's efficiency, too, is read again from what is changed besides."""
+    drive = read_design_text(SHEET.replace('"first"', f'"{name}"'), "sheet")
+    plain = read_design_text(SHEET, "sheet")
+    changed, same = (
+        with_overrides(one, {f"gear.{gear}.ratio": 50}) for one, gear in ((drive, name), (plain, "first"))
+    )
+    assert changed.total_ratio == 100.0
+    assert changed.friction == same.friction != plain.friction

@@ -107,11 +107,9 @@ def motor(constants: str, **values: str) -> str:
 def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     constants: str, values: dict[str, str]
 ) -> None:
-    missing, unit = ("back_emf_constant", "V*s/rad")
-    if missing in values:
-        missing, unit = "torque_constant", "N*m/A"
-    answer = told(motor(constants, **values)).rpartition(" ")[2]
-    design = read_design_text(motor(constants, **values, **{missing: f"{answer} {unit}"}))
+    missing = "torque_constant" if "back_emf_constant" in values else "back_emf_constant"
+    answer = " ".join(told(motor(constants, **values)).split()[-2:])
+    design = read_design_text(motor(constants, **values, **{missing: answer}))
     same = design.effective_motor
     # six digits are told
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
@@ -132,6 +130,34 @@ def test_constants_that_disagree_are_told_as_they_are_written(written: str, want
     number, _, same = text.partition("10 % of ")[2].partition("(")[2].partition(")")[0].partition(" ")
     assert same == unit
     assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
+
+
+@pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
+@pytest.mark.parametrize(
+    ("ampere", "volt", "constants", "units"),
+    [
+        (2**0.5, 1.5**0.5, "rms-line", ("", "")),
+        (1.0, 1.0, "peak-phase", ("", "")),
+        (1.0, 3**0.5, "rms-line", (" peak", " peak")),
+        (2**0.5, 3**0.5, "rms-line", ("", " peak")),
+    ],
+)
+def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
+    stated: str, ampere: float, volt: float, constants: str, units: tuple[str, str]
+) -> None:
+    """A sinusoidal motor of flux constant k: torque 3/2 k a peak ampere, k volts peak of a phase per rad/s.
+
+    ``ampere`` peak amperes are one of the sheet, ``volt`` of its volts are a peak volt of a phase.
+    """
+    kM, kE = 0.03 * ampere, 0.02 * volt
+    if stated != constants or any(units):
+        text = told(motor(stated, torque_constant=f"{kM} Nm/A", back_emf_constant=f"{kE} V*s/rad"))
+        assert f'the ratio is that of motor.constants = "{constants}"' in text
+        assert ("A peak" in text) is any(units)
+    kM_text, kE_text = f"{kM} Nm/A{units[0]}", f"{kE} V{units[1]}/(rad/s)"
+    drive = read_design_text(motor(constants, torque_constant=kM_text, back_emf_constant=kE_text))
+    assert drive.effective_motor.back_emf_constant_Vs_rad == pytest.approx(3**0.5 * 0.02, rel=1e-12)
+    assert drive.effective_motor.torque_constant_Nm_A == pytest.approx(3**0.5 * 0.02, rel=1e-12)
 
 
 def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:
@@ -172,6 +198,12 @@ def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
     assert design.encoder.counts_per_rev == counts
 
 
+def test_counts_are_no_angle_of_a_gain() -> None:
+    """1.1e-4 A/(count/s) at 2^19 counts is 9.2 A s/rad, not 1.1e-4."""
+    text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"\n'
+    assert "one is 2 pi/counts_per_rev rad" in told(text)
+
+
 @pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
 def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
     # of one maker 1024 ppr are 4096 counts after quadrature, of another 1024
@@ -184,11 +216,16 @@ def test_a_speed_without_an_angle_is_asked_for_it(limit: str) -> None:
     assert "write rev or rad into it" in told(DRIVE.replace("[limits]\n", f"[limits]\n{limit}\n"))
 
 
-def test_a_gain_in_torque_is_told_how_to_become_one_in_amperes() -> None:
-    current = '[control.current]\ngain = "1 V/A"\n'
-    for stage, gain in (("position", "50 Nm/rev"), ("velocity", "0.16 Nm/(rev/s)")):
-        text = told(f'{DRIVE}{current}[control.{stage}]\ngain = "{gain}"\n')
-        assert "over kM, and over the ratio squared" in text
+def test_a_gain_of_the_position_in_torque_is_told_how_to_become_one_in_amperes() -> None:
+    """Makers state it at the output as often as at the motor."""
+    text = told(f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.position]\ngain = "50 Nm/rev"\n')
+    assert "over kM, and over the ratio squared" in text
+
+
+def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -> None:
+    text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
+    told_of = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
+    assert told_of.endswith("in SI, 0.0127 V*s/rad")
 
 
 @pytest.mark.parametrize(

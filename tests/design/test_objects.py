@@ -35,7 +35,7 @@ EXPORTED = {
 
 
 def objects(values: dict[str, int], factor: float = 1.0) -> ControllerObjects:
-    items = [(parse_label(label, "test"), value) for label, value in values.items()]
+    items = [(parse_label(label), value) for label, value in values.items()]
     made = tuple(ControllerObject(index=i, subindex=s, value=v) for (i, s), v in items)
     return ControllerObjects(velocity_gain_factor=factor, values=made)
 

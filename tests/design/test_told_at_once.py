@@ -15,7 +15,7 @@ from actuator_lti.errors import InputError, Mistakes
 
 AMBER = load_design("ilr33-amber")
 RATIO = {"gear.planetary.ratio", "gear.worm.ratio"}
-TOP_SPEED = {"limits.speed", "limits.voltage", "motor.back_emf_constant"}
+TOP_SPEED = {"limits.speed", "limits.voltage"}  # kE is as kM has it where it is not read
 FILTER = "control.velocity.filter"
 LAW = {"inputs": ["error"], "D": [60.0], "period": "1 ms"}
 
@@ -116,6 +116,33 @@ def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() 
         for path, (_, new) in mistakes.items()
     }
     assert told == sorted(told, key=lambda line: int(line.split(":")[1].split()[1]))
+
+
+KE, KM = 'back_emf_constant = { value = "5.9 mV*s/rad"', 'torque_constant = { value = "5.9 mN*m/A"'
+
+
+@pytest.mark.parametrize(
+    ("key", "old", "new", "top_rad_s"),
+    [
+        ("motor.back_emf_constant", KE, KE.replace("s/rad", "A"), 12 / 5.9e-3),
+        ("motor.back_emf_constant", KE, f"#{KE}", 12 / 5.9e-3),
+        ("motor.back_emf_constant", KE, KE.replace("mV", "V"), 12 / 5.9e-3),
+        # 2/3 of kM, as the constants of a dq model are: kE is sqrt(3) as large, volts line-line (model.md)
+        ("motor.back_emf_constant", KE, KE.replace("5.9", "3.93"), 12 / (3**0.5 * 3.93e-3)),
+        ("motor.torque_constant", KM, f"#{KM}", 12 / 5.9e-3),
+        ("motor.torque_constant", KM, KM.replace("/A", ""), 12 / 5.9e-3),
+        ("motor.inductance", "inductance = ", "# inductance = ", 12 / 5.9e-3),
+    ],
+)
+def test_a_motor_with_a_mistake_does_not_hide_that_its_supply_cannot_reach_the_speed(
+    key: str, old: str, new: str, top_rad_s: float
+) -> None:
+    text = design_text("ilr33-amber").replace('"942.5 rad/s"', '"30000 rpm"')
+    assert text.count(old) == 1
+    wrong, speed = _told_lines(text.replace(old, new))
+    assert key in wrong
+    assert "limits.speed = 3142 rad/s: the supply cannot reach it" in speed
+    assert f"= {top_rad_s:.4g} rad/s" in speed
 
 
 def _told_lines(text: str) -> list[str]:

@@ -18,7 +18,7 @@ from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.start import retune
 from nonlinear.export import c_export
-from nonlinear.export.c_files import ExportedDesign, exported, spare_parameters
+from nonlinear.export.c_files import exported_row, spare_parameters
 from nonlinear.export.program import source_hash
 from nonlinear.native import LIBRARY, parameters, tick
 
@@ -55,12 +55,11 @@ def pointer(row: np.ndarray) -> ctypes.c_void_p:
 class Twins:
     """One drive twice: by the library of the simulator, and by the exported C."""
 
-    def __init__(self, library: ctypes.CDLL, ours: ExportedDesign) -> None:
+    def __init__(self, library: ctypes.CDLL, row: np.ndarray) -> None:
         self.library = library
-        self.rows, self.c_rows = (
-            (np.zeros(ours.p.size), np.zeros(ours.s.size), np.zeros(at.IO_SIZE)) for _ in range(2)
-        )
-        self.set(slice(0, at.SIZE), ours.row)
+        sizes = (*(each.size for each in parameters(row)), at.IO_SIZE)
+        self.rows, self.c_rows = (tuple(map(np.zeros, sizes)) for _ in range(2))
+        self.set(slice(0, at.SIZE), row)
         self.derive()
         LIBRARY.functions.init(*self.rows[:2])
         library.drive_init(*map(pointer, self.c_rows[:2]))
@@ -96,9 +95,9 @@ class Twins:
 def test_every_row_has_the_same_bits_in_random_drives(library: ctypes.CDLL, seed: int) -> None:
     """Both through random inputs, every row compared at every tick; elastic ones from seed 1000 on."""
     rng = np.random.default_rng(seed)
-    ours = exported((random_drive if seed < 1000 else random_elastic_drive)(rng))
-    twins, ticks = Twins(library, ours), 300 if seed < 1000 else 200
-    for command, moment in np.transpose(random_inputs(rng, ticks, float(ours.row[at.PERIOD]))):
+    row = exported_row((random_drive if seed < 1000 else random_elastic_drive)(rng))
+    twins, ticks = Twins(library, row), 300 if seed < 1000 else 200
+    for command, moment in np.transpose(random_inputs(rng, ticks, float(row[at.PERIOD]))):
         assert twins.tick(command, moment) == at.OK
     assert np.abs(twins.rows[1][at.S_CURRENT]) > 0.0
     assert twins.rows[1][at.S_STATUS] == at.OK
@@ -108,11 +107,11 @@ def test_every_row_has_the_same_bits_in_random_drives(library: ctypes.CDLL, seed
 @pytest.mark.parametrize("name", ELASTIC)
 def test_parameters_changed_on_the_way_have_the_same_bits(library: ctypes.CDLL, name: str) -> None:
     """Coupling, friction and play of another design between two ticks: contact and slip are found again."""
-    design = load_design(name)
-    ours = exported(design)
+    row = exported_row(load_design(name))
     for place in (at.STIFFNESS, at.HALF_PLAY, at.DRY, at.VISCOUS):
-        twins = Twins(library, ours)
-        twins.rows = (np.concatenate([twins.rows[0], np.zeros(spare_parameters(ours))]), *twins.rows[1:])
+        twins = Twins(library, row)
+        p = twins.rows[0]
+        twins.rows = (np.concatenate([p, np.zeros(spare_parameters(p))]), *twins.rows[1:])
         twins.c_rows = (twins.rows[0].copy(), *twins.c_rows[1:])
         for k in range(1600):
             if k % 200 == 100:
@@ -127,7 +126,7 @@ def test_parameters_changed_on_the_way_have_the_same_bits(library: ctypes.CDLL, 
 def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
     """Two designs in one program tick in turns; one is saved, runs ahead, goes on twice elsewhere."""
     rng = np.random.default_rng(8)
-    twins = [Twins(library, exported(make(rng))) for make in (random_drive, random_elastic_drive)]
+    twins = [Twins(library, exported_row(make(rng))) for make in (random_drive, random_elastic_drive)]
     inputs = [random_inputs(rng, 300, float(each.rows[0][at.PERIOD])) for each in twins]
     p, s, io = twins[1].c_rows
     kept, behind = np.zeros_like(s), io.copy()
@@ -171,13 +170,12 @@ def test_the_example_builds_without_a_warning_and_is_the_simulator(
 def test_single_precision_keeps_its_stated_error(name: str, tmp_path) -> None:
     design = load_design(name)
     lib = opened(tmp_path, c_export(design, single_precision=True))
-    ours = exported(design)
-    p, s, io = (np.zeros(n, np.float32) for n in (ours.p.size, ours.s.size, at.IO_SIZE))
+    P, S = parameters(exported_row(design))
+    p, s, io = (np.zeros(n, np.float32) for n in (P.size, S.size, at.IO_SIZE))
     lib.drive_load_design(pointer(p))
     lib.drive_prepare_sizes(pointer(p))
     lib.drive_derive(pointer(p), pointer(s))
     lib.drive_init(pointer(p), pointer(s))
-    P, S = parameters(ours.row)
     IO = np.zeros(at.IO_SIZE)
     period, full = design.controller.period_s, design.validation.full_deflection_rad
     worst = 0.0

@@ -26,9 +26,10 @@ MATHEMATICS = {"sqrt", "floor", "sqrtf", "floorf"}  # of a profile with limited 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
 
 
-def gcc(folder: Path, *arguments: str, compiler: str = "gcc") -> None:
-    done = subprocess.run([compiler, *arguments], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[:2000]
+def ran(folder: Path, *call: str) -> str:
+    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr[:2000]
+    return done.stdout
 
 
 def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_") -> Path:
@@ -40,21 +41,17 @@ def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_
 def worst_of(folder: Path) -> dict[str, tuple[float, float]]:
     """Runs the vectors; difference and bound of each signal."""
     call = ("-std=c99", "-O1", "-ffp-contract=off", *STRICT[:6], "main.c", "controller.c", "-lm", "-o", "run")
-    gcc(folder, *call)
-    done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
-    rows = [line.split(",") for line in done.stdout.splitlines()[2:-1]]
-    assert int(done.stdout.splitlines()[-1].split()[0]) > 10
+    ran(folder, "gcc", *call)
+    *lines, last = ran(folder, "./run").splitlines()
+    rows = [line.split(",") for line in lines[2:]]
+    assert int(last.split()[0]) > 10
     return {f"{name}{k}": (float(a), float(b)) for k, (name, a, b) in enumerate(rows)}
 
 
 def without_library(folder: Path) -> set[str]:
     """Compiles for a machine without any; the functions that it calls all the same."""
-    gcc(folder, "-std=c99", "-O2", "-ffreestanding", "-nostdlib", *STRICT, "-c", "controller.c")
-    done = subprocess.run(
-        ["nm", "-u", "controller.o"], cwd=folder, capture_output=True, text=True, check=True
-    )
-    return {word for word in done.stdout.split() if word != "U"}
+    ran(folder, "gcc", "-std=c99", "-O2", "-ffreestanding", "-nostdlib", *STRICT, "-c", "controller.c")
+    return {*ran(folder, "nm", "-u", "controller.o").split()} - {"U"}
 
 
 @pytest.mark.parametrize("single", [False, True])
@@ -110,7 +107,7 @@ def test_it_links_for_a_cortex_m4f_with_no_library_at_all(name: str, tmp_path: P
     (folder / "math.h").write_text("float sqrtf(float);\nfloat floorf(float);\n")
     zig, *cc = zig_command() or ()
     plain = ("-std=c99", "-O2", "-ffp-contract=off", "-ffreestanding", "-nostdlib", "-isystem", ".")
-    gcc(folder, *cc, *CORTEX_M4F, *plain, "chip.c", "controller.c", "-o", "chip", compiler=zig)
+    ran(folder, zig, *cc, *CORTEX_M4F, *plain, "chip.c", "controller.c", "-o", "chip")
     data = (folder / "chip").read_bytes()
     machine, flags = struct.unpack_from("<H", data, 18)[0], struct.unpack_from("<I", data, 36)[0]
     assert (machine, flags & 0x400) == (40, 0x400)  # ARM, floating-point numbers in registers
@@ -151,7 +148,7 @@ def test_a_coefficient_that_is_off_is_seen(tmp_path: Path) -> None:
     source = (folder / "controller.c").read_text()
     assert "0.0008 *" in source  # of the velocity integral
     (folder / "controller.c").write_text(source.replace("0.0008 *", "0.000800000001 *"))
-    gcc(folder, "-std=c99", "main.c", "controller.c", "-o", "run")
+    ran(folder, "gcc", "-std=c99", "main.c", "controller.c", "-o", "run")
     done = subprocess.run([str(folder / "run")], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert re.search(r"\b[1-9]\d* outside of the bound", done.stdout)
@@ -183,18 +180,14 @@ def test_two_designs_in_one_program_of_cpp_by_their_prefixes(tmp_path: Path) -> 
         folder = tmp_path / prefix.removesuffix("_")
         folder.mkdir()
         written(folder, load_design(name), single=True, prefix=prefix)
-        gcc(folder, "-std=c99", *STRICT, "-c", "controller.c")
-        done = subprocess.run(
-            ["nm", "-g", "controller.o"], cwd=folder, capture_output=True, text=True, check=True
-        )
-        symbols = [line.split()[-1] for line in done.stdout.splitlines()]
+        ran(folder, "gcc", "-std=c99", *STRICT, "-c", "controller.c")
+        symbols = [line.split()[-1] for line in ran(folder, "nm", "-g", "controller.o").splitlines()]
         assert len(symbols) == 3
         assert all(symbol.startswith(prefix) for symbol in symbols)
     (tmp_path / "host.cpp").write_text(HOST)
     call = ("-std=c++11", "-Wall", "-Wextra", "-Werror", "host.cpp", "one/controller.o", "two/controller.o")
-    gcc(tmp_path, *call, "-o", "host", compiler="g++")
-    said = subprocess.run([str(tmp_path / "host")], capture_output=True, text=True, check=True).stdout
-    assert said == f"1|{at.FLAG_VOLTAGE}|{design_hash(load_design('ilr33-amber'))}|emps"
+    ran(tmp_path, "g++", *call, "-o", "host")
+    assert ran(tmp_path, "./host") == f"1|{at.FLAG_VOLTAGE}|{design_hash(load_design('ilr33-amber'))}|emps"
 
 
 ROUND = """#include "controller.h"
@@ -227,13 +220,9 @@ int main(void)
 
 def test_counts_of_the_encoder_go_round(tmp_path: Path) -> None:
     """A turning drive from two counts, one of which passes the largest on the way, has the same bits."""
-    changes = {
-        "encoder.counts_per_rev": "4096",
-        "encoder.speed": "difference",
-        "encoder.difference_samples": 3,
-    }
+    encoder = {"counts_per_rev": "4096", "speed": "difference", "difference_samples": 3}
+    changes = {f"encoder.{key}": value for key, value in encoder.items()}
     written(tmp_path, load_design("ilr33-amber").with_values(changes), single=True)
     (tmp_path / "round.c").write_text(ROUND)
-    gcc(tmp_path, "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
-    done = subprocess.run([str(tmp_path / "round")], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout
+    ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
+    ran(tmp_path, "./round")

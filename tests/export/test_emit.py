@@ -9,17 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from emit_samples import (
-    FIRST,
-    everything,
-    open_order,
-    power,
-    sliced,
-    through,
-    truth,
-    twice,
-    two_types,
-)  # fmt: skip
+from emit_samples import FIRST, everything, open_order, power, sliced, through, truth, twice, two_types
 
 from actuator_lti.compiled import EmitError, emit_c
 from actuator_lti.compiled.form import Form

@@ -64,10 +64,10 @@ def test_a_compiler_that_fails(tmp_path, cli, monkeypatch) -> None:
 
 
 def test_what_single_precision_cannot_say(tmp_path, cli) -> None:
-    from actuator_lti.design.loader import shipped_path
+    from actuator_lti.design.loader import design_text
 
     design = tmp_path / "noisy.toml"
-    design.write_text(shipped_path("ilr33-amber").read_text(encoding="utf-8") + NOISY)
+    design.write_text(design_text("ilr33-amber") + NOISY)
     out = tmp_path / "c"
     line = cli.refused("export", "c", design, "--single", "--out", out)
     assert "noise and jitter need double precision" in line

@@ -146,21 +146,16 @@ NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint", "ballscrew", "fin"])
 def test_random_keys_are_refused_with_the_words_of_the_design_file(name: str, tmp_path) -> None:
     rng = np.random.default_rng(11)
-    design = replace(
-        load_design(name), parameters=FrozenMap({})
-    )  # a refusal shows SI, not the file's own text
+    design = replace(load_design(name), parameters=FrozenMap({}))  # a refusal shows SI, not the file's text
     path = written(tmp_path, design)
     keys = [key for key in trace_keys(design).keys if not key.whole]
     seen = {"refused": 0, "taken": 0}
     with hosted(path) as (host,):
         for _ in range(150):
-            chosen = rng.choice(len(keys), 3, replace=False)
-            values = {
-                keys[j].path: min(
-                    max(keys[j].value * 10.0 ** rng.uniform(-1.5, 1.5), keys[j].low), keys[j].high
-                )
-                for j in chosen
-            }
+            chosen = [keys[j] for j in rng.choice(len(keys), 3, replace=False)]
+            drawn = [key.value * 10.0 ** rng.uniform(-1.5, 1.5) for key in chosen]
+            pairs = zip(chosen, drawn, strict=True)
+            values = {key.path: min(max(value, key.low), key.high) for key, value in pairs}
             try:
                 with_values(design, values)
                 words = ""
@@ -194,9 +189,7 @@ def test_what_the_units_of_the_file_were_turned_by_is_decided(tmp_path) -> None:
 def test_two_units_interleave_and_each_goes_back(unit: Path) -> None:
     """Two instances of one library, at steps of their own; one is saved, runs ahead, and goes back twice."""
     design = load_design("ilr33-amber")
-    ours = {
-        size: simulate(design, commands.step(size), 302 * PERIOD).output_angle_rad for size in (0.02, 0.05)
-    }
+    ours = [simulate(design, commands.step(x), 302 * PERIOD).output_angle_rad for x in (0.02, 0.05)]
     with hosted(unit, 2) as (a, b):
         a.start(command=0.02)
         b.start(command=0.05)
@@ -204,9 +197,9 @@ def test_two_units_interleave_and_each_goes_back(unit: Path) -> None:
         for k in range(100):
             a.step(3 * k * PERIOD, 3 * PERIOD)
             b.step(1.5 * k * PERIOD, 1.5 * PERIOD)
-            assert a.get("output.angle") == [ours[0.02][3 * (k + 1)]]
+            assert a.get("output.angle") == [ours[0][3 * (k + 1)]]
             if k % 2 == 1:
-                assert b.get("output.angle") == [ours[0.05][3 * (k + 1) // 2]]
+                assert b.get("output.angle") == [ours[1][3 * (k + 1) // 2]]
             if k == 40:  # between two ticks
                 kept = b.unit.getFMUState()
             angles.append(b.get("output.angle")[0])

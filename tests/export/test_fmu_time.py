@@ -35,10 +35,9 @@ def delayed(design: Design, ticks: float) -> Design:
 
 def even(design: Design) -> Design:
     """Without torques over the angle: those are looked up once a tick, so a finer tick has others."""
-    load = replace(
-        design.load, moment_slope_Nm_rad=0.0, gravity=None, moment_damping_Nms_rad=0.0, gear_error_Nm=0.0
-    )
-    return replace(design, load=load, motor=replace(design.motor, cogging_Nm=0.0))
+    none = dict.fromkeys(("moment_slope_Nm_rad", "moment_damping_Nms_rad", "gear_error_Nm"), 0.0)
+    load, motor = replace(design.load, gravity=None, **none), replace(design.motor, cogging_Nm=0.0)
+    return replace(design, load=load, motor=motor)
 
 
 def random_one(seed: int, elastic: bool) -> Design:
@@ -83,9 +82,7 @@ def propagated(design: Design, voltage: np.ndarray) -> np.ndarray:
         command=Command(),
     )
     fine = run(bare, held.size, held, tanh_tolerance=1e-13)
-    return np.column_stack(
-        [fine.output_angle_rad, fine.motor_angle_rad, fine.motor_speed_rad_s, fine.current_A]
-    )
+    return np.transpose([fine.output_angle_rad, fine.motor_angle_rad, fine.motor_speed_rad_s, fine.current_A])
 
 
 def wanted(t: float | np.ndarray, design: Design) -> Any:
@@ -153,10 +150,10 @@ def critical_gain(parts: int) -> float:
     """
     design = load_design("emps")
     Ts = design.controller.period_s
-    common = np.lcm(parts, FINE)
 
     def spread(K: float) -> float:
-        return float(np.abs(np.linalg.eigvals(lifted(design, K, Ts, parts, int(common)))).max()) - 1.0
+        map_ = lifted(design, K, Ts, parts, int(np.lcm(parts, FINE)))
+        return float(np.abs(np.linalg.eigvals(map_)).max()) - 1.0
 
     return float(brentq(spread, 20.0, 200.0, xtol=1e-9))
 

@@ -10,7 +10,7 @@ from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import load_design
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.design.access import parameter_value, stacked
+from actuator_lti.design.access import parameter_value, paths_of, stacked
 from actuator_lti.design.model import Design, FrictionPoint, Supply
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
 
@@ -20,32 +20,22 @@ NAMES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_
 def drives() -> list[Design]:
     rng = np.random.default_rng(20261122)
     made = [random_drive(rng) for _ in range(12)] + [random_elastic_drive(rng) for _ in range(8)]
-    amber, fin = load_design("ilr33-amber"), load_design("fin")
-    points = tuple(
-        FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in ((0.0, 3e-3), (40.0, 2e-3), (900.0, 9e-3))
+    amber, Tc = load_design("ilr33-amber"), load_design("ilr33-amber").friction.dry_torque_Nm
+    curve = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 9e-3))
+    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in curve)
+    changed = (
+        {"friction": replace(amber.friction, points=points)},
+        {"friction": replace(amber.friction, dry_torque_reverse_Nm=2.0 * Tc)},
+        {"supply": Supply(resistance_ohm=0.02)},
+        {"load": replace(amber.load, path="self-locking")},
     )
-    one_way = replace(amber.friction, dry_torque_reverse_Nm=2.0 * amber.friction.dry_torque_Nm)
-    return [
-        *made,
-        fin,
-        replace(amber, friction=replace(amber.friction, points=points)),
-        replace(amber, friction=one_way),
-        replace(amber, supply=Supply(resistance_ohm=0.02)),
-        replace(amber, load=replace(amber.load, path="self-locking")),
-        load_design("emps"),
-        load_design("joint"),
-    ]
+    made += [replace(amber, **each) for each in changed]
+    return made + [load_design(name) for name in ("fin", "emps", "joint")]
 
 
 def followed_keys(design: Design) -> dict[str, float]:
-    from actuator_lti.design.access import paths_of
-
-    paths = [
-        path
-        for path in paths_of(design)
-        if changes_row(design, path) and parameter_value(design, path) != 0.0
-    ]
-    return {path: parameter_value(design, path) for path in paths}
+    keys = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
+    return {path: value for path, value in keys.items() if value != 0.0}
 
 
 def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -> list[float]:
@@ -74,9 +64,8 @@ def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
             for spread in (0.0, 0.1, 0.5, 1.0):
                 values = scattered(keys, spread, rng)
                 got = executed([line.c for line in lines], values)
-                wanted = float(
-                    drive_figure(stacked(design, dict(zip(keys, values, strict=True))), name, load)
-                )
+                changed = stacked(design, dict(zip(keys, values, strict=True)))
+                wanted = float(drive_figure(changed, name, load))
                 assert got is not None
                 assert got[0] == pytest.approx(wanted, rel=1e-12, nan_ok=True), (design.name, name, load)
                 compared += math.isfinite(wanted)

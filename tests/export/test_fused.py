@@ -42,7 +42,7 @@ def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> fl
         with LIBRARY.borrowed(path):
             run = rows.trajectory()
         found.append(
-            np.column_stack([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
+            np.transpose([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
         )
     plain, fused = found
     there = plain.any(axis=0)  # a force source has no current
@@ -56,9 +56,7 @@ def test_shipped_designs_stay_within_rounding(name: str, libraries: tuple[Path, 
 
 def test_a_count_on_the_other_side_is_seen(libraries: tuple[Path, Path]) -> None:
     """Drives with counts, noise, friction: most agree to rounding, and some differ far beyond it."""
-    sizes = [
-        apart(random_drive(np.random.default_rng(seed)), libraries)
-        for seed in (*range(10, 20), 37, 63, 64, 65)
-    ]
+    seeds = (*range(10, 20), 37, 63, 64, 65)
+    sizes = [apart(random_drive(np.random.default_rng(seed)), libraries) for seed in seeds]
     assert np.median(sizes) < 1e-9
     assert max(sizes) > 1e-5

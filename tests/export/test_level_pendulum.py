@@ -9,7 +9,7 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design.model import Gravity
 from nonlinear._kernels import layout
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.linear_row import linear_row
 
 
@@ -20,7 +20,7 @@ def test_slope_of_the_linear_row(degrees: float, spring: float) -> None:
     gravity = Gravity(mass_kg=3.5, arm_m=0.28, offset_rad=radians(degrees))
     design = load_design("joint")
     design = replace(design, load=replace(design.load, gravity=gravity, moment_slope_Nm_rad=spring))
-    row = exported(design).row
+    row = exported_row(design)
     linear = np.zeros_like(row)
     linear_row(row, linear)
     level = degrees % 180.0 == 90.0

@@ -52,9 +52,8 @@ def system(entry: dict[str, Any]) -> Any:
 
 
 def same(found: Any, known: Any) -> bool:
-    return bool(np.allclose(np.ravel(found), np.ravel(known), rtol=1e-12, atol=0.0)) and (
-        np.size(found) == np.size(known)
-    )
+    alike = np.allclose(np.ravel(found), np.ravel(known), rtol=1e-12, atol=0.0)
+    return bool(alike) and np.size(found) == np.size(known)
 
 
 @pytest.mark.parametrize(("name", "to"), [*((name, "mat") for name in NAMES), *OTHERS])

@@ -17,7 +17,7 @@ from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design.model import Instruments
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
 from nonlinear.native import parameters, tick
 
@@ -64,7 +64,7 @@ def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
     design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)
     design = replace(design, instruments=Instruments())
     command, moment = random_inputs(rng, ticks, design.controller.period_s)
-    row = exported(design).row
+    row = exported_row(design)
     p, s = parameters(row)
     io, ours = np.zeros(at.IO_SIZE), np.empty((ticks, 3))
     for k in range(ticks):

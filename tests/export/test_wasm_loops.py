@@ -30,7 +30,7 @@ from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from nonlinear.export import linear, linear_loops
-from nonlinear.export.c_files import exported
+from nonlinear.export.c_files import exported_row
 from nonlinear.export.page import line_of
 
 MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
@@ -49,7 +49,7 @@ def in_node(designs: list[Design], folder: Path) -> list[dict[str, Any]]:
         return float(value) if np.isfinite(value) else str(value).replace("inf", "Infinity")
 
     given = {
-        "rows": [[plain(value) for value in exported(design).row] for design in designs],
+        "rows": [[plain(value) for value in exported_row(design)] for design in designs],
         "stages": STAGES,
         "quoted": len(LOOP_QUANTITIES) + 1,
         "angles": ANGLES.tolist(),
@@ -168,9 +168,9 @@ def smooth(design: Design) -> Design:
 
 
 def shipped() -> list[Design]:
-    designs = [load_design(name) for name in shipped_designs()]
-    damped = ("fin", "joint", "ilr33-amber-compliant")
-    return [*designs, *(load_design(name).with_values({"load.moment_damping": 0.2}) for name in damped)]
+    designs = {name: load_design(name) for name in shipped_designs()}
+    damped = (designs[name] for name in ("fin", "joint", "ilr33-amber-compliant"))
+    return [*designs.values(), *(each.with_values({"load.moment_damping": 0.2}) for each in damped)]
 
 
 def without_outer_stages() -> list[Design]:
@@ -309,10 +309,8 @@ def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path) -> No
     Certified margins of the same loop say what it is; half of its digits were lost in the page.
     """
     plain = load_design(base)
-    designs = [
-        replace(plain, load=replace(plain.load, path="back-drivable", moment_slope_Nm_rad=slope))
-        for slope in (1.0, 1e3, 1e5)
-    ]
+    free = replace(plain.load, path="back-drivable")
+    designs = [replace(plain, load=replace(free, moment_slope_Nm_rad=k)) for k in (1.0, 1e3, 1e5)]
     at_rest = 0
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         for name, loop in assemble_loops(design).present.items():

@@ -10,7 +10,6 @@ from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.compare import compare_signals
 from analyses.records.open_record import open_record
-from nonlinear import commands, simulate
 from tests.identification.bench_records import write
 
 
@@ -88,14 +87,3 @@ def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
     assert compare_signals("x", "1", time, np.ones(100), np.sin(time)).delay_s is None
     with pytest.raises(InputError, match="zero throughout"):
         compare_signals("x", "1", time, np.zeros(100), np.ones(100))
-
-
-def test_the_record_s_supply_becomes_the_voltage_limit(tmp_path) -> None:
-    design = load_design("ilr33-amber")
-    run = simulate(design, commands.step(0.05), 0.3)
-    columns = {"time_s": run.time_s, "reference_rad": run.reference_rad}
-    columns |= {"output_angle_rad": run.output_angle_rad, "supply_V": np.full(len(run.time_s), 5.0)}
-    result = correlate_record(design, open_record(write(tmp_path / "r.csv", columns)))
-    assert result["output_angle"].relative_error > 1e-3
-    assert result.limits["voltage"] > 0.0
-    assert any("supply" in note for note in result.notes)

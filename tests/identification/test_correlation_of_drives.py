@@ -47,6 +47,7 @@ MAPPED = replace(
         ),
     ),
 )
+SLOPED = BASE.with_values({"load.moment_slope": -60.0})
 DIRECT = replace(
     _from(BASE, velocity=None, current=None),
     controller=replace(
@@ -77,9 +78,13 @@ def _swing(peak: float, hz: float = 3.0) -> Command:
         (WIDE, "reference [rad]", _swing(0.03), 1.0),
         (MAPPED, "reference [rad]", _swing(0.03), 1.0),
         (DIRECT, "reference [rad]", _swing(0.03), 1.0),
+        (SLOPED, "reference [rad]", _swing(0.03), 1.0),
     ],
-    ids=["position", "speed", "current", "torque", "voltage", "two masses", "friction map", "voltage servo"],
-)
+    ids=[
+        "position", "speed", "current", "torque", "voltage", "two masses", "friction map", "voltage servo",
+        "sloped load",
+    ],
+)  # fmt: skip
 def test_a_record_meets_the_drive_that_made_it(
     design: Design, column: str, command: Command, factor: float, tmp_path
 ) -> None:
@@ -93,7 +98,9 @@ def test_a_record_meets_the_drive_that_made_it(
         assert signal.relative_error < 1e-7, signal.name
     viscous = design.friction.viscous_Nms_rad + 1e-4
     other = replace(design, friction=replace(design.friction, viscous_Nms_rad=viscous, points=()))
-    assert max(signal.relative_error for signal in correlate_record(other, record).signals.values()) > 1e-3
+    for wrong in (other, BASE) if design is SLOPED else (other,):
+        found = correlate_record(wrong, record).signals.values()
+        assert max(signal.relative_error for signal in found) > 1e-3
 
 
 @pytest.mark.parametrize(
@@ -141,6 +148,7 @@ def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_p
     more = {"reference [rad]": run.reference_rad, "supply [V]": np.interp(run.time_s, time, bus)}
     record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more))
     result = correlate_record(design, record)
+    assert any("supply" in note for note in result.notes)
     for signal in result.signals.values():
         assert signal.relative_error < 1e-6, signal.name
     flat = dict(record.signals) | {"supply": np.full(len(record), np.median(record["supply"]))}

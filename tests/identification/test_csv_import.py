@@ -1,5 +1,6 @@
 """Records from CSV: layouts, units, accounts of rows, and refusals that name line, column and reason."""
 
+import hashlib
 from pathlib import Path
 
 import numpy as np
@@ -109,6 +110,12 @@ def test_a_long_file_streams_in_blocks_and_is_averaged(tmp_path, monkeypatch) ->
     assert len(record) <= 1001
     assert record.time_s[0] == pytest.approx(7.5)
     assert "averaged over 16 rows" in record.notes[0]
+
+
+def test_the_checksum_is_that_of_the_file_also_behind_a_byte_order_mark(tmp_path) -> None:
+    path = tmp_path / "marked.csv"
+    path.write_bytes(b"\xef\xbb\xbft,n\n0,1\n1,2\n")
+    assert read_csv_record(path, _spec()).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def test_careful_and_fast_reading_agree(tmp_path) -> None:

@@ -1,6 +1,7 @@
 """Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -57,6 +58,17 @@ def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_pat
     assert checks["residual"]["passed"]
 
 
+def test_a_held_out_record_is_filtered_as_those_of_the_fit(files: dict[str, str], tmp_path, cli) -> None:
+    """The same record again has the residual of the fit, less what its own bias is."""
+    again = shutil.copy(files["a"], tmp_path / "again.csv")
+    words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
+    told = cli.data(*words)
+    checks = {check["id"]: check for check in told["items"]}
+    assert checks["held-out-again.csv"]["value"] == pytest.approx(
+        told["model"]["relative_residual"], rel=0.05
+    )
+
+
 def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
     common = ("identify", files["loaded"], "--design", "ilr33-amber")
     model = cli.data(*common, "--fix", "friction.load_coefficient=1.34 mN*m/(N*m)")["model"]
@@ -72,11 +84,10 @@ def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
         assert reason in cli.refused(*common, "--fix", wrong)
 
 
-def test_a_torque_command_is_the_drive(tmp_path, cli) -> None:
+def test_a_torque_command_is_the_drive(identify) -> None:
     columns = columns_of(motion(2))
     columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
-    path = write(tmp_path / "r.csv", columns)
-    result = cli("identify", path, "--design", "ilr33-amber", "--json").data
+    result = identify(columns).data
     uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
     assert uses["commanded motor torque"] == "drive: torque as commanded"
     assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)

@@ -1,5 +1,7 @@
 """The steady part of a run, means of correlated series, currents between samples, recorders on one clock."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -19,10 +21,10 @@ def _run(noise: float) -> tuple[np.ndarray, np.ndarray]:
     return time, speed + noise * np.random.default_rng(0).standard_normal(len(time))
 
 
-@pytest.mark.parametrize("noise", [0.0, 3.0])
-def test_the_window_lies_on_the_plateau(noise: float) -> None:
+@pytest.mark.parametrize(("noise", "side"), [(0.0, 1.0), (3.0, 1.0), (1.0, -1.0)])
+def test_the_window_lies_on_the_plateau(noise: float, side: float) -> None:
     time, speed = _run(noise)
-    window = find_steady_window(time, speed)
+    window = find_steady_window(time, side * speed)
     assert 2.0 < window.start_s < 2.5
     assert 7.5 < window.stop_s < 8.0
     assert window.largest_acceleration_rad_s2 <= window.limit_rad_s2
@@ -40,11 +42,6 @@ def test_a_run_that_never_settles_is_refused_with_its_acceleration() -> None:
         find_steady_window(time, 300.0 + 40.0 * time)
 
 
-def test_reverse_motion_is_steady_too() -> None:
-    time, speed = _run(1.0)
-    assert find_steady_window(time, -speed).stop_s > 7.0
-
-
 def test_correlation_time_of_an_autoregressive_series() -> None:
     rng = np.random.default_rng(2)
     a = 0.9
@@ -57,10 +54,10 @@ def test_the_standard_error_of_a_correlated_mean_is_that_of_many_repetitions() -
     rng = np.random.default_rng(4)
     a, n, repeats = 0.95, 5000, 300
     series = lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], rng.standard_normal((repeats, n)), axis=1)
-    stated = np.array([correlated_means(x[:, None]).standard_errors[0] for x in series])
+    stated = np.array([correlated_means(x[:, None]).covariance[0, 0] for x in series])
     true = np.std(series.mean(axis=1))
     naive = 1.0 / np.sqrt(n)
-    assert np.sqrt(np.mean(stated**2)) == pytest.approx(true, rel=0.15)
+    assert np.sqrt(np.mean(stated)) == pytest.approx(true, rel=0.15)
     assert true > 4.0 * naive
 
 
@@ -116,33 +113,30 @@ def _pair(offset: float, rate: float, noise: float = 0.01) -> tuple[Record, Reco
     return record_of(first, "drive", speed=speed), record_of(second, "sensor", torque=torque)
 
 
+JOIN = partial(join_records, first_signal="speed", second_signal="torque")
+
+
 @pytest.mark.parametrize("method", ["correlation", "event"])
 @pytest.mark.parametrize(("offset", "rate"), [(0.7312, 1.0), (-0.4, 1.0002), (0.25, 0.9995)])
 def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> None:
     first, second = _pair(offset, rate, 0.003)
-    joined, join = join_records(
-        first, second, first_signal="speed", second_signal="torque", method=method
-    )  # fmt: skip
+    joined, join = JOIN(first, second, method=method)
     assert abs(join.rate - rate) < max(5.0 * join.rate_std, 1e-4)
-    middle = 9.0
-    result = join.offset_s + join.rate * middle
-    assert result == pytest.approx(offset + rate * middle, abs=2e-3)
+    assert join.offset_s + join.rate * 9.0 == pytest.approx(offset + rate * 9.0, abs=2e-3)
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
 
 
 def test_a_single_event_tells_no_rate() -> None:
     first, second = _pair(0.5, 1.0)
     early = second.slice(0, 3000)
-    _, join = join_records(first, early, first_signal="speed", second_signal="torque", method="event")
+    _, join = JOIN(first, early, method="event")
     assert join.rate_std is None
     assert "rate not estimable" in str(join)
 
 
 def test_the_given_offset_is_used_as_it_is() -> None:
     first, second = _pair(0.5, 1.0)
-    joined, join = join_records(
-        first, second, first_signal="speed", second_signal="torque", method="given", offset_s=0.5
-    )
+    joined, join = JOIN(first, second, method="given", offset_s=0.5)
     assert join.offset_s == 0.5
     assert joined.time_s[0] >= 0.5
     assert "given offset" in joined.notes[-1]
@@ -154,8 +148,8 @@ def test_records_that_do_not_belong_together_are_refused() -> None:
     a = record_of(time, "a", speed=rng.standard_normal(5000))
     b = record_of(time, "b", torque=rng.standard_normal(5000))
     with pytest.raises(InputError, match="not alike"):
-        join_records(a, b, first_signal="speed", second_signal="torque")
+        JOIN(a, b)
     flat = record_of(time, "c", torque=np.ones(5000))
     for method in ("correlation", "event"):
         with pytest.raises(InputError, match="flat"):
-            join_records(a, flat, first_signal="speed", second_signal="torque", method=method)
+            JOIN(a, flat, method=method)

@@ -18,10 +18,9 @@ def right() -> Columns:
     return columns_of(motion(2))
 
 
-def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, cli) -> None:
+def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, identify, cli) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
-    record, written = write(tmp_path / "r.csv", right), tmp_path / "o" / "ilr33-amber-identified.toml"
-    data = cli.data("identify", record, "--design", "ilr33-amber", "--out", written.parent)
+    data, written = identify(right).data, tmp_path / "o" / "ilr33-amber-identified.toml"
     truth, result = load_design("ilr33-amber"), load_design(written)
     assert result.inertia_kgm2 == pytest.approx(truth.inertia_kgm2, rel=0.01)
     assert result.motor.rotor_inertia_kgm2 == pytest.approx(truth.motor.rotor_inertia_kgm2, rel=0.01)
@@ -30,7 +29,7 @@ def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path,
     assert "torque constant kM, 0.005900 N m/A" in written.with_name("identification.html").read_text()
     again = data["resimulated"][0]
     assert again["relative_error"] < 0.03
-    own = cli.data("correlate", written, record)["records"][0]["signals"]["current"]
+    own = cli.data("correlate", written, tmp_path / "r.csv")["records"][0]["signals"]["current"]
     assert own["relative_error"] == pytest.approx(again["relative_error"], rel=1e-9)
 
 
@@ -48,23 +47,19 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
 
 
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path, cli
+    right: Columns, tmp_path, identify
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
-    record, out = write(tmp_path / "r.csv", noisy), tmp_path / "o"
-    words = ["identify", record, "--design", "ilr33-amber", "--out", out, "--cutoff", "400"]
-    assert cli(*words).status == 1
-    assert not list(out.glob("*.toml"))
-    assert "accepted, a check failed" in " ".join(cli.text(*words, "--accept", status=1).split())
-    assert list(out.glob("*.toml"))
+    for accepted in ((), ("--accept",)):
+        assert identify(noisy, "ilr33-amber", "--cutoff", "400", *accepted).status == 1
+        assert bool(list((tmp_path / "o").glob("*.toml"))) == bool(accepted)
+    assert "accepted, a check failed" in (tmp_path / "o" / "identification.html").read_text()
 
 
-def test_every_column_is_accounted_for(right: Columns, tmp_path, cli) -> None:
+def test_every_column_is_accounted_for(right: Columns, identify) -> None:
     more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
-    record = write(tmp_path / "r.csv", more)
-    told = cli("identify", record, "--design", "ilr33-amber", "--json").data
-    inputs = {row["column"]: row["use"] for row in told["inputs"]["r.csv"]}
+    inputs = {row["column"]: row["use"] for row in identify(more).data["inputs"]["r.csv"]}
     assert set(inputs) == set(more)
     assert inputs["current_A"].startswith("drive")
     assert inputs["temperature_C"] == "no: no name that is known"
@@ -89,25 +84,6 @@ def test_a_signal_that_nothing_reads_is_refused(
     (tmp_path / "r.toml").write_text(text)
     err = cli.refused("identify", tmp_path / "r.toml", "--design", "ilr33-amber")
     assert reason in err
-
-
-def test_the_designs_slope_of_the_load_is_used_by_correlate(tmp_path) -> None:
-    from actuator_lti.design import with_values
-    from analyses.correlation.closed_loop import correlate_record
-    from analyses.records.open_record import open_record
-    from nonlinear import commands, simulate
-
-    design = with_values(load_design("ilr33-amber"), {"load.moment_slope": -60.0})
-    run = simulate(design, commands.sine(0.08, 2.0), 0.6)
-    run.to_csv(tmp_path / "r.csv")
-    rows = [line.split(",") for line in (tmp_path / "r.csv").read_text().splitlines()]
-    left_out = rows[0].index('"load_Nm"')
-    kept = [",".join(row[:left_out] + row[left_out + 1 :]) for row in rows]
-    (tmp_path / "r.csv").write_text("\n".join(kept) + "\n")
-    result = correlate_record(design, open_record(tmp_path / "r.csv"))
-    assert max(signal.relative_error for signal in result.signals.values()) < 1e-9
-    without = correlate_record(load_design("ilr33-amber"), open_record(tmp_path / "r.csv"))
-    assert without["current"].relative_error > 0.1
 
 
 def _slow_sensor(folder: Path) -> None:

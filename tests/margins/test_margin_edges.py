@@ -9,11 +9,13 @@ import pytest
 from margin_truth import difference, towards_the_border, truth_of
 
 from actuator_lti import load_design
+from actuator_lti.bandwidth import peaks
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.access import with_values
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import Agreement, StabilityMargins, stability_margins
+from actuator_lti.systems.phase import unwrapped_phase_deg
 
 s = control.tf("s")
 
@@ -117,6 +119,21 @@ def test_a_loop_without_dynamics(gain: float, stable: bool, ratio: float | None)
     assert m.stable is stable
     assert m.modulus_margin == pytest.approx(abs(1 + gain))
     assert [g.ratio for g in m.gain_margins] == ([] if ratio is None else [ratio])
+
+
+@pytest.mark.parametrize(("pole", "gain"), [(1.0, -0.5), (-1.0, -0.5), (0.5, 0.0)])
+def test_a_mode_that_a_gain_behind_part_of_a_sample_does_not_show(pole: float, gain: float) -> None:
+    """gain exp(-j w 0.03): real and negative at rest alone; of nothing there is no margin, and no peak."""
+    loop = control.StateSpace([[pole]], [[0.0]], [[0.0]], [[gain]], 0.1, remove_useless_states=False)
+    m = stability_margins(loop, delay_s=0.03)
+    assert m.stable
+    assert [(g.ratio, g.frequency_rad_s) for g in m.gain_margins] == ([(2.0, 0.0)] if gain else [])
+    assert m.modulus_margin == pytest.approx(1.0 + gain)
+    if not gain:
+        assert stability_margins(control.tf([0.0], [1.0, 1.0]), delay_s=0.03, certify=True).stable
+        assert unwrapped_phase_deg(loop, [1.0]) == [0.0]
+        with pytest.raises(NumericalError):
+            peaks(loop, 0.03)
 
 
 def test_disagreement_gives_no_figure() -> None:

@@ -78,7 +78,10 @@ def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) ->
         (["nightly", "a", "b", "c", "--site", "s"], "nightly STUDY --site DIR"),
         (["nightly", "approve", "ilr33-amber", "--site", "s"], "--by and --reason"),
         (["nightly", "ilr33-amber"], "--site"),
-        (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "0"], "--time-limit"),
+        *(
+            (["nightly", "ilr33-amber", "--site", "s", "--time-limit", s], "--time-limit")
+            for s in ("0", "inf")
+        ),
     ],
 )
 def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, words, expected) -> None:

@@ -75,11 +75,10 @@ def test_a_night_enters_whole_or_not_at_all(tmp_path, monkeypatch) -> None:
     """The file of a night that the index does not know is none, and is written over."""
     history = open_history(tmp_path)
     add(history, {"x": 1.0})
-    monkeypatch.setattr(History, "_put", lambda *_: None)
-    add_fails = pytest.raises(StopIteration)
-    with add_fails:
-        add(history, {"x": 2.0}, 2)
-    monkeypatch.undo()
+    with monkeypatch.context() as patch:
+        patch.setattr(History, "_put", lambda *_: None)
+        with pytest.raises(StopIteration):
+            add(history, {"x": 2.0}, 2)
     assert len(list((tmp_path / "nights").iterdir())) == 2
     history = open_history(tmp_path)
     assert [run.id for run in history.runs] == [1]

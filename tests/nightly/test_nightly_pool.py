@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study
 from site_checks import check_whole
@@ -52,8 +53,12 @@ def test_every_design_gets_its_own_end(troubled) -> None:
     assert workers_left() == []
 
 
-def test_the_page_and_the_exit_status_name_who_failed_and_why(troubled) -> None:
-    site, night, _ = troubled
+def test_the_page_and_the_exit_status_name_who_failed_and_why_and_progress_counts_to_the_end(
+    troubled,
+) -> None:
+    site, night, seen = troubled
+    assert [seen[0], seen[-1]] == [(0, 10), (10, 10)]
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert not night.passed
     page = check_whole(site)
     for words in ("did not end within 6 s", "signal 9", "ValueError: gear <b>lost</b> in line two"):
@@ -61,16 +66,7 @@ def test_the_page_and_the_exit_status_name_who_failed_and_why(troubled) -> None:
     assert 'errors="4"' in (site / "junit.xml").read_text()
 
 
-def test_progress_counts_to_the_end(troubled) -> None:
-    _, _, seen = troubled
-    assert seen[0] == (0, 10)
-    assert seen[-1] == (10, 10)
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-
-
 def workers_left() -> list[list[str]]:
-    import psutil
-
     lines = [child.cmdline() for child in psutil.Process().children()]
     return [line for line in lines if "nightly.processes" in str(line)]
 
@@ -153,11 +149,11 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     nightly = subprocess.Popen([sys.executable, str(script), str(site), str(log)], env=QUIET)
     cache = tmp_path / "site.state" / "cache"
     _wait_for(lambda: len(list(cache.glob("*/*.entry"))) >= 4)  # one of them is of the night before
-    workers = _children(nightly.pid)
+    workers = psutil.Process(nightly.pid).children()
     nightly.send_signal(signal.SIGKILL)
     nightly.wait()
     assert workers
-    _wait_for(lambda: not any(Path(f"/proc/{pid}").exists() for pid in workers))
+    assert psutil.wait_procs(workers, timeout=60.0)[1] == []
     assert (site / "index.html").read_bytes() == before
     check_whole(site)
     kept = len(list(cache.glob("*/*.entry"))) - 1
@@ -167,18 +163,6 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     assert len(cached) == kept >= 3
     assert night.interrupted
     assert "did not end" in check_whole(site).text
-
-
-def _children(parent: int) -> list[int]:
-    result = []
-    for entry in Path("/proc").iterdir():
-        try:
-            fields = (entry / "stat").read_text().rpartition(")")[2].split()
-        except (OSError, ValueError):
-            continue
-        if entry.name.isdigit() and int(fields[1]) == parent:
-            result.append(int(entry.name))
-    return result
 
 
 def _wait_for(condition, seconds: float = 60.0) -> None:

@@ -2,11 +2,18 @@
 
 import io
 import unicodedata
+from pathlib import Path
 
 import pypdf
 import pytest
 from built_report import Built
 
+AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"  # by `make page`
+FOUND = """() => axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) => violations
+    .filter(({ impact }) => ["serious", "critical"].includes(impact))
+    .map(({ id, nodes }) => [id, nodes[0].html]))"""
+STOPS = """[...document.querySelectorAll("a[href], button, input, select, textarea, summary, [tabindex]")]
+    .filter((one) => one.tabIndex >= 0 && !one.disabled && one.checkVisibility()).length"""
 OPEN_ALL = (
     "document.querySelectorAll('main details, figure[hidden]').forEach((one) => {"
     " one.open = true; one.hidden = false; })"
@@ -72,9 +79,8 @@ def test_a_bar_is_as_long_as_its_figure(opens, built: Built) -> None:
             ".map(box => [box.left, box.right])"
         )
         (start, now), (low, high), _ = places
-        assert (now - start) / ((low + high) / 2 - start) == pytest.approx(
-            bar["value"] / bar["limit"], rel=0.02
-        )
+        part = (now - start) / ((low + high) / 2 - start)
+        assert part == pytest.approx(bar["value"] / bar["limit"], rel=0.02)
 
 
 def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
@@ -96,9 +102,8 @@ def test_the_summary_prints_on_four_pages(opens, built: Built) -> None:
     page.emulate_media(media="print")
     sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
     assert len(sheets) <= 4
-    printed = unicodedata.normalize(
-        "NFKC", "".join("".join(sheet.extract_text().split()) for sheet in sheets)
-    )
+    words = "".join("".join(sheet.extract_text().split()) for sheet in sheets)
+    printed = unicodedata.normalize("NFKC", words)
     for part in built.document["sections"]:
         assert "".join(part["title"].split()) in printed or part["id"] == "answer"
 
@@ -138,3 +143,12 @@ def test_paper_is_white_short_and_ends_no_page_with_a_heading(opens, built: Buil
         last = sheet.extract_text().strip().splitlines()[-1].strip()
         assert last not in titles
         assert last not in results
+
+
+@pytest.mark.skipif(not AXE.exists(), reason="axe-core is not installed: make page")
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_nothing_serious_and_few_stops_to_tab(opens, built: Built, scheme: str) -> None:
+    page = opens(built.page, bypass_csp=True, color_scheme=scheme)
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    assert page.evaluate(FOUND) == []
+    assert page.evaluate(STOPS) < 220

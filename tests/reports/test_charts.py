@@ -10,14 +10,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from actuator_lti import load_design
+from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.step import StepFigures
+from nonlinear import Trajectory, commands, simulate
 from reports.charts import style
 from reports.charts.axis import Axis, linear_ticks, log_ticks
-from reports.charts.chart import Chart
+from reports.charts.chart import Band, Chart
 from reports.charts.labels import Room
 from reports.charts.svg import page_svg, paper_svg
 from reports.sections.loop import step_figures
 from reports.sections.loop_charts import critical_points, nichols_regions
+from reports.sections.simulate import chart_of
 
 finite = st.floats(-1e9, 1e9, allow_nan=False)
 
@@ -69,8 +73,7 @@ def test_an_axis_places_its_ends_and_what_lies_between(
 
 
 def test_limits_follow_the_values_and_survive_a_single_one() -> None:
-    chart = Chart()
-    panel = chart.panel()
+    panel = Chart().panel()
     panel.curve([1.0, 1.0], [5.0, 5.0])
     (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
     assert x0 < 1.0 < x1
@@ -89,6 +92,12 @@ def test_a_logarithmic_axis_leaves_out_what_it_has_no_place_for_whenever_it_is_s
     assert low * high == pytest.approx(1e4)
 
 
+def ends_of(svg: str) -> list[list[float]]:
+    """Both axes of the first panel: low, high, and where on the picture these lie."""
+    axes = (re.search(rf'data-{key}="\w+ ([^"]*)"', svg) for key in "xy")
+    return [[float(word) for word in axis.group(1).split()] for axis in axes]
+
+
 def test_gaps_break_a_line() -> None:
     chart = Chart()
     chart.panel().curve([0, 1, 2, 3, 4], [0.0, 1.0, None, 1.0, 0.0])
@@ -104,10 +113,8 @@ def test_the_points_of_a_curve_are_where_its_values_are() -> None:
     panel.x.log = True
     panel.curve(f, -20.0 * np.log10(f))
     svg = page_svg(chart, "f", "")
-    x_axis, y_axis = (re.search(rf'data-{k}="(\w+) ([^"]*)"', svg) for k in "xy")
+    (low, high, a, b), (bottom, top, c, d) = ends_of(svg)
     path = re.search(r'class="curve" d="([^"]*)"', svg)
-    low, high, a, b = map(float, x_axis.group(2).split())
-    bottom, top, c, d = map(float, y_axis.group(2).split())
     steps = np.array(re.findall(r"[Ml]([-\d.]+) ([-\d.]+)", path.group(1)), float)
     for (x, y), hz in zip(np.cumsum(steps, axis=0), f, strict=True):
         seen_hz = low * (high / low) ** ((x - a) / (b - a))
@@ -122,11 +129,8 @@ def test_equal_axes_have_equal_units() -> None:
     panel.equal = True
     panel.x.limits(-2.0, 1.0)
     panel.y.limits(-1.0, 1.0)
-    svg = page_svg(chart, "f", "")
     units = []
-    for key in "xy":
-        result = re.search(rf'data-{key}="lin ([^"]*)"', svg)
-        low, high, a, b = map(float, result.group(1).split())
+    for low, high, a, b in ends_of(page_svg(chart, "f", "")):
         assert low <= -1.0
         assert high >= 1.0
         units.append(abs(b - a) / (high - low))
@@ -210,3 +214,20 @@ def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
     marks = [item for item in panel.items if item.kind == "curve" and item.look.marker == "o"]
     assert [float(mark.x[0]) for mark in marks] == pytest.approx([math.log(10 / 9), math.log(10)], abs=1e-3)
     assert [float(mark.y[0]) for mark in marks] == pytest.approx([0.1, 0.9], abs=1e-3)
+
+
+@pytest.fixture(scope="module")
+def run() -> Trajectory:
+    return simulate(load_design("ilr33-amber"), commands.step(0.35), 0.3)
+
+
+@pytest.mark.parametrize("name", ["speed", "acceleration", "current", "voltage"])
+def test_a_limit_is_shaded_where_it_acts(run: Trajectory, name: str) -> None:
+    items = [one for column in chart_of(run).columns for panel in column.panels for one in panel.items]
+    shaded = f"{LIMITERS[name].words} acts"
+    bands = [one for one in items if isinstance(one, Band) and one.label == shaded]
+    rows = run.limit_active(name)
+    assert bool(bands) == bool(rows.any())
+    seen = 1e3 * run.time_s[rows]  # the axis is in ms
+    assert all(any(one.low <= at <= one.high for one in bands) for at in seen)
+    assert rows.any() or name != "acceleration"

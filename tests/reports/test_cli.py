@@ -11,6 +11,7 @@ import typer
 
 from actuator_lti.design.loader import design_text
 from reports.cli.app import build
+from reports.cli.progress import progress
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
@@ -21,10 +22,6 @@ def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
         docs[command.name] = re.findall(r"(?<!\\)\[[a-z_. ]+\]", " ".join(said))
     assert len(docs) > 20
     assert not any(docs.values()), docs
-
-
-def test_version(cli) -> None:
-    assert cli.text("--version").startswith("actuator-lti ")
 
 
 def loaded(code: str) -> set[str]:
@@ -66,6 +63,7 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
 
 
 def test_margins_in_json_and_nothing_else(cli) -> None:
+    assert cli.text("--version").startswith("actuator-lti ")
     ran = cli("margins", "--json")
     assert (ran.status, ran.err) == (0, "")
     result = ran.data
@@ -139,9 +137,8 @@ def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
 
 def test_a_folder_that_is_a_file_is_named(tmp_path, cli) -> None:
     (tmp_path / "out").write_text("in the way")
-    assert str(tmp_path / "out") in cli.refused(
-        "report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation"
-    )
+    said = cli.refused("report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation")
+    assert str(tmp_path / "out") in said
     (tmp_path / "empty.json").touch()
     assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
 
@@ -166,17 +163,13 @@ def test_a_closed_pipe_is_no_error() -> None:
     code = "from reports.cli.main import main; import sys; sys.exit(main(['margins', '--json']))"
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run(
-        [sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False
-    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
     os.close(write)
-    assert done.stderr == ""
-    assert done.returncode == 141
+    assert (done.stderr, done.returncode) == ("", 141)
 
 
 def test_progress_stays_off_where_nobody_looks(capsys) -> None:
-    from reports.cli.progress import progress
-
     with progress("work") as report:
         report(1, 2)
     assert capsys.readouterr().err == ""

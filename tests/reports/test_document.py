@@ -34,18 +34,6 @@ def holding(blocks: list[Any], **section: Any) -> str:
     return json.dumps(made(sections=[doc.section("x", "X", blocks, **section)]))
 
 
-def test_verdicts_are_counted_wherever_they_stand() -> None:
-    counts = {"met": 1, "not_met": 1, "not_proven": 1, "waived": 0}
-    assert made()["verdict"] == {"verdict": "not met", "passed": False, "parts": {"requirements": counts}}
-
-
-def test_checks_and_requirements_are_told_apart() -> None:
-    check = doc.verdicts([judged("d", True)], what="checks")
-    parts = [*made()["sections"], doc.section("two", "Two", [check])]
-    said = verdict_words(verdict_of(parts, "report"))
-    assert said == ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]
-
-
 @pytest.mark.parametrize(
     ("passed", "waiver", "word", "lines"),
     [
@@ -59,27 +47,43 @@ def test_checks_and_requirements_are_told_apart() -> None:
 def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
     passed: tuple[bool | None, ...], waiver: str, word: str, lines: list[tuple[str, str]]
 ) -> None:
-    items = [
-        {**judged(f"v{k}", one), "waiver": waiver if one is None else ""} for k, one in enumerate(passed)
-    ]
+    items = [judged(f"v{k}", one) | {"waiver": waiver * (one is None)} for k, one in enumerate(passed)]
     result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
     assert (result["verdict"], result["passed"]) == (word, word == "met")
     assert verdict_lines(result) == lines
 
 
-def test_a_section_that_is_not_proven_makes_its_report_so() -> None:
-    part = doc.section("margins", "Margins", [], status="warn", verdict=Verdict.NOT_PROVEN)
-    result = verdict_of([part], "report")
-    assert (result["verdict"], result["unproven_sections"]) == ("not proven", ["Margins"])
-    assert verdict_of([part], "compare")["verdict"] == "met"
+BARE = doc.section("missing", "Missing parts", [], status="fail")
+OPEN = doc.section("margins", "Margins", [], status="warn", verdict=Verdict.NOT_PROVEN)
+CHECKED = doc.section("two", "Two", [doc.verdicts([judged("d", True)], what="checks")])
+GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
+
+
+@pytest.mark.parametrize(
+    ("parts", "kind", "word", "said"),
+    [
+        ([*made()["sections"], CHECKED], "report", "not met",  # wherever they stand
+         ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]),
+        ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
+        ([OPEN], "compare", "met", []),
+        ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
+        ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide
+        (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),
+    ],
+)  # fmt: skip
+def test_a_document_is_as_good_as_its_worst_part(
+    parts: list[Any], kind: str, word: str, said: list[str]
+) -> None:
+    """A section that has failed or is open by itself counts; one whose verdict fails is not said twice."""
+    whole = doc.document(title="T", subtitle="", design={}, provenance={}, sections=parts, kind=kind)
+    assert (whole["verdict"]["verdict"], whole["verdict"]["passed"]) == (word, word == "met")
+    assert verdict_words(whole["verdict"]) == said
+    assert doc.loads(doc.dumps(whole))["verdict"] == whole["verdict"]
 
 
 def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
-    assert doc.plain({"a": np.array([1.0, np.nan, np.inf]), 2: np.int64(3), "b": np.bool_(True)}) == {
-        "a": [1.0, None, None],
-        "2": 3,
-        "b": True,
-    }
+    held = {"a": np.array([1.0, np.nan, np.inf]), 2: np.int64(3), "b": np.bool_(True)}
+    assert doc.plain(held) == {"a": [1.0, None, None], "2": 3, "b": True}
     with pytest.raises(TypeError, match="complex"):
         doc.plain([1j])
 
@@ -109,13 +113,12 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
+ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
+
+
 @pytest.mark.parametrize(
     "change",
-    [
-        {"passed": True},
-        {"verdict": "not proven"},
-        {"parts": {"requirements": {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}}},
-    ],
+    [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}],
 )
 def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str, Any], tmp_path) -> None:
     path = tmp_path / "report.json"

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import exp
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,37 +17,33 @@ from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
 from analyses.validation import QUICK, validate
+from tests.changed import changed
 
 SET = ["--set", "load.path=back-drivable", "--set"]
 PUSHED = [*SET, "load.moment_slope=1 N*m/rad"]
 
 
-def pushed(slope_Nm_rad: float = 1.0) -> Design:
-    design = load_design("ilr33-amber")
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad)
-    return replace(design, load=load)
+def pushed(slope_Nm_rad: float = 1.0, **more: Any) -> Design:
+    load = {"path": "back-drivable", "moment_slope_Nm_rad": slope_Nm_rad}
+    return changed(load_design("ilr33-amber"), load=load, **more)
 
 
 def p_velocity(slope_Nm_rad: float) -> Design:
     """Without the integral of the speed, which is the angle: the position loop alone holds the load."""
-    design = pushed(slope_Nm_rad)
-    velocity = replace(design.controller.velocity, integral_time_s=None)
-    return replace(design, controller=replace(design.controller, velocity=velocity))
+    return pushed(slope_Nm_rad, controller={"velocity": {"integral_time_s": None}})
 
 
 def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
     """J s + b with b < 0: s ((L s + R)(J s + b) + k^2) + Kp (s + 1/Ti)(J s + b) is below 0 at s = 0."""
-    design = pushed(slope_Nm_rad)
-    dry = design.friction.dry_torque_Nm
+    dry = load_design("ilr33-amber").friction.dry_torque_Nm
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=dry * x) for w, x in ((0, 1), (20, 0.7), (300, 2)))
-    friction = replace(design.friction, dry_torque_Nm=0.0, viscous_Nms_rad=0.0, points=points)
-    return replace(design, friction=friction, requirements=())
+    friction = {"dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0, "points": points}
+    return pushed(slope_Nm_rad, friction=friction, requirements=())
 
 
 def torque_drive() -> Design:
     """Nothing around the current loop stops the load that pushes away."""
-    design = replace(pushed(), requirements=())
-    return replace(design, controller=replace(design.controller, position=None, velocity=None))
+    return pushed(requirements=(), controller={"position": None, "velocity": None})
 
 
 def held_phase_margin_deg(design: Design) -> float:
@@ -65,8 +62,7 @@ def held_phase_margin_deg(design: Design) -> float:
 
 
 def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
-    design = pushed()
-    design = replace(design, controller=replace(design.controller, computing_delay_s=0.0))
+    design = pushed(controller={"computing_delay_s": 0.0})
     figures = all_loop_figures(assemble_loops(design))
     current = figures["current"]
     assert current.margins.stable is False  # J s^2 + Cv s - k has a root on the right
@@ -88,7 +84,7 @@ def test_a_p_velocity_loop_is_judged_under_a_constant_load() -> None:
     design = p_velocity(1.0)
     figures = all_loop_figures(assemble_loops(design))
     assert [figures[name].margins.stable for name in ("velocity", "position")] == [False, True]
-    free = replace(design, load=replace(design.load, moment_slope_Nm_rad=0.0))
+    free = changed(design, load={"moment_slope_Nm_rad": 0.0})
     alone = stability_margins(assemble_loops(free).velocity.open_loop)
     assert figures["velocity"].judged.margins == alone
     assert level(design) == free
@@ -102,8 +98,7 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
     for share, stable in ((0.98, True), (1.02, False)):
         figures = all_loop_figures(assemble_loops(p_velocity(share * limit)))
         assert figures["position"].margins.stable is stable
-        assert figures["current"].sound is stable
-        assert figures["velocity"].sound is stable
+        assert {figures[name].sound for name in ("current", "velocity")} == {stable}
 
 
 @pytest.mark.parametrize(

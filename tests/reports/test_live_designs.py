@@ -136,16 +136,13 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     design = load_design(name)
     page = opens(design)
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
-    page.wait_for_function(
-        "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
-    )
+    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    page.wait_for_function(drawn)
     page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert len(cells) == 18 * 12
     every = design.controller.position_loop.every
-    ticks, hertz, updates, amplitude = (
-        np.array([cell[k] for cell in cells], dtype=float) for k in range(1, 5)
-    )
+    ticks, hertz, updates, amplitude = np.array([cell[1:5] for cell in cells], dtype=float).T
     rows = Rows.of(design, len(cells))
     rows.sine("command", amplitude, hertz)
     rows.window(every * updates, np.round(hertz * updates * every * design.controller.period_s), 1)
@@ -176,9 +173,8 @@ def test_requirements_on_the_whole_drive_follow(opens, tmp_path) -> None:
     design = replace(load_design("fin"), requirements=tuple(limits))
     page = opens(design)
     verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "requirements"))
-    first = page.eval_on_selector_all(
-        "table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)"
-    )
+    values = ("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
+    first = page.eval_on_selector_all(*values)
     changes = {"limits.peak_current": 0.6, "motor.resistance": 1.7, "load.inertia": 1.5, "coupling.play": 2.0,
                "friction.load_coefficient": 3.0, "limits.voltage": 0.8}  # fmt: skip
     for key, factor in changes.items():
@@ -186,13 +182,11 @@ def test_requirements_on_the_whole_drive_follow(opens, tmp_path) -> None:
         if page.locator(field).count():
             type_value(page, key, factor * float(page.input_value(field)))
     verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "requirements"))
-    then = page.eval_on_selector_all("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
-    assert all(a != b for a, b in zip(first, then, strict=True))
+    assert all(a != b for a, b in zip(first, page.eval_on_selector_all(*values), strict=True))
 
 
-def test_a_requirement_that_needs_a_simulation_of_its_own_is_named(tmp_path) -> None:
+def test_a_requirement_that_needs_a_simulation_of_its_own_is_named() -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
-    design = replace(load_design("ilr33-amber"), requirements=limits)
-    model = live_model(design)
+    model = live_model(replace(load_design("ilr33-amber"), requirements=limits))
     assert model["apart"] == [{"id": "swing", "words": "swing after a step"}]
     assert model["requirements"] == []

@@ -6,7 +6,6 @@ goes through ``margins``, whose figures are those of the linear form, found with
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 from built_report import HOSTILE
-from live_page import read, same_figures, saved, settled, type_value, written
-from typer.testing import CliRunner
+from live_page import command_line, page_text, read, same_figures, saved, settled, type_value, written
 
 from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import with_values
@@ -24,12 +22,13 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from reports.cli.app import build
+from nonlinear import simulate
+from nonlinear.commands import step
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
-DESIGN = "ilr33-amber"
+AMBER = load_design("ilr33-amber")
 DROP = """([name, text]) => {
     const data = new DataTransfer();
     data.items.add(new File([text], name));
@@ -38,14 +37,9 @@ DROP = """([name, text]) => {
 }"""
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory) -> Path:
-    return written(load_design(DESIGN), tmp_path_factory.mktemp("sliders"))
-
-
 @pytest.fixture
-def page(opens, made: Path) -> Page:
-    return opens(made)
+def page(opens) -> Page:
+    return opens(AMBER)
 
 
 def refusal(design: Design) -> str:
@@ -59,10 +53,7 @@ def refusal(design: Design) -> str:
 
 def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> None:
     """Each key by itself, moved by a fifth; what the command line refuses, the page refuses in its words."""
-    design = load_design(DESIGN)
-    keys = json.loads(
-        page.inner_text("#live-data") or page.evaluate("document.getElementById('live-data').textContent")
-    )["keys"]
+    keys = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).keys")
     assert len(keys) > 25
     refused: set[str] = set()
     for key in keys:
@@ -70,7 +61,7 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
         if key["whole"]:
             value = key["value"] + 1.0
         type_value(page, key["path"], value / key["factor"])
-        changed = with_values(design, {key["path"]: value}, check=False)
+        changed = with_values(AMBER, {key["path"]: value}, check=False)
         if why := refusal(changed):
             refused.add(key["path"])
             assert f"Refused, nothing follows: {why}" in page.inner_text(".state")
@@ -86,8 +77,8 @@ def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
     assert page.get_attribute(".state", "data-failing") == "0"
     type_value(page, "control.position.gain", 590.0)
     failing = int(page.get_attribute(".state", "data-failing") or 0)
-    done = CliRunner().invoke(build(), ["margins", str(saved(page, tmp_path / "hot.toml")), "--json"])
-    verdicts = [item for item in json.loads(done.stdout)["requirements"] if item["verdict"] == "not met"]
+    found = command_line(saved(page, tmp_path / "hot.toml"), "requirements")
+    verdicts = [item for item in found if item["verdict"] == "not met"]
     assert failing == sum(item["loop"] is not None for item in verdicts) > 0
     assert f"{failing} not met" in page.inner_text(".state")
     assert [item["id"] for item in verdicts] == ["phase-margin/position"]
@@ -102,12 +93,10 @@ def test_undo_redo_reset_and_keyboard(page: Page) -> None:
     settled(page, lambda: slider.press("PageUp"))
     moved = read(page)
     assert moved["velocity"]["gain_margin"] < before["velocity"]["gain_margin"]
-    settled(page, lambda: page.click('[data-do="undo"]'))
-    settled(page, lambda: page.click('[data-do="undo"]'))
-    assert read(page) == before
-    settled(page, lambda: page.click('[data-do="redo"]'))
-    settled(page, lambda: page.click('[data-do="redo"]'))
-    assert read(page) == moved
+    for does, wanted in (("undo", before), ("redo", moved)):
+        for _ in range(2):
+            settled(page, lambda does=does: page.click(f'[data-do="{does}"]'))
+        assert read(page) == wanted
     settled(page, lambda: page.click('[data-do="reset"]'))
     assert read(page) == before
     assert "#" not in page.url
@@ -127,7 +116,7 @@ def test_a_value_that_is_too_much_is_said_and_undone(
     assert read(page) == before
 
 
-def test_nonsense_is_not_taken(opens, page: Page, made: Path) -> None:
+def test_nonsense_is_not_taken(opens, page: Page) -> None:
     before = read(page)
     row = '.row[data-path="control.position.gain"]'
     for words in ("-5", "abc", "", "0", "Infinity", "1e300"):
@@ -141,24 +130,21 @@ def test_nonsense_is_not_taken(opens, page: Page, made: Path) -> None:
     page.wait_for_selector(f"{row} .field[aria-invalid=false]")
     assert page.inner_text(f"{row} .was") == ""
     nonsense = "#hands-on?control.position.gain=-1&%E0%A4%A=3&control.velocity.gain&no.key=4"
-    other = opens(made, fragment=nonsense)
+    other = opens(AMBER, fragment=nonsense)
     assert read(other) == before
 
 
-def test_a_link_carries_the_changes(opens, page: Page, made: Path) -> None:
+def test_a_link_carries_the_changes(opens, page: Page) -> None:
     type_value(page, "control.position.gain", 175.0)
     type_value(page, "load.inertia", 3e-4)
     page.click('[data-do="link"]')
     link = page.input_value(".sheet textarea")
-    other = opens(made, fragment="#" + link.split("#")[1])
+    other = opens(AMBER, fragment="#" + link.split("#")[1])
     assert read(other) == read(page)
 
 
 def record_of(design: Design, path: Path) -> None:
     """Write what the simulator of the command line gives as a measured record, in deg."""
-    from nonlinear import simulate
-    from nonlinear.commands import step
-
     made = simulate(design, step(math.radians(2.0)), duration_s=0.25)
     table = np.column_stack([made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad)])
     np.savetxt(path, table, delimiter=",", header="time_s,command_deg,angle_deg", comments="", fmt="%.12g")
@@ -166,7 +152,7 @@ def record_of(design: Design, path: Path) -> None:
 
 def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
     """The record is a run of another gain: the model meets it once that gain is set; then it is removed."""
-    record_of(with_values(load_design(DESIGN), {"control.position.gain": 80.0}), tmp_path / "bench.csv")
+    record_of(with_values(AMBER, {"control.position.gain": 80.0}), tmp_path / "bench.csv")
     text = (tmp_path / "bench.csv").read_text()
     settled(page, lambda: page.evaluate(DROP, ["bench.csv", text]))
     page.wait_for_selector("#hands-on[data-behind=done]")
@@ -193,7 +179,7 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page, tmp_path) -> None:
 
 def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
-    model = assemble_loops(load_design(DESIGN)).velocity.open_loop
+    model = assemble_loops(AMBER).velocity.open_loop
     hertz = np.geomspace(2.0, 400.0, 40)
     open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
     closed = open_loop / (1.0 + open_loop)
@@ -219,15 +205,15 @@ def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
 
 
 def test_nothing_of_a_design_becomes_markup(opens) -> None:
-    design = replace(load_design(DESIGN), name=HOSTILE, title=HOSTILE, description=HOSTILE)
+    design = replace(AMBER, name=HOSTILE, title=HOSTILE, description=HOSTILE)
     result = opens(design)
     type_value(result, "control.position.gain", 130.0)
     result.click('[data-do="file"]')
     assert HOSTILE.split("\u202e")[0].split('"')[0] in result.input_value(".sheet textarea")
 
 
-def test_a_phone_has_the_sliders_within_its_width(opens, made: Path) -> None:
-    small = opens(made, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
+    small = opens(AMBER, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     assert small.evaluate("document.documentElement.scrollWidth") <= 390
     before = read(small)
     slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
@@ -238,16 +224,15 @@ def test_a_phone_has_the_sliders_within_its_width(opens, made: Path) -> None:
     assert read(small)["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
-def test_without_scripts_the_page_is_the_report_alone(browser: Browser, made: Path) -> None:
+def test_without_scripts_the_page_is_the_report_alone(browser: Browser, tmp_path: Path) -> None:
     page = browser.new_context(offline=True, java_script_enabled=False).new_page()
-    page.goto(made.as_uri())
+    page.goto(written(AMBER, tmp_path).as_uri())
     assert page.locator("#hands-on").is_hidden()
     assert page.locator("#verdicts").is_visible()
 
 
-def test_the_policy_lets_only_the_module_be_compiled(made: Path) -> None:
-    text = made.read_text(encoding="utf-8")
-    policy = text.split('Content-Security-Policy" content="')[1].split('"')[0]
+def test_the_policy_lets_only_the_module_be_compiled() -> None:
+    policy = page_text(AMBER).split('Content-Security-Policy" content="')[1].split('"')[0]
     assert "'wasm-unsafe-eval'" in policy or "&#39;wasm-unsafe-eval&#39;" in policy
     assert "'unsafe-eval'" not in policy
     assert "http" not in policy
@@ -255,7 +240,7 @@ def test_the_policy_lets_only_the_module_be_compiled(made: Path) -> None:
 
 def test_what_waits_is_not_started_once_a_value_moves(opens) -> None:
     """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
-    page = opens(load_design(DESIGN))
+    page = opens(AMBER)
     page.evaluate("const now = performance.now.bind(performance); performance.now = () => 1000 * now();")
     type_value(page, "control.position.gain", 101.0)  # by this clock its run took long: the next is late
     page.evaluate(

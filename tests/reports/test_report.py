@@ -4,6 +4,7 @@ import math
 import re
 from dataclasses import replace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ import analyses
 import nonlinear
 import reports
 from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.design import with_values
 from actuator_lti.errors import InputError
+from actuator_lti.loops.limiters import onset
 from reports import document as doc
 from reports.build import design_report
 from reports.certain import certain
@@ -181,8 +184,6 @@ def test_names_from_a_design_file_stay_text() -> None:
 
 @pytest.mark.parametrize("on_page", [True, False])
 def test_names_in_a_figure_stay_text(on_page: bool) -> None:
-    from xml.etree import ElementTree
-
     chart = Chart(title=HOSTILE, legend=True, legend_title=HOSTILE, loop=HOSTILE)
     panel = chart.panel(title=HOSTILE)
     panel.curve([1, 2], [1, None], HOSTILE, id=HOSTILE)
@@ -209,10 +210,7 @@ def test_every_shipped_design_has_its_report(name: str) -> None:
 
 
 def test_an_unstable_design_is_called_unstable_and_still_drawn() -> None:
-    from actuator_lti.design import with_values
-
-    design = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 5.0})
-    document = design_report(design)
+    document = design_report(with_values(load_design("ilr33-amber"), {"control.velocity.gain": 5.0}))
     assert document["verdict"]["parts"]["requirements"]["not_met"] > 0
     rows = {row["loop"]: row for row in rows_of(document, "margins", "Stability margins")}
     assert rows["Velocity loop"]["stable"] == {"text": "unstable", "status": "fail"}
@@ -229,10 +227,7 @@ def test_a_linear_axis_is_told_in_its_own_units() -> None:
 
 
 def test_limits_are_those_of_the_linear_onset(built: Built) -> None:
-    from actuator_lti.loops.limiters import onset
-
-    design = load_design("ilr33-amber")
-    loops = assemble_loops(design)
+    loops = assemble_loops(load_design("ilr33-amber"))
     for row in rows_of(built.document, "limits", "How far"):
         result = onset(loops, [2 * math.pi * row["hz"]])
         assert math.degrees(result.amplitude_rad[0]) == pytest.approx(row["amplitude"], rel=5e-3)

@@ -11,12 +11,14 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.errors import InputError
 from analyses.specification.capability import drive_figures
-from analyses.specification.requirements import evaluate_requirements, tally
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 
 
-def with_requirement(design: Design, **keys: Any) -> Design:
-    """Give the design with one requirement only."""
-    return replace(design, requirements=(Requirement(id="r", **keys),))
+def judged(design: Design, waivers: tuple[Waiver, ...] = (), **keys: Any) -> RequirementVerdict:
+    """The verdict on the one requirement of a design."""
+    asked = replace(design, requirements=(Requirement(id="r", **keys),), waivers=waivers)
+    (verdict,) = evaluate_requirements(asked)
+    return verdict
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +41,7 @@ def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
     bandwidth = {"quantity": "bandwidth", "unit": "Hz", "minimum": 30.0, "loop": "position"}
     overshoot = {"quantity": "overshoot", "unit": "%", "maximum": 5.0, "loop": "velocity"}
     for keys, sign, limit in ((bandwidth, 1.0, 30.0), (overshoot, -1.0, 5.0)):
-        (verdict,) = evaluate_requirements(with_requirement(amber, **keys))
+        verdict = judged(amber, **keys)
         assert verdict.verdict == tally((verdict,)).verdict == "not met"
         assert verdict.distance == pytest.approx(sign * (verdict.value - limit))
         assert verdict.distance < 0.0
@@ -47,14 +49,15 @@ def test_a_missed_limit_fails_with_a_negative_distance(amber: Design) -> None:
 
 def test_exactly_at_the_limit_is_met(amber: Design) -> None:
     value = stability_margins(assemble_loops(amber).position.open_loop).phase_margin_deg
-    wanted = with_requirement(amber, quantity="phase_margin", unit="deg", minimum=value, loop="position")
-    assert evaluate_requirements(wanted)[0].verdict == "met"
+    asked = {"quantity": "phase_margin", "unit": "deg", "minimum": value, "loop": "position"}
+    assert judged(amber, **asked).verdict == "met"
 
 
 def test_an_unstable_loop_meets_nothing(amber: Design) -> None:
     broken = with_values(amber, {"control.velocity.gain": 5.0})
-    wanted = with_requirement(broken, quantity="overshoot", unit="%", maximum=1e9, loop="every")
-    verdicts = {verdict.loop: verdict for verdict in evaluate_requirements(wanted)}
+    asked = Requirement(id="r", quantity="overshoot", unit="%", maximum=1e9, loop="every")
+    found = evaluate_requirements(replace(broken, requirements=(asked,)))
+    verdicts = {verdict.loop: verdict for verdict in found}
     assert verdicts["current"].verdict == "met"
     assert verdicts["velocity"].verdict == "not met"
     assert "unstable" in verdicts["velocity"].reason
@@ -65,34 +68,27 @@ def test_a_lower_gain_margin_counts_by_its_size() -> None:
     assert all(one.value > 0 for one in verdicts if one.requirement.quantity == "gain_margin")
 
 
-def test_a_loop_that_the_design_lacks_is_not_proven() -> None:
-    design = load_design("ctms-motor-position")
-    wanted = with_requirement(design, quantity="gain_margin", unit="dB", minimum=6.0, loop="current")
-    (verdict,) = evaluate_requirements(wanted)
-    assert verdict.verdict == "not proven"
-    assert verdict.reason == "the design has no current loop"
+def test_a_loop_that_the_design_lacks_is_not_proven_and_a_waiver_makes_it_grey(amber: Design) -> None:
+    """It lets go of nothing else."""
+    design, lacking = load_design("ctms-motor-position"), {"quantity": "gain_margin", "unit": "dB"}
+    lacking |= {"minimum": 6.0, "loop": "current"}
+    verdict = judged(design, **lacking)
+    assert (verdict.verdict, verdict.reason) == ("not proven", "the design has no current loop")
     assert not tally((verdict,)).passes
-
-
-def test_a_waiver_makes_what_is_not_proven_grey_and_nothing_else(amber: Design) -> None:
-    design = load_design("ctms-motor-position")
     waiver = Waiver(requirement="r", reason="the voltage drive has none", date="2026-11-22")
-    lacking = with_requirement(design, quantity="gain_margin", unit="dB", minimum=6.0, loop="current")
-    (verdict,) = evaluate_requirements(replace(lacking, waivers=(waiver,)))
+    verdict = judged(design, (waiver,), **lacking)
     assert (verdict.verdict, verdict.role, verdict.passes) == ("not proven", "info", True)
     assert verdict.waiver.words == "waived 2026-11-22: the voltage drive has none"
     assert tally((verdict,)).words("requirements") == "0 of 1 requirements met, 1 waived"
-    wanted = with_requirement(amber, quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
-    (missed,) = evaluate_requirements(replace(wanted, waivers=(waiver,)))
+    missed = judged(amber, (waiver,), quantity="bandwidth", unit="Hz", minimum=30.0, loop="position")
     assert (missed.verdict, missed.waiver, missed.passes) == ("not met", None, False)
 
 
 def test_what_is_not_known_is_refused_by_name(amber: Design) -> None:
     with pytest.raises(InputError, match="quantity = 'beauty': allowed are gain_margin"):
-        evaluate_requirements(with_requirement(amber, quantity="beauty", unit="1", minimum=1.0))
-    outer = {"quantity": "bandwidth", "unit": "Hz", "minimum": 1.0, "loop": "outer"}
+        judged(amber, quantity="beauty", unit="1", minimum=1.0)
     with pytest.raises(InputError, match="loop = 'outer': allowed are"):
-        evaluate_requirements(with_requirement(amber, **outer))
+        judged(amber, quantity="bandwidth", unit="Hz", minimum=1.0, loop="outer")
 
 
 # -- the drive's own figures, against the paper's equations by hand ------------------------------------
@@ -115,11 +111,8 @@ def test_a_low_supply_limits_the_speed(amber: Design) -> None:
     assert 0.055 * current + 5.9e-3 * speed == pytest.approx(4.0, rel=1e-12)
 
 
-def test_a_drive_that_friction_holds_does_not_move(amber: Design) -> None:
+def test_a_drive_that_friction_holds_does_not_move_and_a_load_is_a_number(amber: Design) -> None:
     result = drive_figures(amber, 1e3)
     assert (result.output_rate_rad_s, result.acceleration_rad_s2, result.rate_limit) == (0.0, 0.0, "force")
-
-
-def test_a_load_that_is_no_number_is_refused(amber: Design) -> None:
     with pytest.raises(InputError, match="must be finite"):
         drive_figures(amber, math.nan)

@@ -20,12 +20,11 @@ from analyses.isolation import drain
 from analyses.linear import loop_figures
 from analyses.margins import run
 from analyses.validation import CHECKS, validate
-from reports import document as doc
 from reports.cli.app import build
 from reports.cli.main import main
 from reports.sections.corners import summary as corners_summary
 from reports.sections.validation import section
-from reports.verdict_summary import verdict_of, verdict_words
+from reports.verdict_summary import verdict_of
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
@@ -42,13 +41,9 @@ def status(path: Path, design: Design, capsys, *call: str) -> tuple[int, str]:
     return code, capsys.readouterr().out
 
 
-@pytest.mark.parametrize(
-    ("waivers", "code", "head", "word"), [((), 1, "NOT PROVEN", "not proven"), ((WAIVED,), 0, "PASS", "met")]
-)
-def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], code: int, head: str, word: str, tmp_path,
-    capsys,
-) -> None:  # fmt: skip
+@pytest.mark.parametrize("waivers", [(), (WAIVED,)])
+def test_margins_and_report_say_the_same(waivers: tuple[Waiver, ...], tmp_path, capsys) -> None:
+    code, head, word = (0, "PASS", "met") if waivers else (1, "NOT PROVEN", "not proven")
     design, path = asking(*waivers), tmp_path / "d.toml"
     made = status(path, design, capsys, "margins")
     assert (made[0], made[1].startswith(f"{head}  ")) == (code, True)
@@ -144,28 +139,6 @@ def test_a_row_of_a_validation_not_proven_can_be_waived(waived: str, passes: boo
     assert made[0]["status"] == ("pass" if passes else "warn")
     wrong = replace(judged, rows=tuple(replace(row, verdict=Verdict.NOT_MET) for row in rows))
     assert wrong.verdict == "not met"  # a waiver lets go what is not proven, never what is contradicted
-
-
-def document(*sections: doc.Section, kind: str = "report") -> Any:
-    return doc.document(title="T", subtitle="", design={}, provenance={}, sections=sections, kind=kind)
-
-
-def test_a_failed_section_fails_the_report() -> None:
-    met = doc.verdict("a", "A", value=3.0, limit=2.0, unit="dB", distance=1.0, passed=True)
-    good = doc.section("one", "One", [doc.verdicts([met])], status="pass")
-    bad = doc.section("missing-linear", "Missing parts", [], status="fail")
-    assert document(good)["verdict"]["passed"] is True
-    whole = document(good, bad)
-    assert whole["verdict"]["passed"] is False
-    assert verdict_words(whole["verdict"]) == ["failed: Missing parts", "1 of 1 requirements met"]
-    assert doc.loads(doc.dumps(whole))["verdict"] == whole["verdict"]
-    assert document(good, bad, kind="validation")["verdict"]["passed"] is True  # its own verdicts decide
-
-
-def test_a_section_with_a_failed_verdict_is_not_said_twice() -> None:
-    missed = doc.verdict("a", "A", value=1.0, limit=2.0, unit="dB", distance=-1.0, passed=False)
-    verdict = document(doc.section("one", "One", [doc.verdicts([missed])], status="fail"))["verdict"]
-    assert verdict_words(verdict) == ["0 of 1 requirements met, 1 not met"]
 
 
 def reported(folder: Path, *changes: str) -> tuple[int, str, Any]:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
 from actuator_lti.design import with_overrides, with_values
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Requirement
 from analyses.corners import corners
 from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
 from analyses.linear.responses import curve
@@ -97,8 +97,6 @@ def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_dr
 
 
 def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey, fin: Design) -> None:
-    from actuator_lti.design.model import Requirement
-
     asked = Requirement(id="m", quantity="modulus_margin", unit="1", loop="every", minimum=0.7)
     point = weakest(replace(survey, design=replace(fin, requirements=(asked,))))
     assert (point.view.place, point.view.loop, point.limit, point.required) == ("", "position", 0.7, True)

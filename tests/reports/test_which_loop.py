@@ -22,7 +22,7 @@ from analyses.large_signal.from_rest import free_amplitude, sweep_from_rest
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.responses import answer_curve, response_at
-from analyses.specification.requirements import evaluate_requirements
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
@@ -30,6 +30,11 @@ from reports.sections.requirements import label
 def asking(design: Design, **keys: object) -> Design:
     kept = {"id": "r", "quantity": "bandwidth", "unit": "Hz", "loop": "position", "minimum": 1.0}
     return replace(design, requirements=(Requirement(**{**kept, **keys}),))
+
+
+def judged(design: Design, **keys: object) -> RequirementVerdict:
+    (verdict,) = evaluate_requirements(asking(design, **keys))
+    return verdict
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +49,9 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115(screw
     db = answer_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
     assert db[0] == pytest.approx(-2.37, abs=0.01)
     assert db[1] == pytest.approx(-12.7, abs=0.05)
-    (to_command,) = evaluate_requirements(asking(screw, to="command"))
-    (to_reference,) = evaluate_requirements(asking(screw, to="reference"))
-    (default,) = evaluate_requirements(asking(screw))
+    to_command = judged(screw, to="command")
+    to_reference = judged(screw, to="reference")
+    default = judged(screw)
     assert to_command.value == default.value == pytest.approx(5.62, abs=0.01)
     assert to_reference.value == pytest.approx(114.8, abs=0.05)
     assert label(to_command) == "Position loop: bandwidth (−3 dB), to the command"
@@ -67,7 +72,7 @@ def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal(screw: Design) ->
 
 def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
     """The sentence beside the requirement, against a run of the simulator read by hand."""
-    (verdict,) = evaluate_requirements(asking(screw, to="command"))
+    verdict = judged(screw, to="command")
     full = screw.validation.full_deflection_rad
     hz = verdict.value
     onset = 1e3 * min(0.4 / (2.0 * np.pi * hz), 4.0 / (2.0 * np.pi * hz) ** 2)
@@ -136,15 +141,14 @@ def test_the_step_behind_a_mean_is_the_simulated_one(screw: Design) -> None:
     y = [sum(loop_y[max(0, k - mean.samples + 1) : k + 1]) / mean.samples for k in range(len(loop_y))]
     np.testing.assert_allclose(figures.response, y, atol=1e-9)
     assert figures.overshoot_percent == pytest.approx(100.0 * (max(y) / figures.final_value - 1.0))
-    assert figures.settling_time_s == pytest.approx(
-        (1 + max(k for k, v in enumerate(y) if abs(v / figures.final_value - 1.0) > 0.02)) * mean.period_s
-    )
+    last = max(k for k, v in enumerate(y) if abs(v / figures.final_value - 1.0) > 0.02)
+    assert figures.settling_time_s == pytest.approx((1 + last) * mean.period_s)
 
 
 def test_a_filter_of_the_command_is_in_one_response_only() -> None:
     design = with_overrides(load_design("ilr33-amber"), {"command.filter_time": "50 ms"})
-    (to_command,) = evaluate_requirements(asking(design))
-    (to_reference,) = evaluate_requirements(asking(design, to="reference"))
+    to_command = judged(design)
+    to_reference = judged(design, to="reference")
     bare = closed_loop_bandwidth(assemble_loops(load_design("ilr33-amber")).plain_response)
     assert to_reference.value == pytest.approx(bare.minus3db_hz)
     assert to_command.value < 3.2 < to_reference.value  # 1/(2 pi 50 ms) = 3.18 Hz
@@ -155,10 +159,10 @@ def test_a_requirement_chooses_the_current_loop() -> None:
     keys = {"quantity": "phase_margin", "unit": "deg", "loop": "current"}
     for rotor in ("free", "locked"):
         loops = assemble_loops(design, rotor=rotor)
-        (verdict,) = evaluate_requirements(asking(design, **keys, rotor=rotor))
+        verdict = judged(design, **keys, rotor=rotor)
         assert verdict.value == pytest.approx(stability_margins(loops.current.open_loop).phase_margin_deg)
         assert label(verdict) == f"Current loop, rotor {rotor}: phase margin"
-    (verdict,) = evaluate_requirements(asking(design, **keys))
+    verdict = judged(design, **keys)
     assert verdict.rotor == "free"
 
 

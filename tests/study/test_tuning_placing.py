@@ -8,20 +8,8 @@ from toleranced import QUICK, need
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.design.model import (
-    Controller,
-    ControllerObjects,
-    Coupling,
-    Design,
-    Friction,
-    Gear,
-    Limits,
-    Load,
-    Motor,
-    PositionLoop,
-    Validation,
-    VelocityLoop,
-)
+from actuator_lti.design import model
+from actuator_lti.design.model import Coupling, Design, Gear, Load, Motor, PositionLoop
 from actuator_lti.errors import InputError
 from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
@@ -38,10 +26,11 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
         name="servo", title="", motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
         gears=(Gear(name="none", ratio=1.0),), coupling=coupling,
         load=Load(inertia_kgm2=inertia, path="back-drivable"),
-        friction=Friction(viscous_Nms_rad=1e-4), limits=Limits(voltage_V=10.0),
-        controller=Controller(period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
-                              velocity=VelocityLoop(gain=gain, integral_time_s=integral_time)),
-        validation=Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
+        friction=model.Friction(viscous_Nms_rad=1e-4), limits=model.Limits(voltage_V=10.0),
+        controller=model.Controller(
+            period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
+            velocity=model.VelocityLoop(gain=gain, integral_time_s=integral_time)),
+        validation=model.Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
     )  # fmt: skip
 
 
@@ -87,16 +76,14 @@ def test_a_requirement_that_only_a_notch_meets():
 
 def distance_of(tuned):
     """Squares of the ln ratios of gain and depth, and of the width of the notch over its frequency."""
-    velocity = tuned.design.controller.velocity
-    notch = velocity.filters[-1]
+    velocity, notch = tuned.design.controller.velocity, tuned.design.controller.velocity.filters[-1]
     ratios = np.log([velocity.gain / 0.02, notch.depth])
     return ratios @ ratios + (notch.width_rad_s / notch.frequency_rad_s) ** 2
 
 
 def nearest_drawn(design, most):
     """Of many notches about the resonance, with any gain and depth: the nearest that does, below a change."""
-    placed = place(design, ("notch",))
-    problem = problem_of(placed.design, loop_requirements(design), {}, placed.variables)
+    problem = problem_of(design, loop_requirements(design), {}, ("notch",))
     rng, size = np.random.default_rng(5), 60_000
     frequency = 2 * np.pi * 700.0 * np.exp(rng.uniform(-0.3, 0.3, size))
     gain, depth = 0.02 * np.exp(rng.uniform(0.0, 1.5, size)), np.exp(rng.uniform(-1.5, 0.0, size))
@@ -140,12 +127,12 @@ def test_a_design_that_meets_all_is_left_as_it_is():
 def test_neutral_elements_change_nothing():
     """A notch of depth 1 is a factor 1; feed-forward starts at what the design has."""
     design = servo(stiffness=RESONANT, position=PositionLoop(gain=20.0, feedforward=0.4))
-    placed = place(design, ("notch", "feedforward"))
-    starts = {v.path: v.start for v in placed.variables}
+    placed, variables = place(design, ("notch", "feedforward"))
+    starts = {v.path: v.start for v in variables}
     assert starts["control.position.feedforward"] == 0.4
     for name in ("velocity", "position"):
         before = stability_margins(getattr(assemble_loops(design), name).open_loop)
-        after = stability_margins(getattr(assemble_loops(placed.design), name).open_loop)
+        after = stability_margins(getattr(assemble_loops(placed), name).open_loop)
         assert after.gain_margin_db == pytest.approx(before.gain_margin_db, rel=1e-9)
         assert after.phase_margin_deg == pytest.approx(before.phase_margin_deg, rel=1e-9)
 
@@ -168,7 +155,7 @@ def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
     baseline = load_design("ilr33-amber")
     assert baseline.objects.named
     assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
-    other = replace(baseline, objects=ControllerObjects())
+    other = replace(baseline, objects=model.ControllerObjects())
     assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
     assert step_of_gain(load_design("joint"), "control.position.gain") is None
 

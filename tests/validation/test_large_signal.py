@@ -24,6 +24,7 @@ from analyses.large_signal.sawtooth import sawtooth
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from reports.sections.large_signal import _result
+from reports.sections.names import output_unit
 from tests.changed import changed
 from tests.nonlinear.elastic_drive import stribeck
 from tests.validation.random_drives import full_drive
@@ -173,7 +174,7 @@ def _words(gain_db: list[float]) -> str:
         0.0, HZ, (1.0,), size, gain, nothing, gain[0], nothing[0], size, found, nothing[:, 0], low_high,
         below, 5.0, None,
     )  # fmt: skip
-    return _result(result, 180.0 / np.pi, "deg")
+    return _result(result, output_unit("rotary"))
 
 
 @pytest.mark.parametrize(

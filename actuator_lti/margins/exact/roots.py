@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import Any, TypeVar
 
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
@@ -56,8 +56,15 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
         p = p.right_shift(1)
     if p.degree() < 1:
         return []
-    result: Any = (p // p.content()).complex_roots()
-    return [(acb(root), times) for root, times in result]
+    return list(_isolated(tuple((p // p.content()).coeffs()), ctx.prec))
+
+
+@lru_cache(maxsize=32)
+def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]:
+    """Margins and peaks of one loop ask for the same roots, which take seconds of a hundred states."""
+    with ctx.workprec(bits):
+        result: Any = fmpz_poly(list(coefficients)).complex_roots()
+        return [(acb(root), times) for root, times in result]
 
 
 def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:

@@ -9,7 +9,7 @@ const first = { values: start, pins: {} };
 export const past = { ...first, settled: first, back: [], forth: [] };
 let frame = 0; // that the page follows in; 0 where it has followed
 const same = (a, b) => a.every((value, k) => value === b[k]);
-export const allowed = (key, value) => Number.isFinite(value) && (key.open ? value > key.least : value >= (key.least ?? -Infinity)) && value <= (key.most ?? Infinity) && (!key.whole || Number.isInteger(value));
+export const allowed = (key, value) => Number.isFinite(value) && value >= (key.least ?? -Infinity) && value <= (key.most ?? Infinity) && (!key.whole || Number.isInteger(value));
 export const inUnit = (key, value) => value / key.factor;
 
 export const preview = (k, value) => {
