@@ -40,6 +40,14 @@ _FACTORS = {
     "9.549 V/krpm": 1e3 / 9.549296585513721,
 }
 """The usual factors between conventions of data sheets."""
+_SHEETS = {
+    "dc": 1.0,
+    "rms-line": 3**0.5,
+    "peak-phase": 1.5,
+    'rms-line", kM in A peak or kE in V peak': 1.5**0.5,
+    'rms-line", kM in A peak and kE in V peak': 0.75**0.5,
+}
+"""kM over kE in SI, by what motor.constants and units say of amperes and volts."""
 
 
 def check_motor(design: Design) -> Iterator[Refusal]:
@@ -58,11 +66,10 @@ def check_motor(design: Design) -> Iterator[Refusal]:
     kM, kE = _constants(design)
     if kM is not None and kE is not None and _apart(kM, kE):
         wanted = given["back_emf_constant"] * kM / kE
-        off, words = min((abs(abs(log(kE / kM)) - log(factor)), words) for words, factor in _FACTORS.items())
         allowed = (
             f"allowed: within 10 % of {wanted:g}{_as_written(design, 'back_emf_constant', kM / kE)}, as "
             f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
-            f"constant){f'; the ratio is {words}' if off < 0.08 else ''}"
+            f"constant){_ratio(given['torque_constant'] / given['back_emf_constant'], kE / kM)}"
         )
         yield "motor.back_emf_constant", _stated(design, "back_emf_constant"), allowed
 
@@ -75,6 +82,18 @@ def _constants(design: Design) -> tuple[Any, Any]:
 
 def _apart(kM: Any, kE: Any) -> Any:
     return abs(kE - kM) > 0.1 * kM * (1 + 1e-12)
+
+
+def _ratio(stated: Any, off: Any) -> str:
+    """What would explain the ratio of kM to kE, as stated and of the model's."""
+    near = {words: abs(log(stated / ratio)) for words, ratio in _SHEETS.items()}
+    words = min(near, key=near.__getitem__)
+    if near[words] < 0.04:
+        closed = words if '"' in words else f'{words}"'
+        return f'; the ratio is that of motor.constants = "{closed}'
+    factors = {words: abs(abs(log(off)) - log(factor)) for words, factor in _FACTORS.items()}
+    words = min(factors, key=factors.__getitem__)
+    return f"; the ratio is {words}" if factors[words] < 0.08 else ""
 
 
 def with_stand_ins(design: Design) -> Design:

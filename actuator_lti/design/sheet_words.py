@@ -128,12 +128,15 @@ _WORDS: dict[str, dict[str, str]] = {
         "ki kvi i_gain integral_gain integrator_gain": _INTEGRAL,
         "kd d_gain derivative_gain": "derivative_time = derivative gain/gain",
         "tn ti reset_time integral_time_constant integral_action_time": "integral_time",
-        "time_constant": "frequency, 1/(2 pi time constant), where it is that of a low-pass",
         "pff kff pfg velocity_feedforward": "feedforward",
         "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
-        "q": "width, the frequency over Q",
         "frequency cycle_time sample_time": _MULTIPLE,
-        "bandwidth": "gain: 2 pi f times L (current), J/kM (velocity) or 1 (position)",
+        "bandwidth": 'gain, which takes "40 Hz" too; of the position 2 pi f',
+    },
+    ".filter": {
+        "bandwidth": "width",
+        "time_constant": "frequency, 1/(2 pi time constant), where it is that of a low-pass",
+        "q": "width, the frequency over Q",
     },
     ".law": {
         "num numerator den denominator": "A, B, C and D, in MATLAB [A,B,C,D] = tf2ss(num,den), at the period "
@@ -166,7 +169,7 @@ def key_for(table: str, word: str, known: Iterable[str] = ()) -> str:
     first, *rest = re.split(r"[.\[]", table)
     plain = _AFTER.sub("", re.sub(r"[- ()]+", "_", word.lower()).strip("_"))
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
-    tables = (".law",) if "law" in rest else tables
+    tables = (".law",) if "law" in rest else (".filter", *tables) if "filter" in rest else tables
     own = {key: key for key in known}
     words = plain.split("_")
     ends = ("_".join(words[k:]) for k in range(len(words)))

@@ -30,6 +30,7 @@ _BASE = {
     "m meter metre": "[length]", "s second sec": "[time]", "kg kilogram": "[mass]",
     "A ampere amp": "[current]", "rad radian": "[angle]",
     "K kelvin": "[temperature]", "degC celsius C": "[celsius]",
+    "count counts cnt cts cpr CPR inc increment": "[count]",  # no angle: its revolution is another key
 }  # fmt: skip
 # What each is, in units that stand above it.
 _DERIVED = {
@@ -73,8 +74,7 @@ _DERIVED = {
     "rpm RPM": ("0.10471975511965977", "rad/s"),
     "KV Kv": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
-    "count cpr CPR inc increment": ("1", "1"),
-    "line": ("4", "1"),  # of an encoder: two edges of two tracks
+    "line": ("4", "count"),  # of an encoder: two edges of two tracks
 }
 # What makers write into a unit that is none, and what is to be written instead.
 _PULSES = 'is not the same of all makers; write "lines" (4 counts each) or "counts"'
@@ -87,6 +87,7 @@ _ASIDE = {
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
+_COUNTS: Dimension = (("[count]", 1),)
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
 _AMPERE = re.compile(r"\bA\b")
@@ -256,9 +257,12 @@ _FREQUENCY = "speed or angular frequency"
 _GAIN_OF_TORQUE = (
     "such a gain over kM, and over the ratio squared where it is of the output, is one in amperes"
 )
+_IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     (_FREQUENCY, "s"): "a period of {period:.6g} s",
+    ("gain or rate", "A*s/rad"): _IN_HZ,
+    ("gain or rate", "V*s/rad"): _IN_HZ,
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
@@ -280,6 +284,8 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         size = number * value.factor
         period = 2.0 * pi / size if size > 0.0 else 0.0
         return f"; {said.format(size=size, period=period)}" if period or "{period" not in said else ""
+    if "[count]" in dict(value.dimension):
+        return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
     if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
         return "; write rev or rad into it, whichever is meant"
     return ""
@@ -287,7 +293,7 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
 
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:
     """Whether a unit may stand for another; a radian in the denominator may be left out."""
-    if value.dimension == wanted.dimension:
+    if value.dimension == wanted.dimension or (value.dimension, wanted.dimension) == (_COUNTS, ()):
         return True
     return wanted.angle < 0 and value.angle == 0 and value.without_angle() == wanted.without_angle()
 

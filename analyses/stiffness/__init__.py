@@ -2,5 +2,6 @@
 
 from actuator_lti.start.on_first_use import on_first_use
 
-_NAMES = ("Stiffness", "check_stiffness", "lost_motion_seen", "stiffness", "stiffness_at_rest")
-__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys((*_NAMES, "stiffness_curves"), f"{__name__}.run"))
+_RESULTS = ("AtRest", "Check", "LostMotion", "Stiffness", "StiffnessCurve")
+_QUESTIONS = ("check_stiffness", "lost_motion_seen", "stiffness", "stiffness_at_rest", "stiffness_curves")
+__getattr__, __dir__ = on_first_use(__name__, dict.fromkeys((*_RESULTS, *_QUESTIONS), f"{__name__}.run"))

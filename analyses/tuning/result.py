@@ -150,6 +150,6 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tup
             shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
             limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
-            one = (corner, size, rise, seen["overshoot"], settling, seen["final_error"], limited)
-            made.append(NonlinearCheck(*one))
+            overshoot, error = seen["overshoot"], seen["final_error"]
+            made.append(NonlinearCheck(corner, size, rise, overshoot, settling, error, limited))
     return tuple(made)

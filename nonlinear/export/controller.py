@@ -42,6 +42,8 @@ def controller_export(
     """
     refuse_prefix(prefix)
     ours = controller_of(design, prefix, single_precision=single_precision)
+    source = _source(ours.program, prefix)
+    called = ", ".join(f"`{name}`" for name in sorted({*_LIBRARY.findall(source)}))
     values = {
         "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),
         "NAME": plain(design.name), "TITLE": plain(design.title), "VERSION": exporter_version(),
@@ -49,15 +51,11 @@ def controller_export(
         "DESIGN_HASH": design_hash(design), "REAL": "float" if single_precision else "double",
         "PRECISION": "single" if single_precision else "double",
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
-        "STRUCTS": _structs(ours),
-        "DECLARATIONS": _declarations(ours.program),
+        "STRUCTS": _structs(ours), "SIZES": _sizes(ours, single_precision),
+        "DECLARATIONS": _declarations(ours.program), "ROUNDINGS": str(roundings(ours)),
+        "SOURCE_HASH": hashlib.sha256(source.encode()).hexdigest(),
     }  # fmt: skip
-    source = _source(ours.program, prefix)
-    values["SOURCE_HASH"] = hashlib.sha256(source.encode()).hexdigest()
-    called = ", ".join(f"`{name}`" for name in sorted({*_LIBRARY.findall(source)}))
     values["LIBRARY"] = f"{called} of the mathematical library" if called else "no function of any library"
-    values["SIZES"] = _sizes(ours, single_precision)
-    values["ROUNDINGS"] = str(roundings(ours))
     texts = {
         "controller.h": filled("controller.h", values),
         "controller.c": source,
@@ -81,8 +79,8 @@ def _source(program: Program, prefix: str) -> str:
         head += ["#include <math.h>", ""]
     if re.search(r"\bbool\b", body):
         head += ["#include <stdbool.h>", ""]
-    words = {"DESIGN": "actuator-lti controller ", "REVISION": " revision ", "DESIGN_HASH": " "}
-    words["SOURCE_HASH"] = " "
+    words = {"DESIGN": "actuator-lti controller ", "REVISION": " revision "}
+    words |= dict.fromkeys(("DESIGN_HASH", "SOURCE_HASH"), " ")
     parts = " ".join(f'"{word}" {upper}CONTROLLER_{name}' for name, word in words.items())
     return "\n".join([*head, f"const char {prefix}controller_version[] = {parts};", "", body])
 

@@ -134,10 +134,9 @@ def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr 
 
 def begins(p: Floats) -> dict[int, str]:
     """Name of each part of the state by its first place."""
-    result = {
-        value: name for name, value in vars(layout).items() if name.startswith("S_") and type(value) is int
-    }
-    result |= {int(p[getattr(layout, name)]): name for name in vars(layout) if name.startswith("AT_")}
+    places = {name: value for name, value in vars(layout).items() if type(value) is int}
+    result = {value: name for name, value in places.items() if name.startswith("S_")}
+    result |= {int(p[value]): name for name, value in places.items() if name.startswith("AT_")}
     if p[layout.OWN_STAGE] > 0.0:
         own, work = int(p[layout.AT_OWN]), int(p[layout.AT_WORK])
         result |= {work + j: f"LAW_{name.upper()}" for j, name in enumerate(LAW_INPUTS)}
@@ -147,49 +146,35 @@ def begins(p: Floats) -> dict[int, str]:
     return dict(sorted(result.items()))
 
 
-def _owner(bounds: dict[int, str], row: str, index: ast.expr) -> object:
+def _owner(bounds: dict[int, str], row: str, index: ast.expr) -> str | None:
     """The part of the state that an element belongs to; None in other rows."""
-    return _part(bounds, _begin(index)) if row == "s" else None
+    place = _begin(index)
+    return bounds[max(begin for begin in bounds if begin <= place)] if row == "s" else None
 
 
 def _begin(index: ast.expr) -> int:
     return split_index(index)[0]  # the known part of an index
 
 
-def _part(bounds: dict[int, str], place: int) -> str:
-    return bounds[max(begin for begin in bounds if begin <= place)]
-
-
 def _elements(functions: Iterable[Leftover], row: str) -> list[ast.Subscript]:
-    return [
-        node
-        for left in functions
-        for node in ast.walk(left.tree)
-        if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name) and node.value.id == row
-    ]
+    nodes = (node for left in functions for node in ast.walk(left.tree) if isinstance(node, ast.Subscript))
+    return [node for node in nodes if isinstance(node.value, ast.Name) and node.value.id == row]
 
 
 def _never_changed(functions: dict[str, Leftover], bounds: dict[int, str]) -> dict[int, float]:
     """Single numbers of the state that only the start writes, as a constant, or nobody."""
     start = {"controller_start", *(name for name in functions if name.startswith(("init_", "settle")))}
-    changed = {
-        _part(bounds, _begin(node.slice))
-        for node in _elements((left for name, left in functions.items() if name not in start), "s")
-        if isinstance(node.ctx, ast.Store)
-    }
+    running = _elements((left for name, left in functions.items() if name not in start), "s")
+    changed = {_owner(bounds, "s", node.slice) for node in running if isinstance(node.ctx, ast.Store)}
     begun: dict[int, float | None] = {}
     for name in start & set(functions):
         for node in ast.walk(functions[name].tree):
             if isinstance(node, ast.Assign):
                 value = float(number(node.value)) if isinstance(node.value, ast.Constant) else None
                 begun |= {_begin(t.slice): value for t in node.targets if isinstance(t, ast.Subscript)}
-    read = {
-        _begin(node.slice)
-        for node in _elements(functions.values(), "s")
-        if isinstance(node.slice, ast.Constant)
-    }
-    values = {place: begun.get(place, 0.0) for place in read if _part(bounds, place) not in changed}
-    return {place: value for place, value in values.items() if value is not None}
+    single = [node for node in _elements(functions.values(), "s") if isinstance(node.slice, ast.Constant)]
+    read = {_begin(node.slice) for node in single if _owner(bounds, "s", node.slice) not in changed}
+    return {place: value for place in read if (value := begun.get(place, 0.0)) is not None}
 
 
 def _structs(design: Design, p: Floats, prefix: str, functions: Iterable[Leftover]) -> dict[str, Struct]:
@@ -207,7 +192,7 @@ def _state(design: Design, p: Floats, functions: list[Leftover]) -> Iterable[Mem
     kinds = state_kinds(p)
     nodes = _elements(functions, "s")
     for begin, name in bounds.items():
-        ours = [node.slice for node in nodes if _part(bounds, _begin(node.slice)) == name]
+        ours = [node.slice for node in nodes if _owner(bounds, "s", node.slice) == name]
         if not ours:
             continue
         places = [_begin(index) for index in ours]
@@ -224,19 +209,15 @@ def _members(design: Design, functions: list[Leftover], row: str) -> Iterable[Me
     """Inputs or outputs that are used."""
     used = {_begin(node.slice) for node in _elements(functions, row)}
     for place in sorted(used):
-        if place in (MOTOR_COUNTS, OUTPUT_COUNTS):
-            yield Member("motor_counts" if place == MOTOR_COUNTS else "output_counts", place, 0, "count")
+        kind: Kind = "int" if place == layout.IO_FLAGS else "float"
+        if name := {MOTOR_COUNTS: "motor_counts", OUTPUT_COUNTS: "output_counts"}.get(place):
+            yield Member(name, place, 0, "count")
         else:
-            kind: Kind = "int" if place == layout.IO_FLAGS else "float"
             yield Member(member_name(design, SIGNAL_AT[place]), place, 0, kind)
 
 
 def _zeroed(start: Leftover, state: Struct) -> None:
     """Begin with zero in what the start itself leaves."""
-    texts = [
-        f"for j in range({each.length}): s[{each.first} + j] = 0.0"
-        if each.length
-        else f"s[{each.first}] = 0.0"
-        for each in state.members
-    ]
-    start.tree.body = ast.parse("\n".join(texts)).body + start.tree.body
+    for each in reversed(state.members):
+        text = f"for j in range({each.length}): s[{each.first} + j] = 0.0"
+        start.tree.body[:0] = ast.parse(text if each.length else f"s[{each.first}] = 0.0").body

@@ -13,14 +13,8 @@ _INSIDE = {  # numbers in the unit of the command of the next stage inside
     "S_VELOCITY_INTEGRATOR": "velocity", "S_TORQUE_FEEDFORWARD": "velocity", "S_TORQUE_CHAIN": "velocity",
     "S_POSITION_INTEGRATOR": "position",
 }  # fmt: skip
-_OUTERMOST = (
-    "S_PROFILE",
-    "S_PROFILE_COMMAND",
-    "AT_AVERAGE",
-    "S_AVERAGE_SUM",
-    "S_COMMAND_CHAIN",
-    "IN_COMMAND",
-)
+_OUTERMOST = {"S_PROFILE", "S_PROFILE_COMMAND", "S_COMMAND_CHAIN", "S_AVERAGE_SUM"}
+_OUTERMOST |= {"AT_AVERAGE", "IN_COMMAND"}
 _UNITS = {
     "AT_ANGLES": "rad", "LAW_ANGLE": "rad", "LAW_OUTPUT_ANGLE": "rad", "LAW_SPEED": "rad/s",
     "LAW_OUTPUT_SPEED": "rad/s", "LAW_CURRENT": "A",
@@ -60,9 +54,8 @@ def _unit(design: Design, name: str) -> str:
     if name == "S_PROFILE_SPEED":
         return f"{_COMMANDED[stages[0]]}/s".replace("/s/s", "/s2")
     if name in _INSIDE:
-        order = [*_COMMANDED]
-        outside = order.index(_INSIDE[name])
-        return next(_COMMANDED[each] for each in stages if order.index(each) > outside)
+        inside = [*_COMMANDED][[*_COMMANDED].index(_INSIDE[name]) + 1 :]
+        return next(_COMMANDED[each] for each in stages if each in inside)
     return _UNITS.get(name) or said_of(name)[1]
 
 

@@ -65,13 +65,12 @@ def _is_moderate(ours: Controller, vector: Vector) -> bool:
 def _is_decided(ours: Controller, vector: Vector, rng: np.random.Generator, scale: float) -> bool:
     """Whether the whole numbers stay where all others are moved by random shares of the roundings."""
     whole = _all_places(ours.state, "int")
-    plain = after(ours, vector)[whole]
+    plain, size = after(ours, vector)[whole], roundings(ours) * _MOVE * scale
     places = [_all_places(struct, "float") for struct in (ours.state, ours.measured)]
     for _ in range(_TRIED):
         moved = vector
         for which, place in enumerate(places):
-            by = roundings(ours) * _MOVE * scale * rng.uniform(-1.0, 1.0, place.size)
-            moved = _moved_at(ours, moved, which, place, by)
+            moved = _moved_at(ours, moved, which, place, size * rng.uniform(-1.0, 1.0, place.size))
         if not np.array_equal(after(ours, moved)[whole], plain):
             return False
     return True
@@ -169,13 +168,12 @@ def _moved_at(
     """A vector with numbers moved, either way, so that no count goes on to the next."""
     counted = [each for each in ours.measured.members if which and each.kind == "count"]
     for way in (1.0, -1.0):
-        rows = [vector[0].copy(), vector[1].copy()]
-        rows[which][place] *= 1.0 + way * by
-        now, then = (
-            [_value(ours, ours.measured, each, row) for each in counted] for row in (rows[1], vector[1])
-        )
+        state, seen = moved = vector[0].copy(), vector[1].copy()
+        moved[which][place] *= 1.0 + way * by
+        rows = (seen, vector[1])
+        now, then = ([_value(ours, ours.measured, each, row) for each in counted] for row in rows)
         if now == then:
-            return rows[0], rows[1]
+            return state, seen
     return vector
 
 
@@ -183,19 +181,15 @@ def vectors_text(ours: Controller, prefix: str, *, single_precision: bool) -> st
     """``vectors.h``: the vectors, and what is compared with which bound."""
     vectors = vectors_of(ours, single_precision=single_precision)
     bounds = rounding_bounds(ours, vectors, single_precision=single_precision)
-    rows = []
+    structs, rows = (ours.state, ours.measured, ours.out, ours.state), []
     for vector in vectors:
         behind = after(ours, vector)
-        parts = (
-            (ours.state, vector[0]), (ours.measured, vector[1]), (ours.out, behind), (ours.state, behind),
-        )  # fmt: skip
+        parts = zip(structs, (*vector, behind, behind), strict=True)
         rows.append("    {" + ", ".join(_initialiser(ours, struct, row) for struct, row in parts) + "}")
-    checks = [
-        f"static const check {name}_checks[] = {{\n"
-        + ",\n".join(_check(struct, each, bound) for each, bound in zip(struct.members, row, strict=True))
-        + "\n};"
-        for name, struct, row in zip(("out", "state"), (ours.out, ours.state), bounds, strict=True)
-    ]
+    checks = []
+    for struct, row in zip((ours.out, ours.state), bounds, strict=True):
+        lines = ",\n".join(_check(struct, *each) for each in zip(struct.members, row, strict=True))
+        checks.append(f"static const check {struct.argument}_checks[] = {{\n{lines}\n}};")
     return "\n".join([
         "/* Ticks of the simulator: state before, what the controller saw, output, state behind it. */",
         "#include <stddef.h>", '#include "controller.h"', "",

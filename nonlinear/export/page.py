@@ -48,11 +48,8 @@ def changes_row(design: Design, path: str) -> bool | None:
 
 def changes_figure(design: Design, path: str, name: str, load_Nm: float) -> bool:
     """Whether a key has an influence on a figure of the whole drive."""
-    try:
-        changed = followed(design, {path: parameter_value(design, path)}, Tape(interpreted=True))
-        return isinstance(drive_figure(changed, name, load_Nm), Traced)
-    except TypeError:
-        return False
+    lines = figure_statements(design, {path: parameter_value(design, path)}, name, load_Nm)
+    return lines is not None and isinstance(lines[-1].terms[0], str)  # else a number
 
 
 def figure_statements(

@@ -62,8 +62,7 @@ def _followed(
             break
     except ArithmeticError:  # a turn that no values take: those of the keys' ranges never come here
         end = _refusal(BEYOND)
-    rest = [end]
-    number = len(way.outcomes)
+    rest, number = [end], len(way.outcomes)
     for statement in reversed(way.statements):
         if statement.kind != "condition":
             rest.insert(0, statement)

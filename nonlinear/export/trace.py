@@ -113,22 +113,17 @@ class Traced:
     __sub__, __rsub__ = _binary("-", operator.sub)
     __mul__, __rmul__ = _binary("*", operator.mul)
     __truediv__, __rtruediv__ = _binary("/", operator.truediv)
+    __pow__, _ = _binary("pow", operator.pow)
+    __and__, _ = _binary("&&", lambda one, other: bool(one) and bool(other))  # of comparisons that are values
+    __or__, _ = _binary("||", lambda one, other: bool(one) or bool(other))
+    __rand__, __ror__ = __and__, __or__
     __lt__, __le__ = _compared("<", operator.lt), _compared("<=", operator.le)
     __gt__, __ge__ = _compared(">", operator.gt), _compared(">=", operator.ge)
     __eq__, __ne__ = _compared("==", operator.eq), _compared("!=", operator.ne)
     floor, ceil = _rounded("floor"), _rounded("ceil")  # numpy asks by these names
     __floor__, __ceil__ = floor, ceil
     tan, sqrt, sin, cos, exp, log = (_function(name) for name in ("tan", "sqrt", "sin", "cos", "exp", "log"))
-
-    def __and__(self, other: Any) -> Any:
-        """Both; of comparisons that are values."""
-        return self.tape.value("&&", (self, other), bool(self.number) and bool(_number(other)))
-
-    def __or__(self, other: Any) -> Any:
-        """One at least."""
-        return self.tape.value("||", (self, other), bool(self.number) or bool(_number(other)))
-
-    __rand__, __ror__ = __and__, __or__
+    __abs__ = _function("fabs")
 
     def either(self, yes: Any, no: Any) -> Traced:
         """One value where this comparison holds, else the other."""
@@ -141,8 +136,9 @@ class Traced:
         kept = self.number if abs(self.number) >= _number(least) else 0.0
         return self.tape.value("zero_below", (self, least), kept)
 
-    def __pow__(self, power: Any) -> Traced:
-        return self.tape.value("pow", (self, power), self.number ** _number(power))
+    def __format__(self, form: str) -> str:
+        """Stands in a message for the value that it will have."""
+        return f"\x01{form or 'g'}\x02{self.name}\x03"
 
     def __mod__(self, other: Any) -> Traced:
         return self._remainder(self, other)
@@ -155,15 +151,8 @@ class Traced:
             raise TypeError("a remainder")
         return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
 
-    def __format__(self, form: str) -> str:
-        """Stands in a message for the value that it will have."""
-        return f"\x01{form or 'g'}\x02{self.name}\x03"
-
     def __neg__(self) -> Traced:
         return self.tape.value("-", (self,), -self.number)
-
-    def __abs__(self) -> Traced:
-        return self.tape.value("fabs", (self,), abs(self.number))
 
     def __bool__(self) -> bool:
         return self.tape.condition("!=", (self, 0.0), self.number != 0.0)

@@ -94,14 +94,9 @@ def _those(one: Compared, word: Verdict) -> str:
 def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
     """Say what a variant gains (+1) or loses (-1) of each distance, the most first."""
     base = {v.id: nearness(v) for v in comparison.base.verdicts}
-    moved = [
-        (label(v), near - before)
-        for v in one.verdicts
-        if (near := nearness(v)) is not None
-        and (before := base.get(v.id)) is not None
-        and sign * (near - before) > SEEN
-    ]
-    moved.sort(key=lambda pair: -abs(pair[1]))
+    known = [(label(v), nearness(v), base.get(v.id)) for v in one.verdicts]
+    moved = [(name, now - before) for name, now, before in known if now is not None and before is not None]
+    moved = sorted((pair for pair in moved if sign * pair[1] > SEEN), key=lambda pair: -abs(pair[1]))
     words = [f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST]]
     words += [f"{len(moved) - _MOST} more"] if len(moved) > _MOST else []
     return "; ".join(words) or "nothing"
@@ -214,15 +209,13 @@ def table_text(comparison: Comparison) -> str:
     header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]
-    return csv_text(header, (_row(one, comparison) for one in comparison.all))
-
-
-def _row(one: Compared, comparison: Comparison) -> list[object]:
-    near, verdict = weakest(one)
-    values, count = {v.id: v.value for v in one.verdicts}, tally(one.verdicts)
-    least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
-    return [
-        *(one.variant.name, count.met, count.not_met, count.not_proven, *least),
-        *(one.figures.get(name.key) for name in comparison.names),
-        *(values.get(wanted.id) for wanted in comparison.base.verdicts),
-    ]
+    rows: list[list[object]] = []
+    for one in comparison.all:
+        (near, verdict), count = weakest(one), tally(one.verdicts)
+        values = {v.id: v.value for v in one.verdicts}
+        least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
+        figures = [one.figures.get(name.key) for name in comparison.names]
+        asked = [values.get(wanted.id) for wanted in comparison.base.verdicts]
+        counts = (count.met, count.not_met, count.not_proven)
+        rows.append([one.variant.name, *counts, *least, *figures, *asked])
+    return csv_text(header, rows)

@@ -56,8 +56,8 @@ def asked_words(result: Duty) -> str:
 def summary(result: Duty) -> str:
     known = math.isfinite(result.continuous_A)
     part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
-    limits = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
-    part += limits if result.limited else ""
+    if result.limited:
+        part += f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
     return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A rms{part}."
 
 
@@ -68,9 +68,8 @@ def _rows(result: Duty) -> list[doc.Row]:
         _row("current, rms", result.rms_A, result.continuous_A, "A"),
         _row("current in motion, rms", result.moving_rms_A, math.inf, "A"),
     ]
-    if result.asked.share < 1.0:
-        rows.append(_row("current at rest, rms", result.holding_A, math.inf, "A"))
-    rows.append(_row("current, peak", result.peak_A, peak, "A", judged=False))
+    rows += [_row("current at rest, rms", result.holding_A, math.inf, "A")] * (result.asked.share < 1.0)
+    rows.append({**_row("current, peak", result.peak_A, peak, "A"), "_status": None})
     if over is not None:
         rows.append(_row("overload state, peak", over.peak, 1.0, "", over.acts_after_s))
     if heat is not None:
@@ -78,10 +77,8 @@ def _rows(result: Duty) -> list[doc.Row]:
     return rows
 
 
-def _row(
-    what: str, value: float, limit: float, unit: str, when: float | None = None, *, judged: bool = True
-) -> doc.Row:
-    status = "fail" if judged and value > limit else None
+def _row(what: str, value: float, limit: float, unit: str, when: float | None = None) -> doc.Row:
+    status = "fail" if value > limit else None
     return {"what": what, "value": value, "limit": limit, "unit": unit, "when": when, "_status": status}
 
 

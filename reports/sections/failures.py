@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
 from analyses.failures.run import Failures
 from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
-from reports.sections.names import Unit, load_unit, output_unit
+from reports.sections.names import Unit, load_unit, output_unit, push_words
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -67,6 +66,7 @@ def summary(result: Failures) -> str:
 def _table(result: Failures, out: Unit) -> doc.Block:
     time, near = Unit(1e3, "ms").column("ms:3"), out.of(result.asked.deflection_rad, 4)
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
+    push, load = push_words(result.design), load_unit(result.design)
     current = "peak_current_A" if result.design.motor.has_electrical_dynamics else lambda _case: None
     columns = [
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
@@ -74,16 +74,12 @@ def _table(result: Failures, out: Unit) -> doc.Block:
         doc.of("to_stop_s", "stop", "To the stop", **time),
         doc.of("at_detection_rad", "seen", "Until detected", **out.column(better=-1)),
         doc.of(current, "current", "Peak current", "A", **most),
-        doc.of("peak_moment_Nm", "moment", f"Peak {_push(result.design)}", load_unit(result.design), **most),
+        doc.of("peak_moment_Nm", "moment", f"Peak {push}", load, **most),
         doc.of("protected_s", "protected", "I²t acts at", **time),
         doc.of("words", "words", "What happens"),
     ]
     note = f"No value: not within the {result.asked.watched_s:g} s watched."
     return doc.listing("Failure cases", result.cases, columns, note)
-
-
-def _push(design: Design) -> str:
-    return "force" if design.axis == "linear" else "torque"
 
 
 def _figure(result: Failures, out: Unit) -> doc.Block:
@@ -104,7 +100,7 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
-    push = _push(result.design)
+    push = push_words(result.design)
     top.y.label, bottom.y.label = f"deflection, {out.unit}", f"{push}, {load_unit(result.design)}"
     bottom.x.limits(0.0, last * per_s)
     both = f"Deflection of the output and {push}"

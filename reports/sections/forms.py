@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from actuator_lti.design.model import Design
+from actuator_lti.files.tree import Tree
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import BreakPoint, OperatingPointFigures
 from analyses.linear.responses import curve, frequency_grid
@@ -34,7 +35,7 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
     """Make the section from the figures by form and loop; ``refused`` says which are missing, and why."""
     pairs = [(name, form) for name in forms["sampled"] for form in forms if name in forms[form]]
     ideal = forms.get("ideal", {})
-    rows = [_row(name, form, forms[form][name], ideal.get(name)) for name, form in pairs]
+    rows: list[Tree] = [_row(name, form, forms[form][name], ideal.get(name)) for name, form in pairs]
     note = (
         "Sampled: exact. Continuous: PI in s with the exact delays of computing and hold. Ideal: the same "
         "without any delay. No form uses a Padé approximation."
@@ -43,22 +44,18 @@ def section(forms: Mapping[str, Mapping[str, LoopFigures]], refused: Sequence[st
     reasons = evidence_notes(named)
     note += "" if reasons else " All margins are certified."
     table = doc.table("Margins and bandwidths in the three forms", COLUMNS, rows, note)
-    intro = "The forms differ by sampling, hold and computing delay."
     notes = [*(f"Not found: {reason}." for reason in refused), *reasons]
     blocks = [_overlay(forms), table, *map(doc.text, notes)]
-    return doc.section("forms", "Sampled, continuous, ideal", blocks, result=_result(rows), intro=intro)
-
-
-def _result(rows: Sequence[Mapping[str, Any]]) -> str:
+    words = "No phase margin is known in both the sampled and the ideal form."
     costs = [row for row in rows if row["form"] == FORMS["sampled"] and row["phase_cost_deg"] is not None]
-    if not costs:
-        return "No phase margin is known in both the sampled and the ideal form."
-    row = min(costs, key=lambda row: float(row["phase_cost_deg"]))
-    change = to_minus(f"{row['phase_cost_deg']:+.1f}")
-    most = ", the largest change of all loops" if len(costs) > 1 else ""
-    loop = row["loop"].lower() + "," * ("," in row["loop"])
-    words = f"Sampling and delay change the phase margin of the {loop} by {change} deg{most}"
-    return f"{words}; its crossover moves, too."
+    if costs:
+        row = min(costs, key=lambda row: float(row["phase_cost_deg"]))
+        change = to_minus(f"{row['phase_cost_deg']:+.1f}")
+        loop = row["loop"].lower() + "," * ("," in row["loop"])
+        words = f"Sampling and delay change the phase margin of the {loop} by {change} deg"
+        words += ", the largest change of all loops" * (len(costs) > 1) + "; its crossover moves, too."
+    intro = "The forms differ by sampling, hold and computing delay."
+    return doc.section("forms", "Sampled, continuous, ideal", blocks, result=words, intro=intro)
 
 
 def _row(name: str, form: str, figures: LoopFigures, ideal: LoopFigures | None) -> doc.Row:
@@ -186,13 +183,12 @@ def _spread(points: Sequence[OperatingPointFigures]) -> str:
 
 
 def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:
-    row: doc.Row = {"point": point.label, "slope": point.slope_Nms_rad * scale}
-    row["load"] = "any" if point.load_Nm is None else point.load_Nm
+    load = "any" if point.load_Nm is None else point.load_Nm
+    row: doc.Row = {"point": point.label, "slope": point.slope_Nms_rad * scale, "load": load}
     for name, result in point.figures.items():
         margins, response = margin_row(result), response_row(result)
         row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
         row[f"{name}_band"] = response["minus3db_hz"] or None
-    if any(result.sound is False for result in point.figures.values()):
-        row["_status"] = "fail"
+        row |= {"_status": "fail"} if result.sound is False else {}
     return row

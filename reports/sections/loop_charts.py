@@ -164,9 +164,8 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
             (at,) = response_at(system, np.array([closest]))
             panel.curve([-1.0, at.real], [0.0, at.imag], width=1.3, **look)
             panel.points([at.real], [at.imag], marker="D", size=6.0, **look)
-    for m in margins.gain_margins:
-        if m.ratio > 0:
-            panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=ORANGE, size=6.0, read=False)
+    for m in (one for one in margins.gain_margins if one.ratio > 0):
+        panel.points([-1.0 / m.ratio], [0.0], marker="s", colour=ORANGE, size=6.0, read=False)
     phases = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0]
     for point in response_at(system, np.array(phases)) if phases else ():
         panel.points([point.real], [point.imag], colour=GREEN, size=6.5, read=False)

@@ -134,10 +134,10 @@ def _below_custom(result: Margins) -> str:
     low = []
     for name, one in result.loops.items():
         for quantity, value in figures_of(one.judged.margins).items() if one.sound else ():
-            if value < CUSTOMARY[quantity]:
-                of, unit = QUANTITIES[quantity], f" {unit_words(QUANTITIES[quantity].unit)}".rstrip()
-                words = f"{of.words} {value:.3g}{unit} (of {CUSTOMARY[quantity]:g}{unit})"
-                low.append(f"{LOOPS[name].lower()}, {words}")
+            if value < (usual := CUSTOMARY[quantity]):
+                of = QUANTITIES[quantity]
+                unit = f" {unit_words(of.unit)}".rstrip()
+                low.append(f"{LOOPS[name].lower()}, {of.words} {value:.3g}{unit} (of {usual:g}{unit})")
     return f" Below what is customary: {'; '.join(low)}." if low and not result.requirements else ""
 
 
@@ -155,8 +155,11 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
     for words, sound in (("not stable", False), ("stability not known", None)):
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
-    apart = [(label, one.loop.name) for label, one in named.items() if one.held is not None]
-    held = [f"{label} with the {HELD[name]} (by itself, {OPEN[name]}, {AWAY})" for label, name in apart]
+    held = [
+        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
+        for label, one in named.items()
+        if one.held is not None
+    ]
     return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
 
 
@@ -173,9 +176,8 @@ def _elsewhere(result: Margins) -> str:
 def _cogging(result: Margins) -> str:
     """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
     away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
-    unstable = any(one.sound is False for one in result.loops.values())
     words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
-    return words if unstable and away else ""
+    return words * (away and any(one.sound is False for one in result.loops.values()))
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
@@ -352,10 +354,8 @@ def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
     for label, figures in named.items():
         free = figures.loop.name == "current" and (figures.locked or figures.held)
         every[f"{label}, rotor free" if free else label] = figures
-        if free:
-            every[f"{label}, rotor locked"] = free
-        elif figures.held is not None:
-            every[f"{label}, {HELD[figures.loop.name]}"] = figures.held
+        if other := free or figures.held:
+            every[f"{label}, {'rotor locked' if free else HELD[figures.loop.name]}"] = other
         if figures.reference is not None:
             every[f"{label}, to the reference"] = figures.reference
     return every

@@ -62,12 +62,12 @@ def _result(result: MonteCarloResult) -> str:
         said = words if result.left_out else "The design states no requirement"
         return f"{said}; {result.samples} samples were drawn."
     words += f"; {every.passed} of {every.count} samples meet every one"
-    words += " that is sampled" if result.left_out else ""
+    words += " that is sampled" * bool(result.left_out)
     weakest = min(each.values(), key=lambda odds: odds.probability, default=None)
-    if weakest is None or weakest.probability == 1.0:
-        return f"{words}."
-    share = f"{100.0 * weakest.probability:.3g} % meet it"
-    return f"{words}; the one missed most often is {weakest.label} ({share})."
+    if weakest is not None and weakest.probability < 1.0:
+        share = f"{100.0 * weakest.probability:.3g} % meet it"
+        words += f"; the one missed most often is {weakest.label} ({share})"
+    return f"{words}."
 
 
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:

@@ -68,6 +68,10 @@ def load_unit(design: Design) -> str:
     return "N" if design.axis == "linear" else "N m"
 
 
+def push_words(design: Design) -> str:
+    return "force" if design.axis == "linear" else "torque"
+
+
 def unit_words(unit: str) -> str:
     """A unit as it is printed: of a ratio none."""
     return "" if unit == "1" else unit

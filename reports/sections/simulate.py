@@ -83,18 +83,15 @@ def _in_words(name: str, value: float) -> list[doc.Row]:
 
 
 def _limits(run: Trajectory) -> doc.Block:
+    uses = [(name, use, bool(np.isfinite(use.limit))) for name, use in run.limits.items()]
     columns = [
-        doc.column("name", "Limit"),
-        doc.column("limit", "Value", format="short:6"),
-        doc.column("unit", "Unit"),
-        doc.column("share", "Acts, of the time", "%", format="short:3"),
-        doc.column("first", "First at", "s", format="short:6"),
+        doc.of(lambda one: one[0], "name", "Limit"),
+        doc.of(lambda one: one[1].limit if one[2] else "none", "limit", "Value", format="short:6"),
+        doc.of(lambda one: one[1].unit * one[2], "unit", "Unit"),
+        doc.of(lambda one: one[1].fraction, "share", "Acts, of the time", "%", scale=100.0, format="short:3"),
+        doc.of(lambda one: one[1].first_time_s, "first", "First at", "s", format="short:6"),
     ]
-    rows = []
-    for name, use in run.limits.items():
-        value = (use.limit, use.unit) if np.isfinite(use.limit) else ("none", "")
-        rows.append((name, *value, 100.0 * use.fraction, use.first_time_s))
-    return doc.table("Limits", columns, rows)
+    return doc.listing("Limits", uses, columns)
 
 
 def _energy(run: Trajectory) -> doc.Block:
@@ -109,13 +106,15 @@ def chart_of(run: Trajectory) -> style.Chart:
     linear = run.axis == "linear"
     angle, unit = (1e3, "mm") if linear else (180.0 / np.pi, "deg")
     command: dict[Stage, Signals] = {run.stage: [("command", run.reference_rad)]}
-    speed = [("speed", run.motor_speed_rad_s), *_scaled(command.get("velocity", []), run.ratio)]
+    speed = [("speed", run.motor_speed_rad_s)]
+    speed += [(name, run.ratio * values) for name, values in command.get("velocity", [])]
     if run.stage == "position" and run.speed_command_rad_s.any():
         speed.append(("commanded", run.speed_command_rad_s))
     current = [("current", run.current_A), *command.get("current", [])]
     if run.stage in ("position", "velocity") and run.current_command_A.any():
         current.append(("commanded", run.current_command_A))
-    position = _scaled([("output", run.output_angle_rad), *command.get("position", [])], angle)
+    position = [("output", run.output_angle_rad), *command.get("position", [])]
+    position = [(name, angle * values) for name, values in position]
     parts: list[tuple[str, Signals, Acting]] = [
         (f"output position, {unit}", position, ()),
         (f"{'axis' if linear else 'motor'} speed, {'m/s' if linear else 'rad/s'}", speed, _limiters("w_ref")),
@@ -152,10 +151,6 @@ def chart_of(run: Trajectory) -> style.Chart:
 def _limiters(*signals: str) -> Acting:
     """What limits the signals of a panel, the clamp first; what shapes the command is no limit."""
     return tuple(one for one in LIMITERS.values() if one.signal in signals and one.kind != "command")
-
-
-def _scaled(signals: Signals, factor: float) -> Signals:
-    return [(name, factor * values) for name, values in signals]
 
 
 def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> list[list[float]]:

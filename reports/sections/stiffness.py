@@ -13,7 +13,7 @@ from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short
-from reports.sections.names import load_unit, output_unit
+from reports.sections.names import load_unit, output_unit, push_words
 
 STATES = {
     "powered": "powered, command held",
@@ -35,37 +35,30 @@ def section(result: Stiffness) -> doc.Section:
         *([_checks(result, unit)] if result.checks else []),
     ]
     intro = (
-        f"Load {_push(result)} over the deflection of the output, the command held: the inverse of the "
-        "linear response from load to output. Friction slides; dry friction and play are not in the curves."
+        f"Load {push_words(result.design)} over the deflection of the output, the command held: the inverse "
+        "of the linear response from load to output. Friction slides; dry friction and play are not in the "
+        "curves."
     )
     status, words = result.verdict.role(), _result(result, unit)
     return doc.section("stiffness", "Stiffness", blocks, result=words, intro=intro, status=status)
 
 
-def _push(result: Stiffness) -> str:
-    return "force" if result.design.axis == "linear" else "torque"
-
-
 def _result(result: Stiffness, unit: str) -> str:
+    words = f"A load {push_words(result.design)} does not move the output of this drive"
     powered = result.curves[0]
-    words = f"A load {_push(result)} does not move the output of this drive"
     if np.isfinite(powered.stiffness_Nm_rad).any():
-        least, at = powered.least
-        static = powered.static_Nm_rad
+        (least, at), static = powered.least, powered.static_Nm_rad
         words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
         words = f"Powered, the static stiffness is {words}"
         words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz"
-    return "; ".join(filter(None, (words, _compared(result)))) + "."
-
-
-def _compared(result: Stiffness) -> str:
-    if not result.checks:
-        return f"nothing is compared: {result.unproven}" if result.unproven else ""
-    most = max(check.difference for check in result.checks)
-    words = f"small loads at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
-    if result.lost_motion_difference is not None:
-        words += f", the lost motion to {result.lost_motion_difference:.1e}, allowed {READ:g}"
-    return f"{words} (relative)"
+    if result.checks:
+        most, lost = max(check.difference for check in result.checks), result.lost_motion_difference
+        words += f"; small loads at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
+        words += "" if lost is None else f", the lost motion to {lost:.1e}, allowed {READ:g}"
+        words += " (relative)"
+    elif result.unproven:
+        words += f"; nothing is compared: {result.unproven}"
+    return f"{words}."
 
 
 def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
@@ -115,7 +108,7 @@ def _lost_motion(result: Stiffness) -> doc.Block:
     rows = [("play", lost.play_rad, None), ("lost motion", lost.foreseen_rad, lost.seen_rad)]
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
-        f"the largest load {_push(result)}, which goes slowly to either side."
+        f"the largest load {push_words(result.design)}, which goes slowly to either side."
     )
     return doc.listing("Lost motion at the output", rows, columns, note)
 
@@ -127,7 +120,7 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
     )
     of_load = load_unit(result.design)
     columns = [
-        doc.of("moment_Nm", "moment", f"Load {_push(result)}, peak", of_load, format="sig:3"),
+        doc.of("moment_Nm", "moment", f"Load {push_words(result.design)}, peak", of_load, format="sig:3"),
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),
         doc.of(lambda one: abs(one.seen_Nm_rad), "seen", "Stiffness", unit, format="sig:4"),
     ]

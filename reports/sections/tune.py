@@ -44,20 +44,17 @@ def summary(result: TuningResult) -> str:
         if not missed:
             return f"The search meets every requirement over {over}; certified margins do not confirm it."
         return f"No gains meet every requirement over {over}. The best compromise misses {missed}."
-    words = [f"Every requirement is met over {over}."]
-    if result.placed:
-        words.append(f"Gains alone do not do; added: {', '.join(result.placed)}.")
-    binding = [r for r in result.requirements if r.binds]
-    names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in binding)
+    words = f"Every requirement is met over {over}"
+    placed = f" Gains alone do not do; added: {', '.join(result.placed)}." if result.placed else ""
+    names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in result.requirements if r.binds)
     if result.aim == "least-change":
         if not changed(result):
-            return f"{words[0]} Nothing needs to change."
-        words += [f"This is the least change that does; binding: {names}."] if binding else []
-    elif binding:
-        words.append(f"Nothing better is possible because of {names}.")
-    else:
-        words[0] = f"Every requirement is met over {over}, each with 30 % or more to spare; none binds."
-    return " ".join(words)
+            return f"{words}. Nothing needs to change."
+        binding = f" This is the least change that does; binding: {names}." if names else ""
+        return f"{words}.{placed}{binding}"
+    if names:
+        return f"{words}.{placed} Nothing better is possible because of {names}."
+    return f"{words}, each with 30 % or more to spare; none binds.{placed}"
 
 
 def changed(result: TuningResult) -> bool:

@@ -450,6 +450,15 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         ("voltage = ", 'max_rate = "400 deg/s"\nvoltage = ', ("(it is speed, at the motor: that of",)),
         ("[control]", '[encoder]\nresolution = "5 um"\n[control]', ("one metre over a step",)),
         ("resistance", "resistance_line_to_line", ("(it is resistance)",)),
+        (
+            "[control]",
+            f'{CURRENT}gain = "180 1/s"\n[[control.velocity.filter]]\nkind = "notch"\nfrequency = "90 Hz"\n'
+            'bandwidth = "9 Hz"\n[control]',
+            (
+                "a bandwidth is written in Hz or rad/s",
+                'filter.1.bandwidth = "9 Hz": unknown key (it is width)',
+            ),
+        ),
         ("[load]", '[load]\ncoulomb_friction = "6 mNm"', ("dry_torque of [load.friction]",)),
         ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
     ],

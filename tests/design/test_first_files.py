@@ -132,6 +132,34 @@ def test_constants_that_disagree_are_told_as_they_are_written(written: str, want
     assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
 
 
+@pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
+@pytest.mark.parametrize(
+    ("ampere", "volt", "constants", "units"),
+    [
+        (2**0.5, 1.5**0.5, "rms-line", ("", "")),
+        (1.0, 1.0, "peak-phase", ("", "")),
+        (1.0, 3**0.5, "rms-line", (" peak", " peak")),
+        (2**0.5, 3**0.5, "rms-line", ("", " peak")),
+    ],
+)
+def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
+    stated: str, ampere: float, volt: float, constants: str, units: tuple[str, str]
+) -> None:
+    """A sinusoidal motor of flux constant k: torque 3/2 k a peak ampere, k volts peak of a phase per rad/s.
+
+    ``ampere`` peak amperes are one of the sheet, ``volt`` of its volts are a peak volt of a phase.
+    """
+    kM, kE = 0.03 * ampere, 0.02 * volt
+    if stated != constants or any(units):
+        text = told(motor(stated, torque_constant=f"{kM} Nm/A", back_emf_constant=f"{kE} V*s/rad"))
+        assert f'the ratio is that of motor.constants = "{constants}"' in text
+        assert ("A peak" in text) is any(units)
+    kM_text, kE_text = f"{kM} Nm/A{units[0]}", f"{kE} V{units[1]}/(rad/s)"
+    drive = read_design_text(motor(constants, torque_constant=kM_text, back_emf_constant=kE_text))
+    assert drive.effective_motor.back_emf_constant_Vs_rad == pytest.approx(3**0.5 * 0.02, rel=1e-12)
+    assert drive.effective_motor.torque_constant_Nm_A == pytest.approx(3**0.5 * 0.02, rel=1e-12)
+
+
 def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:
     # by hand: 0.45 mH/5.9 ohm; 5.9 ohm 4.1e-7 kg m2/(12.7 mN m/A)^2; 12 V/(1.33 V/krpm); 12 V/5.9 ohm
     (tmp_path / "first.toml").write_text(DRIVE + '[load]\ninertia = "30 gcm2"\n', encoding="utf-8")
@@ -168,6 +196,12 @@ def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings
 def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
     design = read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n')
     assert design.encoder.counts_per_rev == counts
+
+
+def test_counts_are_no_angle_of_a_gain() -> None:
+    """1.1e-4 A/(count/s) at 2^19 counts is 9.2 A s/rad, not 1.1e-4."""
+    text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"\n'
+    assert "one is 2 pi/counts_per_rev rad" in told(text)
 
 
 @pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])

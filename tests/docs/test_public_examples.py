@@ -48,9 +48,8 @@ def has_doctest(thing: Any) -> bool:
     """Whether the docstring, or for a class that of a member, has an example."""
     docs = [inspect.getdoc(thing) or ""]
     if inspect.isclass(thing):
-        docs += [
-            inspect.getdoc(member) or "" for name, member in vars(thing).items() if not name.startswith("__")
-        ]
+        members = (member for name, member in vars(thing).items() if not name.startswith("__"))
+        docs += [inspect.getdoc(member) or "" for member in members]
     return any(doctest.DocTestParser().get_examples(text) for text in docs)
 
 
@@ -73,12 +72,8 @@ def test_every_public_name_has_an_example_and_words(name: str) -> None:
 
 def commands() -> list[str]:
     def leaves(command: Any, path: str) -> list[str]:
-        inner = getattr(command, "commands", None)
-        return (
-            [path]
-            if not inner
-            else [one for key, sub in inner.items() for one in leaves(sub, f"{path} {key}")]
-        )
+        inner = getattr(command, "commands", None) or {}
+        return [one for key, sub in inner.items() for one in leaves(sub, f"{path} {key}")] or [path]
 
     return leaves(typer.main.get_command(build()), "actuator-lti")
 

@@ -26,16 +26,12 @@ def maybe(rng: Rng, value: Any, other: Any, share: float = 0.5) -> Any:
 def random_drive(rng: Rng) -> model.Design:
     """A drive near a shipped one with any of the features."""
     design, own = load_design("ilr33-amber"), rng.spawn(1)[0]
-    motor = design.motor
-    assert motor.resistance_ohm is not None
-    assert motor.inductance_H is not None
+    near = ("resistance_ohm", "inductance_H", "rotor_inertia_kgm2")
     made = replace(
         design,
         motor=replace(
-            motor,
-            resistance_ohm=scaled(rng, motor.resistance_ohm),
-            inductance_H=scaled(rng, motor.inductance_H),
-            rotor_inertia_kgm2=scaled(rng, motor.rotor_inertia_kgm2),
+            design.motor,
+            **{name: scaled(rng, getattr(design.motor, name)) for name in near},
             cogging_Nm=maybe(own, scaled(own, 1e-3), 0.0),
             cogging_periods=scaled(own, 40.0),
             cogging_phase_rad=own.uniform(0.0, 3.0),
@@ -90,15 +86,12 @@ def law_at(rng: Rng, design: model.Design, stage: str, n: int) -> model.Design:
     law = Law(inputs=inputs, A=tuple(map(tuple, A.tolist())), B=tuple(map(tuple, (1e-2 * B).tolist())),
               C=tuple(C.tolist()), D=tuple(D.tolist()), L=tuple((0.1 * rng.standard_normal(n)).tolist()),
               gain=scaled(rng, 1.0))  # type: ignore[arg-type]  # fmt: skip
-    kept = {
-        key: getattr(loop, key) for key in ("every", "sensor", "back_emf_feedforward") if hasattr(loop, key)
-    }
-    velocity = design.controller.velocity
+    own = (key for key in ("every", "sensor", "back_emf_feedforward") if hasattr(loop, key))
+    part = type(loop)(**{key: getattr(loop, key) for key in own}, law=law)
+    control, velocity = design.controller, design.controller.velocity
     if velocity is not None:
-        speeds = replace(velocity, filters=velocity.filters_on("torque"))
-        design = replace(design, controller=replace(design.controller, velocity=speeds))
-    part = type(loop)(**kept, law=law)
-    control = replace(design.controller, **{stage: part})
+        control = replace(control, velocity=replace(velocity, filters=velocity.filters_on("torque")))
+    control = replace(control, **{stage: part})
     return replace(design, controller=control, encoder=replace(design.encoder, filter_time_s=0.0))
 
 
@@ -150,9 +143,6 @@ def _map(rng: Rng, level_Nm: float) -> tuple[model.FrictionPoint, ...]:
 
 def _controller(rng: Rng, design: model.Design) -> Any:
     c = design.controller
-    assert c.velocity is not None
-    assert c.current is not None
-    assert c.position is not None
     every = int(rng.integers(1, 4))
     windup = ("conditional", "clamped", "back-calculation")
     return replace(
@@ -256,7 +246,6 @@ def _limits(rng: Rng, design: model.Design) -> Any:
 def random_inputs(rng: Rng, ticks: int, period_s: float) -> tuple[np.ndarray, np.ndarray]:
     """Commands and hinge moments, one a tick: a sine with a step, and a slow one."""
     t = np.arange(ticks) * period_s
-    command = scaled(rng, 0.1) * np.sin(2.0 * np.pi * scaled(rng, 5.0) * t) + maybe(rng, 0.05, 0.0) * (
-        t > 0.01
-    )
+    command = scaled(rng, 0.1) * np.sin(2.0 * np.pi * scaled(rng, 5.0) * t)
+    command += maybe(rng, 0.05, 0.0) * (t > 0.01)
     return command, scaled(rng, 2.0) * np.sin(2.0 * np.pi * scaled(rng, 2.0) * t + 1.0)

@@ -38,10 +38,6 @@ def exported(folder: Path, title: str) -> None:
         said(folder, sys.executable, "-m", "reports.cli", *words[1:])
 
 
-def python(folder: Path, text: str) -> str:
-    return said(folder, sys.executable, "-c", text)
-
-
 def compiled(folder: Path, title: str, *files: str) -> str:
     (folder / "host.c").write_text(block(title, "c"))
     call = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "host.c", *files)
@@ -78,12 +74,13 @@ def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path
 def test_the_host_of_the_unit(truth: float, tmp_path: Path) -> None:
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
     exported(tmp_path, "The unit")
-    assert float(python(tmp_path, block("The unit", "python"))) == pytest.approx(truth, rel=1e-9)
+    host = said(tmp_path, sys.executable, "-c", block("The unit", "python"))
+    assert float(host) == pytest.approx(truth, rel=1e-9)
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
 def test_the_host_in_javascript(truth: float, tmp_path: Path) -> None:
-    python(tmp_path, block("WebAssembly", "python"))
+    said(tmp_path, sys.executable, "-c", block("WebAssembly", "python"))
     (tmp_path / "host.mjs").write_text(block("WebAssembly", "javascript"))
     assert float(said(tmp_path, "node", "host.mjs")) == pytest.approx(truth, rel=1e-9)
     assert at.IO_OUTPUT == 14  # the page says so
@@ -91,8 +88,8 @@ def test_the_host_in_javascript(truth: float, tmp_path: Path) -> None:
 
 def test_the_host_of_the_module_in_python(truth: float, tmp_path: Path) -> None:
     pytest.importorskip("wasmtime", reason="wasmtime is not installed")
-    python(tmp_path, block("WebAssembly", "python"))
-    assert float(python(tmp_path, block("WebAssembly", "python", 1))) == pytest.approx(truth, rel=1e-9)
+    _, host = (said(tmp_path, sys.executable, "-c", block("WebAssembly", "python", n)) for n in (0, 1))
+    assert float(host) == pytest.approx(truth, rel=1e-9)
 
 
 @needs_compiler

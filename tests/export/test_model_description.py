@@ -56,8 +56,6 @@ def speed_drive() -> Design:
 def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) -> None:
     known = variables(described(load_design(name), version))
     angle, ratio, speed, torque, current, voltage, load = SIZES[name]
-    assert angle is not None
-    assert ratio is not None
     linear = name in ("ballscrew", "emps")
     turn, shown = ("m", "mm") if linear else ("rad", "deg")
     rate = (f"{turn}/s", None) if linear else ("rad/s", "deg/s")
@@ -76,11 +74,11 @@ def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) ->
         "control.speed_command": (speed, rate[0], None if linear else "rpm"),
         "initial.angle": (None, turn, shown),
     }  # fmt: skip
-    found = {each: (float(a["nominal"]) if "nominal" in (a := known[each]) else None, a["unit"],
-                    a.get("displayUnit")) for each in wanted}  # fmt: skip
     for each, (size, *units) in wanted.items():
-        assert found[each][1:] == tuple(units), each
-        assert found[each][0] == (None if size is None else pytest.approx(size, rel=1e-6)), each
+        about = known[each]
+        assert [about["unit"], about.get("displayUnit")] == units, each
+        nominal = float(about["nominal"]) if "nominal" in about else None
+        assert nominal == (None if size is None else pytest.approx(size, rel=1e-6)), each
 
 
 @pytest.mark.parametrize("version", [2, 3])

@@ -143,14 +143,13 @@ def child(number: int, folder: Path, engine: Engine) -> int:
 def contents(folder: Path) -> dict[str, str]:
     """Every file of a study by the hash of what it holds, and what was found."""
     files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
+    files["found"] = folder.with_suffix(".found")
     # a note of a reduced study says in which order its parts ended; ".part": killed while it was written
-    made = {
-        name: path
+    return {
+        name: hashlib.sha256(path.read_bytes()).hexdigest()
         for name, path in files.items()
         if not name.startswith("reduced-") and path.suffix != ".part"
     }
-    told = {"found": folder.with_suffix(".found")}
-    return {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in {**made, **told}.items()}
 
 
 def ended(process: int, most_s: float = 240.0) -> int:

@@ -138,11 +138,8 @@ def override(path: Path) -> None:
 
 
 def settings(path: Path) -> None:
-    import_objects(read_settings_toml(decode(path.read_bytes(), "f"), "f"), base())
-
-
-def settings_xml(path: Path) -> None:
-    import_objects(read_settings_xml(decode(path.read_bytes(), "f"), "f"), base())
+    read = read_settings_xml if path.suffix == ".xml" else read_settings_toml
+    import_objects(read(decode(path.read_bytes(), "f"), "f"), base())
 
 
 def controller_file(path: Path) -> None:
@@ -234,9 +231,8 @@ def small_report() -> bytes:
 
     columns = [doc.column("a", "A", "deg", format="sig:3"), doc.column("b", "B")]
     rows = [{"a": 1.5, "b": {"text": "x", "status": "pass"}, "_status": "fail"}, {"a": None, "b": True}]
-    verdict = doc.verdict(
-        "i", "I", value=1.0, limit=2.0, unit="dB", distance=1.0, passed=True, comparison="<="
-    )
+    judged = {"value": 1.0, "limit": 2.0, "unit": "dB", "distance": 1.0, "passed": True, "comparison": "<="}
+    verdict = doc.verdict("i", "I", **judged)
     drawn = Chart(width=300.0)
     panel = drawn.panel()
     panel.points([1.0, 2.0, None], [0.0, -3.0, 1.0], "k")
@@ -293,14 +289,8 @@ def mat_files() -> tuple[bytes, ...]:
     made = []
     for packed in (False, True):
         stream = io.BytesIO()
-        values: dict[str, Any] = {
-            "t": np.arange(20.0),
-            "i": np.arange(20.0) ** 2,
-            "n": np.ones((1, 20)),
-            "k": 3.5,
-            "f": np.arange(1.0, 5.0),
-            "H": np.arange(1.0, 5.0) * 1j,
-        }
+        f, t = np.arange(1.0, 5.0), np.arange(20.0)
+        values = {"t": t, "i": t**2, "n": np.ones((1, 20)), "k": 3.5, "f": f, "H": f * 1j}
         savemat(stream, values, do_compression=packed)
         made.append(b"MATLAB 5.0 MAT-file".ljust(116) + stream.getvalue()[116:])  # without the date
     return tuple(made)
@@ -353,7 +343,7 @@ def targets() -> tuple[Target, ...]:
         Target("design", designs, design_round, share=200),
         Target("extreme design", designs, design_round, fault=extreme, share=200),
         Target("settings", (SETTINGS,), settings, share=1000),
-        Target("settings xml", (xml_seed(),), settings_xml, ".xml", share=1000),
+        Target("settings xml", (xml_seed(),), settings, ".xml", share=1000),
         Target("controller file", CONTROLLERS, controller_file, ".xml", share=400),
         Target("response", (RESPONSE,), read_response, ".csv", share=800),
         Target("response in mat", mat_files(), read_response, ".mat", share=1500),

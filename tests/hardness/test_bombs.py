@@ -11,7 +11,7 @@ import pytest
 
 from actuator_lti import bounds
 from actuator_lti.design import load_design
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import NumericalError
 from analyses.monte_carlo import MonteCarloSettings
 from analyses.studies.sampling import read_table
 from analyses.studies.study import load_study
@@ -19,6 +19,7 @@ from nonlinear import Drive, Run, State, commands, loads, simulate, simulate_man
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.batch import run_rows
 from reports.cli import main  # noqa: F401 - what it loads is not what is measured
+from tests import refusals
 
 ROOT = Path(__file__).parents[2]
 PERIOD_S = 1e-4
@@ -36,43 +37,43 @@ def light() -> Iterator[None]:
 
 
 def refused(call: Callable[[], object], *words: str) -> None:
-    with pytest.raises(InputError) as caught:
-        call()
-    line = str(caught.value)
-    assert line.isprintable()
-    assert len(line) < 400
-    for word in words:
-        assert word in line
+    refusals.refused(call, words=words)
 
 
-def amber():
-    return load_design("ilr33-amber")
+AMBER, STEP = load_design("ilr33-amber"), commands.step(0.1)
+FAR, YEARS = commands.sampled([0.0, 1e9], [0.0, 1.0]), loads.series([0.0, 1e9], [0.0, 1.0])
 
 
-def test_two_rows_a_billion_seconds_apart() -> None:
-    far = commands.sampled([0.0, 1e9], [0.0, 1.0])
-    refused(lambda: simulate(amber(), far, 1e9), "duration_s = 1e+09", "at most 1000000000")
-    refused(lambda: simulate(amber(), far, 2e4), "--duration", "at most 50000000")
-    refused(lambda: simulate(amber(), commands.step(0.1), 1e300), "duration_s = 1e+300")
-    years = loads.series([0.0, 1e9], [0.0, 1.0])
-    refused(lambda: simulate(amber(), commands.step(0.1), 2e4, years), "at most 50000000")
+def run(duration_s: float, command: commands.Command = STEP, load: Any = 0.0, **more: Any) -> object:
+    return simulate(AMBER, command, duration_s, load, **more)
 
 
-def test_a_history_beyond_the_memory() -> None:
-    refused(lambda: simulate(amber(), commands.step(0.1), 9e4), "does not fit into memory", "record_every")
+def stepped(tones: Any, cycles: Any = 5, **more: Any) -> object:
+    return commands.stepped_sine(0.1, tones, cycles, PERIOD_S, **more)
 
 
-def test_millions_of_tones() -> None:
-    refused(lambda: commands.stepped_sine(0.1, range(1, 10**7), 5, PERIOD_S), "--count", "at most 10000")
-    refused(lambda: commands.stepped_sine(0.1, [1e-9], 5, PERIOD_S), "--frequency", "at most 50000000")
-    refused(lambda: commands.multisine(0.1, range(1, 10**9), 1.0, PERIOD_S), "--count", "at most 10000")
-    refused(lambda: commands.multisine(0.1, [1.0], 1e9, PERIOD_S), "--duration")
-    refused(lambda: commands.multisine(0.1, [1.0] * 5000, 4000.0, PERIOD_S), "lines times ticks")
-    refused(lambda: commands.multisine(0.1, [1.0], 1.0, PERIOD_S, seed=-1), "seed = -1")
-    refused(lambda: commands.multisine(0.1, [1.0, 1e7], 1.0, PERIOD_S), "1e+07 Hz", "Nyquist", "5000 Hz")
-    refused(lambda: commands.stepped_sine(0.1, [1.0, 1e308], 5, PERIOD_S), "1e+308 Hz", "5000 Hz")
-    refused(lambda: commands.stepped_sine(0.1, [5e-324], 5, PERIOD_S), "at most 50000000")
-    refused(lambda: commands.stepped_sine(0.1, [1.0], 10**400, PERIOD_S), "--cycles", "at most 50000000")
+def summed(tones: Any, duration_s: Any = 1.0, **more: Any) -> commands.Command:
+    return commands.multisine(0.1, tones, duration_s, PERIOD_S, **more)
+
+
+def test_runs_of_years_histories_beyond_the_memory_and_millions_of_tones() -> None:
+    refused(lambda: run(1e9, FAR), "duration_s = 1e+09", "at most 1000000000")
+    refused(lambda: run(2e4, FAR), "--duration", "at most 50000000")
+    refused(lambda: run(1e300), "duration_s = 1e+300")
+    refused(lambda: run(2e4, STEP, YEARS), "at most 50000000")
+    refused(lambda: run(9e4), "does not fit into memory", "record_every")
+    refused(lambda: stepped(range(1, 10**7)), "--count", "at most 10000")
+    refused(lambda: stepped([1e-9]), "--frequency", "at most 50000000")
+    refused(lambda: summed(range(1, 10**9)), "--count", "at most 10000")
+    refused(lambda: summed([1.0], 1e9), "--duration")
+    refused(lambda: summed([1.0] * 5000, 4000.0), "lines times ticks")
+    refused(lambda: summed([1.0], seed=-1), "seed = -1")
+    refused(lambda: summed([1.0, 1e7]), "1e+07 Hz", "Nyquist", "5000 Hz")
+    refused(lambda: stepped([1.0, 1e308]), "1e+308 Hz", "5000 Hz")
+    refused(lambda: stepped([5e-324]), "at most 50000000")
+    refused(lambda: stepped([1.0], 10**400), "--cycles", "at most 50000000")
+    refused(lambda: MonteCarloSettings(samples=10**12), "--samples", "at most 100000000")
+    refused(lambda: MonteCarloSettings(seed=-1), "seed = -1")
 
 
 ABSURD = {
@@ -91,23 +92,23 @@ ABSURD = {
 TAKES: dict[str, Callable[[Any], object]] = {
     "size": commands.step,
     "end": lambda given: commands.ramp(1.0, 0.0, given),
-    "frequencies": lambda given: commands.stepped_sine(0.1, given, 5, PERIOD_S),
-    "cycles": lambda given: commands.stepped_sine(0.1, [1.0], given, PERIOD_S),
-    "settling": lambda given: commands.stepped_sine(0.1, [1.0], 1, PERIOD_S, settle_cycles=given),
-    "tones": lambda given: commands.multisine(0.1, given, 1.0, PERIOD_S),
+    "frequencies": stepped,
+    "cycles": lambda given: stepped([1.0], given),
+    "settling": lambda given: stepped([1.0], 1, settle_cycles=given),
+    "tones": summed,
     "times": lambda given: commands.sampled(given, [1.0, 2.0]),
     "angles": lambda given: commands.sampled([0.0, 1.0], given),
     "ticks": lambda given: commands.step(0.1).values(PERIOD_S, given),
     "moment": loads.constant,
     "moments": lambda given: loads.series([0.0, 1.0], given),
-    "duration": lambda given: simulate(amber(), commands.step(0.1), given),
-    "torque": lambda given: simulate(amber(), commands.step(0.1), 0.01, disturbance_Nm=given),
-    "tolerance": lambda given: simulate(amber(), commands.step(0.1), 0.01, tanh_tolerance=given),
-    "start": lambda given: simulate(amber(), commands.step(0.1), 0.01, initial=State(motor_angle_rad=given)),
-    "law": lambda given: simulate(amber(), commands.step(0.1), 0.01, initial=State(law=given)),
-    "probes": lambda given: simulate(amber(), commands.step(0.1), 0.01, probes=given),
+    "duration": run,
+    "torque": lambda given: run(0.01, disturbance_Nm=given),
+    "tolerance": lambda given: run(0.01, tanh_tolerance=given),
+    "start": lambda given: run(0.01, initial=State(motor_angle_rad=given)),
+    "law": lambda given: run(0.01, initial=State(law=given)),
+    "probes": lambda given: run(0.01, probes=given),
     "runs": simulate_many,
-    "state": lambda given: Drive(amber()).set(given),
+    "state": lambda given: Drive(AMBER).set(given),
 }
 
 
@@ -121,17 +122,14 @@ def test_no_argument_is_laid_out_before_it_is_refused(takes: str) -> None:
 def test_a_count_beyond_every_run_is_as_good_as_all(digits: int) -> None:
     """Of ticks that are left out, of events, of threads."""
     count = 10**digits
-    run = simulate(amber(), commands.step(0.1), 0.01, record_every=count, max_events=count)
-    assert run.time_s.size == 1
-    asked = Run(design=amber(), command=commands.step(0.1), duration_s=0.01)
+    assert run(0.01, record_every=count, max_events=count).time_s.size == 1
+    asked = Run(design=AMBER, command=STEP, duration_s=0.01)
     assert simulate_many([asked], threads=count).status.tolist() == [0]
 
 
 def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
     """The tones at 100 001 ticks are never held at once; it begins at zero, rising."""
-    made = commands.multisine(0.1, [1.0, 500.0], 10.0, PERIOD_S)
-    assert made.samples is not None
-    times, values = made.samples
+    times, values = summed([1.0, 500.0], 10.0).samples
     assert times.size == 100_001
     assert abs(values[0]) < 1e-9
     assert values[1] > 0.0
@@ -159,7 +157,7 @@ def test_a_command_as_large_as_a_double_has_no_warning() -> None:
 def test_a_batch_that_would_take_days() -> None:
     from nonlinear._kernels import layout as at
 
-    row = design_row(amber())
+    row = design_row(AMBER)
     row[at.TICKS] = 3e10
     with pytest.raises(NumericalError, match="3e\\+10 ticks"):
         run_rows(row[None, :])
@@ -225,11 +223,6 @@ def test_sweeps_stop_at_the_first_variant_too_many(tmp_path, monkeypatch) -> Non
     monkeypatch.setattr(_Maker, "_made", count)
     refused(lambda: load_study(path), "[[sweep]]", "at most 25")
     assert len(made) == 26
-
-
-def test_samples_without_end() -> None:
-    refused(lambda: MonteCarloSettings(samples=10**12), "--samples", "at most 100000000")
-    refused(lambda: MonteCarloSettings(seed=-1), "seed = -1")
 
 
 def test_the_table_in_the_documentation_is_this_one() -> None:

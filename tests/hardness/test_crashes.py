@@ -16,20 +16,21 @@ from reports.cli.main import main
 REPORT = ("report", "ilr33-amber", "--quiet")
 
 # What is broken on purpose (module, function), and the sections that must be there all the same.
+USUAL = ("margins", "loop-position")
 BROKEN = {
-    "reports.build:survey_loops": {"parameters", "provenance"},
-    "analyses.linear.loop_survey:_other_form": {"margins", "loop-position", "parameters"},
-    "analyses.linear.loop_figures:_locked": {"margins", "loop-current", "parameters"},
-    "analyses.linear.loop_survey:_break_points": {"margins", "loop-position", "parameters"},
-    "analyses.linear.loop_survey:operating_points": {"margins", "loop-position", "parameters"},
-    "analyses.linear.loop_survey:_budgets": {"margins", "loop-position", "parameters"},
-    "analyses.linear.loop_survey:_onset": {"margins", "loop-position", "parameters"},
-    "reports.build:evaluate_requirements": {"margins", "loop-position", "parameters"},
-    "reports.sections.answer:section": {"margins", "loop-position", "parameters"},
-    "reports.sections.margins:of_loops": {"loop-position", "parameters"},
-    "reports.sections.loop:section": {"margins", "parameters"},
-    "reports.sections.forms:section": {"margins", "loop-position", "parameters"},
-    "reports.sections.requirements:section": {"margins", "loop-position", "parameters"},
+    "reports.build:survey_loops": ("provenance",),
+    "analyses.linear.loop_survey:_other_form": USUAL,
+    "analyses.linear.loop_figures:_locked": ("margins", "loop-current"),
+    "analyses.linear.loop_survey:_break_points": USUAL,
+    "analyses.linear.loop_survey:operating_points": USUAL,
+    "analyses.linear.loop_survey:_budgets": USUAL,
+    "analyses.linear.loop_survey:_onset": USUAL,
+    "reports.build:evaluate_requirements": USUAL,
+    "reports.sections.answer:section": USUAL,
+    "reports.sections.margins:of_loops": ("loop-position",),
+    "reports.sections.loop:section": ("margins",),
+    "reports.sections.forms:section": USUAL,
+    "reports.sections.requirements:section": USUAL,
 }
 
 
@@ -37,10 +38,20 @@ def broken(*_arguments: object, **_named: object) -> None:
     raise ZeroDivisionError("by\nzero\x1b[31m")
 
 
-def traceback_file(line: str) -> Path:
+def one_line(printed: pytest.CaptureFixture[str]) -> str:
+    line = printed.readouterr().err
+    assert line.count("\n") == 1
+    assert line.strip().isprintable()
+    return line
+
+
+def traceback_of(line: str) -> str:
+    """What is in the file that a line names, which is removed."""
     result = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
     assert result, line
-    return Path(result[1])
+    text = Path(result[1]).read_text(encoding="utf-8")
+    Path(result[1]).unlink()
+    return text
 
 
 @pytest.fixture
@@ -55,16 +66,12 @@ def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, m
     module, _, name = place.partition(":")
     monkeypatch.setattr(import_module(module), name, broken)
     assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    assert line.strip().isprintable()
+    line = one_line(capsys)
     assert "ZeroDivisionError" in line
-    file = traceback_file(line)
-    assert "ZeroDivisionError" in file.read_text(encoding="utf-8")
-    file.unlink()
+    assert "ZeroDivisionError" in traceback_of(line)
     made = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     ids = {part["id"] for part in made["sections"]}
-    assert ids >= BROKEN[place] | {"missing-linear"}
+    assert ids >= {*BROKEN[place], "parameters", "missing-linear"}
     notice = next(part for part in made["sections"] if part["id"] == "missing-linear")
     assert notice["status"] == "fail"
     assert "Parts of this report that could not be computed" in (tmp_path / "report.html").read_text("utf-8")
@@ -74,7 +81,7 @@ def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, m
 def test_a_validation_that_crashes_leaves_the_linear_report(tmp_path, monkeypatch, capsys) -> None:
     monkeypatch.setattr(import_module("reports.build"), "validate", broken)
     assert main([*REPORT, "--out", str(tmp_path)]) == 3
-    traceback_file(capsys.readouterr().err).unlink()
+    traceback_of(one_line(capsys))
     ids = [part["id"] for part in json.loads((tmp_path / "report.json").read_text("utf-8"))["sections"]]
     assert "missing-validation" in ids
     assert "margins" in ids
@@ -86,9 +93,9 @@ def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, capsys) ->
 
     monkeypatch.setattr("reports.drawing.draw_svg", draw)
     assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3
-    line = capsys.readouterr().err
+    line = one_line(capsys)
     assert "(nyquist)" in line
-    traceback_file(line).unlink()
+    traceback_of(line)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "This figure could not be drawn" in page
     assert "loop-position" in page
@@ -115,12 +122,10 @@ def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, 
         raise error
 
     assert run(call) == status
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    assert line.strip().isprintable()
+    line = one_line(capsys)
     assert words in line
     if "traceback: " in line:
-        traceback_file(line).unlink()
+        traceback_of(line)
 
 
 def test_a_command_ends_at_its_time_limit(capsys, monkeypatch) -> None:

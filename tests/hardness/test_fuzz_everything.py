@@ -14,6 +14,7 @@ from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
 from analyses.estimation.least_squares import solve
 from analyses.records.differentiation import filtered_motion
+from tests import refusals
 
 SEED = 18
 INPUTS = {"command": 12, "history": 100, "study": 100}  # by the first word of a target's name
@@ -64,19 +65,12 @@ BY_NAME = {target.name: target for target in targets()}
 def refused(name: str, data: bytes) -> str:
     """What is said of an input."""
     target = BY_NAME[name]
-    with pytest.raises(InputError) as caught:
-        target.attack(written(data, target.suffix))
-    line = str(caught.value)
-    assert line.isprintable()
-    return line
+    return refusals.refused(target.attack, written(data, target.suffix))
 
 
-def table_of(made: dict) -> dict:
-    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "table")
-
-
-def glance_of(made: dict) -> dict:
-    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == "glance")
+def first(kind: str, made: dict) -> dict:
+    """The first block of a kind."""
+    return next(block for block in made["sections"][0]["blocks"] if block["kind"] == kind)
 
 
 @pytest.mark.parametrize(
@@ -106,13 +100,13 @@ def test_an_id_of_a_requirement_that_is_no_text(written_id: str) -> None:
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda made: table_of(made)["columns"][0].update(format="sig:0"), "format"),
-        (lambda made: glance_of(made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
-        (lambda made: table_of(made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
-        (lambda made: table_of(made)["rows"][0].update(b={"text": "x"}), "status"),
-        (lambda made: glance_of(made)["loops"][0].update(stable="yes"), "stable"),
-        (lambda made: glance_of(made)["loops"][0]["stable"].pop("status"), "status"),
-        (lambda made: glance_of(made)["weakest"].pop("words"), "words"),
+        (lambda made: first("table", made)["columns"][0].update(format="sig:0"), "format"),
+        (lambda made: first("glance", made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
+        (lambda made: first("table", made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
+        (lambda made: first("table", made)["rows"][0].update(b={"text": "x"}), "status"),
+        (lambda made: first("glance", made)["loops"][0].update(stable="yes"), "stable"),
+        (lambda made: first("glance", made)["loops"][0]["stable"].pop("status"), "status"),
+        (lambda made: first("glance", made)["weakest"].pop("words"), "words"),
         (lambda made: made["provenance"].update(time=3), "time"),
         (lambda made: made["provenance"].update(commit=[1]), "commit"),
     ],
@@ -132,7 +126,7 @@ def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:
 
 def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
     made = json.loads(small_report())
-    table_of(made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
+    first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
     BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 

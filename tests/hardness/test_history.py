@@ -12,7 +12,6 @@ import pytest
 from nightly_fakes import CODE, INLINE, job, study
 
 from actuator_lti.errors import InputError
-from reports.cli.main import main
 from reports.nightly.history import _INDEX, open_history
 from reports.nightly.night import Settings, approve, run_night
 from reports.nightly.state import INDEX, HistoryLost, Memory, remembered
@@ -26,6 +25,10 @@ def night(site: Path, margin: float, settings: Settings = INLINE):
     return run_night(study(job("a", margin), job("b")), site, settings, code=CODE)
 
 
+def approved(site: Path) -> None:
+    approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
+
+
 def state(site: Path) -> Path:
     return site.with_name(site.name + ".state")
 
@@ -35,7 +38,7 @@ def site(tmp_path) -> Path:
     """Two nights and an approval."""
     site = tmp_path / "site"
     night(site, 10.0)
-    approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
+    approved(site)
     night(site, 10.5)
     return site
 
@@ -80,7 +83,7 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lost: str) 
         assert "2 night(s) and 1 approval(s)" in str(caught.value)
         assert "\n" not in str(caught.value)
     with pytest.raises(HistoryLost):
-        approve(study(job("a"), job("b")), site, by="x", reason="y", settings=INLINE)
+        approved(site)
     assert (site / "index.html").read_bytes() == index
     night(site, 12.0, AGAIN)
     night(site, 12.0)  # from here on it is known again
@@ -103,21 +106,20 @@ def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(sit
         night(site, 3.0)
 
 
-def test_the_command_exits_1_with_one_line(tmp_path, capsys, monkeypatch) -> None:
+def test_the_command_exits_1_with_one_line(tmp_path, cli, monkeypatch) -> None:
     monkeypatch.setattr("reports.nightly.compute.build", lambda payload: pytest.fail("built"))
     site = tmp_path / "site"
     site.mkdir()
     (site / ".nightly-site").write_text("x")
     (site / "summary.json").write_text(json.dumps({"history": {"id": "i", "nights": 7, "approvals": 1}}))
-    assert main(["nightly", "ilr33-amber", "--site", str(site), "--quiet"]) == 1
-    line = capsys.readouterr().err
-    assert line.count("\n") == 1
-    assert "7 night(s) and 1 approval(s)" in line
+    ran = cli("nightly", "ilr33-amber", "--site", site, "--quiet")
+    assert (ran.status, ran.err.count("\n")) == (1, 1)
+    assert "7 night(s) and 1 approval(s)" in ran.err
 
 
 def test_the_history_of_an_earlier_version_is_refused_and_left(site) -> None:
     (state(site) / INDEX).rename(state(site) / "history.sqlite")
-    for begin in (lambda: night(site, 3.0), lambda: approve(study(job("a")), site, by="x", reason="y")):
+    for begin in (lambda: night(site, 3.0), lambda: approved(site)):
         with pytest.raises(HistoryLost, match=r"earlier version.*--accept-lost-history"):
             begin()
     night(site, 3.0, AGAIN)

@@ -1,6 +1,7 @@
 """Readers of records at their edges, and records that would fill the memory."""
 
 import os
+import re
 import struct
 import zlib
 from collections.abc import Callable
@@ -19,15 +20,11 @@ from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
 from analyses.records.readers import read_mat_record, read_record
 from nonlinear import commands
+from tests import refusals
 
 
 def refused(read, text: str) -> str:
-    with pytest.raises(InputError) as caught:
-        read(text, "f")
-    line = str(caught.value)
-    assert line.isprintable()
-    assert len(line) < 500
-    return line
+    return refusals.refused(read, text, "f")
 
 
 def tables(levels: int) -> str:
@@ -109,9 +106,7 @@ def test_a_pipe_or_a_device_is_refused_without_waiting(suffix, tmp_path) -> None
     os.mkfifo(pipe)
     other = {pipe: "is no regular file", Path("/dev/zero"): "is no regular file", tmp_path: "is a directory"}
     for path, words in {**other, tmp_path / "a\0b": "null|is no file"}.items():
-        with pytest.raises(InputError, match=words) as caught:
-            KINDS[suffix](path)
-        assert str(caught.value).isprintable()
+        assert re.search(words, refusals.refused(KINDS[suffix], path))
 
 
 def test_a_file_of_any_kind_has_a_largest_size(tmp_path, monkeypatch) -> None:
@@ -127,25 +122,14 @@ def test_a_file_of_any_kind_has_a_largest_size(tmp_path, monkeypatch) -> None:
 
 def packed_zeros(count: int) -> bytes:
     """A .mat file of so many bytes of zeros in one compressed array, written piece by piece."""
-    head = (
-        struct.pack("<IIII", 6, 8, 6, 0)
-        + struct.pack("<IIii", 5, 8, 1, count)
-        + struct.pack("<II", 1, 1)
-        + b"t" * 8
-    )
+    head = struct.pack("<IIIIIIiiII", 6, 8, 6, 0, 5, 8, 1, count, 1, 1) + b"t" * 8
     body = struct.pack("<II", 14, len(head) + 8 + count) + head + struct.pack("<II", 2, count)
     pack = zlib.compressobj(1)
     data = pack.compress(body)
     for _ in range(0, count, 1 << 20):
         data += pack.compress(bytes(1 << 20))
     data += pack.flush()
-    return (
-        b"MATLAB 5.0".ljust(124)
-        + struct.pack("<H", 0x0100)
-        + b"IM"
-        + struct.pack("<II", 15, len(data))
-        + data
-    )
+    return b"MATLAB 5.0".ljust(124) + struct.pack("<H2sII", 0x0100, b"IM", 15, len(data)) + data
 
 
 def test_a_small_file_that_unpacks_to_gigabytes(tmp_path) -> None:
@@ -188,7 +172,4 @@ def test_a_campaign_is_read_as_strictly_as_a_design(tmp_path, old, new, words) -
     path.write_bytes(b"\xef\xbb\xbf" + CAMPAIGN)
     assert load_campaign(path).runs
     path.write_bytes(CAMPAIGN.replace(old, new, 1))
-    with pytest.raises(InputError, match=r"c\.toml") as caught:
-        load_campaign(path)
-    assert words in str(caught.value)
-    assert str(caught.value).isprintable()
+    refusals.refused(load_campaign, path, words=("c.toml", words))

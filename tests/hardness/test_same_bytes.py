@@ -20,12 +20,16 @@ sys.stdout.write(dumps(design_report(load_design("ilr33-amber"))))
 """
 
 
-def document(**environment: str) -> bytes:
-    given = {**os.environ, "SOURCE_DATE_EPOCH": "0", **environment}
-    done = subprocess.run(
-        [sys.executable, "-c", DOCUMENT], capture_output=True, env=given, check=True, timeout=300
-    )
+def ran(*words: str, kept: tuple[str, ...] = tuple(os.environ), **environment: str) -> bytes:
+    """What Python says with these words, in an environment that keeps some of ours."""
+    given = {**{name: os.environ[name] for name in kept}, **environment}
+    done = subprocess.run([sys.executable, *words], capture_output=True, env=given, check=False, timeout=3000)
+    assert done.returncode in (0, words[0] == "-m"), done.stderr
     return done.stdout
+
+
+def document(**environment: str) -> bytes:
+    return ran("-c", DOCUMENT, SOURCE_DATE_EPOCH="0", **environment)
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names of kernels of one family of processors")
@@ -41,10 +45,8 @@ def test_a_report_with_its_validation_has_the_same_bytes_twice(name: str, tmp_pa
     """Page and JSON, by two processes whose sets and dictionaries are ordered by other hashes."""
     made = []
     for seed in ("1", "2"):
-        given = {**os.environ, "SOURCE_DATE_EPOCH": "1700000000", "PYTHONHASHSEED": seed}
-        call = [sys.executable, "-m", "reports.cli", "report", name, "--quiet", "--out", str(tmp_path / seed)]
-        done = subprocess.run(call, capture_output=True, env=given, check=False, timeout=3000)
-        assert done.returncode in (0, 1), done.stderr
+        words = ("-m", "reports.cli", "report", name, "--quiet", "--out", str(tmp_path / seed))
+        ran(*words, SOURCE_DATE_EPOCH="1700000000", PYTHONHASHSEED=seed)
         made.append([(tmp_path / seed / file).read_bytes() for file in ("report.html", "report.json")])
     assert made[0] == made[1]
     assert b"Predictions against simulation" in made[0][0]
@@ -55,16 +57,13 @@ def test_rounding_keeps_what_is_certain_and_nothing_else() -> None:
     for ulp in (third, third * (1.0 + 4e-15), third * (1.0 - 4e-15)):
         assert certain(ulp) == 0.33333333
     assert certain(9.2e-7) == 9.2e-7
-    assert certain(
-        {"s_peak": {"frequency_hz": 63.771488913938995, "x_db": 1.4740612903870745, "y_deg": 4.92010755e-7}}
-    ) == {"s_peak": {"frequency_hz": 63.771, "x_db": 1.4740613, "y_deg": 4.92e-07}}
+    peak = {"frequency_hz": 63.771488913938995, "x_db": 1.4740612903870745, "y_deg": 4.92010755e-7}
+    kept = {"frequency_hz": 63.771, "x_db": 1.4740613, "y_deg": 4.92e-07}
+    assert certain({"s_peak": peak}) == {"s_peak": kept}
     assert certain([40.0, -1.9e-15, None, "a", 7]) == [40.0, 0.0, None, "a", 7]
-    table = {
-        "kind": "table",
-        "columns": [{"key": "a", "unit": "deg"}],
-        "rows": [{"a": 4.9201e-7, "b": 4.9201e-7}],
-    }
-    assert certain(table)["rows"] == [{"a": 4.92e-7, "b": 4.9201e-7}]
+    columns, rows = [{"key": "a", "unit": "deg"}], [{"a": 4.9201e-7, "b": 4.9201e-7}]
+    rounded = certain({"kind": "table", "columns": columns, "rows": rows})["rows"]
+    assert rounded == [{"a": 4.92e-7, "b": 4.9201e-7}]
     assert certain(-0.0) == 0.0
     assert str(certain([-1e-17])) == "[0.0]"
 
@@ -82,18 +81,13 @@ sys.stdout.write("|" + repr({{name: os.environ.get(name) for name in {names}}}))
 def settings_of_a_process(before: str, **environment: str) -> dict[str, str | None]:
     """What linear algebra was told in a process that runs a command."""
     names = (*same_order(), "OPENBLAS_CORETYPE")
-    kept = {name: value for name, value in os.environ.items() if name not in names}
-    code = ASKED.format(before=before, names=names)
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, env={**kept, **environment}, check=True
-    )
-    return ast.literal_eval(done.stdout.partition("|")[2])
+    kept = tuple(name for name in os.environ if name not in names)
+    said = ran("-c", ASKED.format(before=before, names=names), kept=kept, **environment)
+    return ast.literal_eval(said.decode().partition("|")[2])
 
 
 def test_the_command_line_fixes_the_order_at_its_start_unless_told_otherwise() -> None:
-    assert settings_of_a_process("") == same_order() | (
-        {} if "OPENBLAS_CORETYPE" in same_order() else {"OPENBLAS_CORETYPE": None}
-    )
+    assert settings_of_a_process("") == {"OPENBLAS_CORETYPE": None} | same_order()
     told = settings_of_a_process("", OPENBLAS_NUM_THREADS="2")
     assert told["OPENBLAS_NUM_THREADS"] == "2"
     assert told["MKL_CBWR"] == same_order()["MKL_CBWR"]

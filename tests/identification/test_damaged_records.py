@@ -18,8 +18,8 @@ from analyses.identification.joint_model import NAMES
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from benchmarks.random_records import KINDS, VALUES, random_records
-from nonlinear import commands, simulate
-from tests.identification.bench_records import Columns, columns_of, motion, record_of
+from nonlinear import Trajectory, commands, simulate
+from tests.identification.bench_records import NOISE_A, Columns, motion, record_of
 
 BASE = load_design("ilr33-amber")
 TRUTH = {"friction.dry_torque": 3e-3, "friction.viscous": 4e-6, "motor.rotor_inertia": 1.3e-6}
@@ -34,18 +34,20 @@ def drive() -> Design:
     return with_values(BASE, TRUTH)
 
 
+def _columns(run: Trajectory, seed: int) -> Columns:
+    """In SI at 1 kHz, the current with white noise of 20 mA."""
+    signals = {
+        "time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad,
+        "speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V,
+    }  # fmt: skip
+    table = {name: values[::10] for name, values in signals.items()}
+    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(table["time"]))
+    return {**table, "current": table["current"] + noise}
+
+
 @pytest.fixture(scope="module")
 def columns(drive: Design) -> Columns:
-    run = motion(2, design=drive)
-    table = columns_of(run, 1)
-    return {
-        "time": table["time_s"],
-        "reference": np.radians(table["reference_deg"]),
-        "angle": table["motor_angle_rad"],
-        "speed": table["motor_speed_rpm"] * np.pi / 30.0,
-        "current": table["current_A"],
-        "voltage": run.voltage_V[::10],
-    }
+    return _columns(motion(2, design=drive), 1)
 
 
 def _record(columns: Columns, names: tuple[str, ...] = ALL) -> Record:
@@ -99,13 +101,8 @@ def _range_from(share: float, factor: float) -> Damage:
 
 def _of_another_run(name: str) -> Damage:
     """A signal of the same drive's other motion."""
-
-    def change(columns: Columns) -> Columns:
-        table = columns_of(motion(7, design=with_values(BASE, TRUTH)), 5)
-        other = {"current": table["current_A"], "reference": np.radians(table["reference_deg"])}
-        return {**columns, name: other[name]}
-
-    return change
+    drive = with_values(BASE, TRUTH)
+    return lambda columns: {**columns, name: _columns(motion(7, design=drive), 5)[name]}
 
 
 def _said(result: BenchResult) -> str:
@@ -281,10 +278,9 @@ def test_what_cannot_be_put_right_gives_no_design(name: str, columns: Columns) -
 @pytest.mark.parametrize("factor", [100.0, 1e-3])
 def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns, drive: Design) -> None:
     """The design's, or a load in another unit."""
-    loaded = motion(5, load_Nm=5.0, design=drive)
-    table = {"time": loaded.time_s[::10], "angle": loaded.motor_angle_rad[::10]}
-    table |= {"current": loaded.current_A[::10], "torque": np.full(len(table["time"]), 5.0)}
-    second = replace(_record(table, ("angle", "current", "torque")), name="loaded")
+    loaded = _columns(motion(5, load_Nm=5.0, design=drive), 3)
+    loaded["torque"] = np.full(len(loaded["time"]), 5.0)
+    second = replace(_record(loaded, (*BARE, "torque")), name="loaded")
     wrong = with_values(drive, {"friction.load_coefficient": factor * drive.friction.load_coefficient})
     result = identify_bench(wrong, [_record(columns), second])
     assert not result.passed
@@ -294,9 +290,8 @@ def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns, 
 
 
 def test_a_load_that_was_not_recorded_is_named_with_its_size(drive: Design) -> None:
-    run = motion(2, load_Nm=6.0, design=drive)
-    table = {"time": run.time_s[::10], "angle": run.motor_angle_rad[::10], "current": run.current_A[::10]}
-    result = identify_bench(drive, [_record(table, BARE)])
+    loaded = _columns(motion(2, load_Nm=6.0, design=drive), 1)
+    result = identify_bench(drive, [_record(loaded, BARE)])
     assert not result.passed
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
 
@@ -350,11 +345,7 @@ def test_no_lag_is_found_where_the_drive_hardly_moves(
     lag of 2 to 3 ms was found in records that have none.
     """
     run = simulate(drive, commands.multisine(amplitude, [0.7, 1.9, 4.3], 4.0, 1e-4, seed=2), 4.0)
-    table = {"time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad}
-    table |= {"speed": run.motor_speed_rad_s, "current": run.current_A}
-    noise = 0.02 * np.random.default_rng(1).standard_normal(len(run.time_s[::10]))
-    columns = {name: values[::10] for name, values in table.items()}
-    result = identify_bench(BASE, [_record({**columns, "current": columns["current"] + noise}, signals)])
+    result = identify_bench(BASE, [_record(_columns(run, 1), signals)])
     assert "later" not in _said(result)
     assert "earlier" not in _said(result)
     model, truth = result.model, _truth(drive)

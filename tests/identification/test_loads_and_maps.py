@@ -8,6 +8,7 @@ import pytest
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.correlation.closed_loop import correlate_record
 from analyses.identification.asked import Settings
 from analyses.identification.bench import identify_bench
 from analyses.identification.electrical import electrical_values, fit_electrical
@@ -101,20 +102,6 @@ def _axis_record(law: str, seed: int = 0) -> Record:
     return _record(position=_waves(0, 0.05), force=force)
 
 
-def test_a_friction_map_is_found_with_its_break_points() -> None:
-    """Truth: 30, 18, 15 N at 0, 0.01, 0.05 m/s, then rising 100 N per m/s."""
-    model = fit_map(load_design("emps"), [_axis_record("map")])
-    taken = next(law for law in model.laws if law.taken)
-    assert taken.breaks_rad_s == pytest.approx((0.01, 0.05), rel=0.25)
-    assert taken.criterion < -100.0
-    knots = model.knots_rad_s
-    assert knots is not None
-    torque = [model[f"map_{k}"] for k in range(len(knots))]
-    speeds = np.array([0.003, 0.02, 0.04, 0.1, 0.15])
-    assert np.interp(speeds, knots, torque) == pytest.approx(_stribeck(speeds), rel=0.05)
-    assert model["inertia"] == pytest.approx(95.0, rel=5e-3)
-
-
 def test_a_plain_law_needs_no_map() -> None:
     """Over five draws of noise the criterion never takes a map for a drive that has none."""
     for seed in range(5):
@@ -123,16 +110,20 @@ def test_a_plain_law_needs_no_map() -> None:
         assert next(law for law in model.laws if law.taken).name.startswith("plain")
 
 
-def test_the_map_goes_into_the_design_with_its_errors() -> None:
+def test_a_friction_map_is_found_with_its_break_points_and_goes_into_the_design() -> None:
+    """Truth: 30, 18, 15 N at 0, 0.01, 0.05 m/s, then rising 100 N per m/s; each point with its error."""
     result = identify_bench(load_design("emps"), [_axis_record("map")], settings=Settings(friction="map"))
+    taken = next(law for law in result.laws if law.taken)
+    assert taken.breaks_rad_s == pytest.approx((0.01, 0.05), rel=0.25)
+    assert taken.criterion < -100.0
+    assert result.model["inertia"] == pytest.approx(95.0, rel=5e-3)
     back = read_design_text(result.text)
     points = back.friction.map(1)
     assert points[0].speed_rad_s == 0.0
     assert len(points) == 4
     for k, point in enumerate(points, 1):
-        tolerance = back.parameters[f"friction.point.{k}.torque"].tolerance
         assert point.torque_Nm == pytest.approx(result.model[f"map_{k - 1}"], rel=1e-6)
-        assert tolerance is not None
+        assert back.parameters[f"friction.point.{k}.torque"].tolerance is not None
     assert result.passed
     assert result.resimulated[0].relative_error < 0.02
     speeds = np.array([0.003, 0.02, 0.04, 0.1, 0.15])
@@ -161,8 +152,6 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
 
 
 def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() -> None:
-    from analyses.correlation.closed_loop import correlate_record
-
     record = _axis_record("map")
     record = replace(record, signals={**record.signals, "position_reference": record["position"]})
     result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))

@@ -87,16 +87,19 @@ def _seen(of: str) -> np.ndarray:
     return {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
 
 
+def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: float | None = None) -> Path:
+    columns = {"frequency_hz": hertz, "real": response.real, "imag": response.imag}
+    if deviation is not None:
+        columns["deviation"] = np.full(len(hertz), deviation)
+    table, path = np.column_stack(list(columns.values())), folder / "response.csv"
+    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="")
+    return path
+
+
 def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: bool = True) -> Path:
     noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ))) / np.sqrt(2.0)
     value = _seen(of) * (1.0 + deviation * (noise[0] + 1j * noise[1]))
-    columns = {"frequency_hz": HERTZ, "real": value.real, "imag": value.imag}
-    if stated:
-        columns["deviation"] = np.full(len(HERTZ), deviation)
-    path = folder / "response.csv"
-    table = np.column_stack(list(columns.values()))
-    np.savetxt(path, table, delimiter=",", header=",".join(columns), comments="")
-    return path
+    return _written(folder, HERTZ, value, deviation if stated else None)
 
 
 def _found(folder: Path, *measured: object, **options: object) -> ResponseResult:
@@ -128,11 +131,8 @@ def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
     rigid = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
     design = tmp_path / "rigid.toml"
     design.write_text(rigid.format(J=2e-5, Jl=0.04, C=4e-4, d=6e-4))
-    file = _measured(tmp_path, "L", 0.01, 0)
     hertz, total = HERTZ[HERTZ < 4.0], 2e-5 + 0.04 / N**2
-    rows = [f"{f},{v.real},{v.imag},0.01" for f, v in zip(hertz, open_loop(hertz), strict=True)]
-    file.write_text("f_hz,re,im,deviation\n" + "\n".join(rows))
-    fit = identify_response(load_design(design), file).fit
+    fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
     assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
     inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
     assert inertia == pytest.approx(total, rel=0.02)
@@ -151,11 +151,8 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
 
 def test_a_response_that_leaves_no_load_behind_the_coupling_is_refused(tmp_path, cli) -> None:
     """Ten times the loop is that of a tenth of the inertia: less than the rotor's, which is held."""
-    loop, design = 10.0 * open_loop(HERTZ), _design(tmp_path, OFF)
-    (tmp_path / "r.csv").write_text(
-        "f_hz,re,im\n" + "".join(f"{f},{v.real},{v.imag}\n" for f, v in zip(HERTZ, loop, strict=True))
-    )
-    words = ("identify", "--response", tmp_path / "r.csv", "--design", design)
+    file, design = _written(tmp_path, HERTZ, 10.0 * open_loop(HERTZ)), _design(tmp_path, OFF)
+    words = ("identify", "--response", file, "--design", design)
     said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
     assert "wants no inertia behind the coupling; allowed: a response of position, --of L" in said
 

@@ -1,5 +1,7 @@
 """The steady part of a run, means of correlated series, currents between samples, recorders on one clock."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -111,33 +113,30 @@ def _pair(offset: float, rate: float, noise: float = 0.01) -> tuple[Record, Reco
     return record_of(first, "drive", speed=speed), record_of(second, "sensor", torque=torque)
 
 
+JOIN = partial(join_records, first_signal="speed", second_signal="torque")
+
+
 @pytest.mark.parametrize("method", ["correlation", "event"])
 @pytest.mark.parametrize(("offset", "rate"), [(0.7312, 1.0), (-0.4, 1.0002), (0.25, 0.9995)])
 def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> None:
     first, second = _pair(offset, rate, 0.003)
-    joined, join = join_records(
-        first, second, first_signal="speed", second_signal="torque", method=method
-    )  # fmt: skip
+    joined, join = JOIN(first, second, method=method)
     assert abs(join.rate - rate) < max(5.0 * join.rate_std, 1e-4)
-    middle = 9.0
-    result = join.offset_s + join.rate * middle
-    assert result == pytest.approx(offset + rate * middle, abs=2e-3)
+    assert join.offset_s + join.rate * 9.0 == pytest.approx(offset + rate * 9.0, abs=2e-3)
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
 
 
 def test_a_single_event_tells_no_rate() -> None:
     first, second = _pair(0.5, 1.0)
     early = second.slice(0, 3000)
-    _, join = join_records(first, early, first_signal="speed", second_signal="torque", method="event")
+    _, join = JOIN(first, early, method="event")
     assert join.rate_std is None
     assert "rate not estimable" in str(join)
 
 
 def test_the_given_offset_is_used_as_it_is() -> None:
     first, second = _pair(0.5, 1.0)
-    joined, join = join_records(
-        first, second, first_signal="speed", second_signal="torque", method="given", offset_s=0.5
-    )
+    joined, join = JOIN(first, second, method="given", offset_s=0.5)
     assert join.offset_s == 0.5
     assert joined.time_s[0] >= 0.5
     assert "given offset" in joined.notes[-1]
@@ -149,8 +148,8 @@ def test_records_that_do_not_belong_together_are_refused() -> None:
     a = record_of(time, "a", speed=rng.standard_normal(5000))
     b = record_of(time, "b", torque=rng.standard_normal(5000))
     with pytest.raises(InputError, match="not alike"):
-        join_records(a, b, first_signal="speed", second_signal="torque")
+        JOIN(a, b)
     flat = record_of(time, "c", torque=np.ones(5000))
     for method in ("correlation", "event"):
         with pytest.raises(InputError, match="flat"):
-            join_records(a, flat, first_signal="speed", second_signal="torque", method=method)
+            JOIN(a, flat, method=method)

@@ -105,12 +105,9 @@ def test_margins_beside_octave() -> None:
     loops = [_random_loop(rng) for _ in range(200)]
     lines = ["pkg load control; warning('off', 'all');"]
     for num, den in loops:
-        text = [" ".join(f"{v:.17g}" for v in p) for p in (num, den)]
-        lines.append(
-            f"try, [g, p, wg, wp] = margin(tf([{text[0]}], [{text[1]}])); "
-            "printf('%.17g %.17g %.17g %.17g\\n', g, p, wg, wp); "
-            "catch, printf('NaN NaN NaN NaN\\n'); end"
-        )
+        text = "], [".join(" ".join(f"{v:.17g}" for v in p) for p in (num, den))
+        shown = "printf('%.17g %.17g %.17g %.17g\\n', g, p, wg, wp); catch, printf('NaN NaN NaN NaN\\n'); end"
+        lines.append(f"try, [g, p, wg, wp] = margin(tf([{text}])); {shown}")
     done = subprocess.run(["octave-cli", "--quiet", "--no-init-file"], input="\n".join(lines),
                           capture_output=True, text=True, check=False, timeout=600)  # fmt: skip
     answers = [line for line in done.stdout.splitlines() if len(line.split()) == 4]

@@ -137,9 +137,13 @@ class Speed:
             w = self.w
         self.y += self.T / (self.encoder.filter_time_s + self.T) * (w - self.y)
         out = self.y
-        for item in self.filters:
-            out = item(out)
-        return out
+        return chained(self.filters, out)
+
+
+def chained(filters: list[Digital], x: float) -> float:
+    for item in filters:
+        x = item(x)
+    return x
 
 
 class Controller:
@@ -149,19 +153,14 @@ class Controller:
         self.design, c = design, design.controller
         self.Ts, self.k = c.period_s, 0
         self.n_v = c.velocity.every if c.velocity else 1
-        self.n_p = {"position": c.position.every if c.position else 1, "velocity": self.n_v}.get(
-            c.outermost, 1
-        )
+        self.n_p = c.position.every if c.position else self.n_v
         self.profile = Profile(design, self.n_p * self.Ts, 0.0)
         self.filter = self.command_filter()
         self.speed = Speed(design, self.n_v * self.Ts)
         self.pi_v = Regulator(c.velocity, self.n_v * self.Ts) if c.velocity else None
         self.pi_c = Regulator(c.current, self.Ts) if c.current else None
-        self.torque = (
-            [digital(f, self.n_v * self.Ts, 0.0) for f in c.velocity.filters_on("torque")]
-            if c.velocity
-            else []
-        )
+        filters = c.velocity.filters_on("torque") if c.velocity else ()
+        self.torque = [digital(f, self.n_v * self.Ts, 0.0) for f in filters]
         self.r = [0.0, 0.0]
         self.e = self.D = self.I = self.i_ff = self.w_ref = self.i_ref = self.u = self.w_meas = 0.0
         self.x, self.overloaded = 0.0, False
@@ -255,9 +254,7 @@ class Controller:
             self.w_meas = self.speed(*self.sensed(w, th, y))
             limit = self.i_max if c.current else limits.voltage_V
             out, _ = self.pi_v(self.w_ref - self.w_meas, self.i_ff, limit)
-            for item in self.torque:
-                out = item(out)
-            out = clamp(out, limit)
+            out = clamp(chained(self.torque, out), limit)
             if c.current:
                 self.i_ref = self.slope(self.at("i_ref", out, self.k), self.n_v)
             else:

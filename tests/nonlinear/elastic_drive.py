@@ -1,6 +1,6 @@
 """Two-mass drives for the tests, and the event-driven plant under prescribed voltages and moments."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear.native import parameters, tick
 from nonlinear.row.parameters import design_row
+from tests.changed import changed
 from tests.loops.two_mass import MOTOR
 
 SOURCE = model.Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=1.0)
@@ -43,19 +44,14 @@ def two_mass(
     """Drive F with other parts: ``coupling``, ``friction``, ``load_friction`` as dicts of their fields."""
     design = drive_f()
     friction = model.LoadFriction(**parts["load_friction"]) if "load_friction" in parts else None
-    controller = replace(design.controller, period_s=period_s, computing_delay_s=0.0)
-    if source:
-        controller = replace(controller, current=None)
-    coupling = design.coupling
-    if "coupling" in parts:
-        coupling = replace(coupling, **parts["coupling"]) if parts["coupling"] is not None else None
-    return replace(
+    control = {"period_s": period_s, "computing_delay_s": 0.0} | ({"current": None} if source else {})
+    return changed(
         design,
         motor=SOURCE if source else design.motor,
-        load=replace(design.load, path=path, friction=friction, inertia_kgm2=parts.get("J_l", 1e-3)),
+        load={"path": path, "friction": friction, "inertia_kgm2": parts.get("J_l", 1e-3)},
         friction=model.Friction(**parts.get("friction", {})),
-        coupling=coupling,
-        controller=controller,
+        coupling=parts.get("coupling", {}),
+        controller=control,
         gears=(model.Gear(name="g", ratio=parts.get("ratio", 10.0)), *parts.get("behind", ())),
     )
 

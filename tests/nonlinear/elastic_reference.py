@@ -37,10 +37,9 @@ class Reference:
         self.kM, self.kE = m.torque_constant_Nm_A or 0.0, m.back_emf_constant_Vs_rad or 0.0
         self.Nc, self.Nr = design.ratio_to_coupling, design.ratio_behind_coupling
         c, lf = design.coupling, design.load.friction
-        self.rigid = c is None
-        self.k, self.c, self.b = (
-            (0.0, 0.0, 0.0) if c is None else (c.stiffness_Nm_rad, c.damping_Nms_rad, c.play_rad / 2)
-        )
+        self.rigid, self.k, self.c, self.b = c is None, 0.0, 0.0, 0.0
+        if c is not None:
+            self.k, self.c, self.b = c.stiffness_Nm_rad, c.damping_Nms_rad, c.play_rad / 2
         self.Jm = design.inertia_kgm2 if self.rigid else design.motor_side_inertia_kgm2
         self.Jl = 1.0 if self.rigid else design.load_side_inertia_kgm2
         self.back = design.load.path == "back-drivable"
@@ -114,22 +113,21 @@ class Reference:
         result: list[Event] = []
         if not self.rigid:
             result += self.contact_events(mode)
+
+        def motor_leaves(x: np.ndarray, k: int) -> float:
+            return k * self.drive(x, self.torque(x, mode)) - self.level(x, mode, k) - TINY
+
+        def load_leaves(x: np.ndarray, k: int) -> float:
+            return k * self.load_drive(x, mode) - self.ratio_l * self.C0l - TINY
+
         if mode.motor:
             result.append(("land", lambda _, x: x[1], -mode.motor))
         else:
-            for side in (1, -1):
-                leave = lambda _, x, k=side: (  # noqa: E731
-                    k * self.drive(x, self.torque(x, mode)) - self.level(x, mode, k) - TINY
-                )
-                result.append((f"motor{side}", leave, 1.0))
+            result += [(f"motor{k}", lambda _, x, k=k: motor_leaves(x, k), 1.0) for k in (1, -1)]
         if mode.load and self.C0l:
             result.append(("load lands", lambda _, x: x[2], -mode.load))
         elif not mode.load:
-            for side in (1, -1):
-                leave = lambda _, x, k=side: (  # noqa: E731
-                    k * self.load_drive(x, mode) - self.ratio_l * self.C0l - TINY
-                )
-                result.append((f"load{side}", leave, 1.0))
+            result += [(f"load{k}", lambda _, x, k=k: load_leaves(x, k), 1.0) for k in (1, -1)]
         return result
 
     def contact_events(self, mode: Mode) -> list[Event]:
@@ -220,21 +218,12 @@ def advance(ref: Reference, x: np.ndarray, mode: Mode, span: float) -> np.ndarra
             events=functions, max_step=ref.step(),
         )  # fmt: skip
         t, x = out.t[-1], out.y[:, -1].copy()
-        if out.status == 1:
-            change(
-                ref,
-                x,
-                mode,
-                [name for (name, _, _), times in zip(named, out.t_events, strict=True) if times.size],
-            )
+        if out.status == 1:  # all events of one instant, in their order: contact, motor, load
+            for (name, _, _), times in zip(named, out.t_events, strict=True):
+                if times.size:
+                    happen(ref, x, mode, name)
+            settle(ref, x, mode)
     return x
-
-
-def change(ref: Reference, x: np.ndarray, mode: Mode, names: list[str]) -> None:
-    """All events of one instant, in their order: contact, motor, load."""
-    for name in names:
-        happen(ref, x, mode, name)
-    settle(ref, x, mode)
 
 
 def reference(

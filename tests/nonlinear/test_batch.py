@@ -1,6 +1,7 @@
 """Many runs have the bits of single ones, reducers agree with histories; probes measure the loop."""
 
 import shutil
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,18 +13,19 @@ from nonlinear._kernels import layout
 from nonlinear.bench.probe import fractional_delay
 from nonlinear.runs.reduced import whole_periods
 
+AMBER = load_design("ilr33-amber")
+BOTH_RATES = pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
+
 
 def mixed_runs() -> list[Run]:
     designs = [load_design(n) for n in ("ilr33-amber", "emps", "ilr33-amber-multirate")]
     table = commands.sampled([0.0, 0.1, 0.2], [0.0, 0.01, -0.01])
-    asked = [commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table for k in range(12)]
-    load, kept = [loads.proportional(3.0 * k, 1.0) for k in range(12)], Reducers(extremes=True)
-    return [
-        Run(
-            design=designs[k % 3], command=asked[k], duration_s=0.2 + 0.01 * k, load_Nm=load[k], reducers=kept
-        )
-        for k in range(12)
-    ]
+    runs, kept = [], Reducers(extremes=True)
+    for k in range(12):
+        command = commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table
+        how = {"duration_s": 0.2 + 0.01 * k, "load_Nm": loads.proportional(3.0 * k, 1.0), "reducers": kept}
+        runs.append(Run(design=designs[k % 3], command=command, **how))
+    return runs
 
 
 def test_bits_of_single_runs_for_any_number_of_threads() -> None:
@@ -57,13 +59,13 @@ def test_going_on_gives_the_bits_of_one_run(name: str) -> None:
 
 
 def test_windows_against_the_history() -> None:
-    design = load_design("ilr33-amber")
-    frequency, ticks, cycles = whole_periods(37.0, design.controller.period_s)
+    Ts = AMBER.controller.period_s
+    frequency, ticks, cycles = whole_periods(37.0, Ts)
     probe = Probe(point="w_ref", injection=commands.sine(20.0, frequency))
     asked = {"command": commands.hold(), "bias": commands.ramp(0.1), "probes": (probe,)}
-    asked["duration_s"] = (2 * ticks + 731) * design.controller.period_s
+    asked["duration_s"] = (2 * ticks + 731) * Ts
     kept = Reducers(window_ticks=ticks, cycles=cycles, harmonics=3)
-    batch, history = simulate_many([Run(design=design, reducers=kept, **asked)]), simulate(design, **asked)
+    batch, history = simulate_many([Run(design=AMBER, reducers=kept, **asked)]), simulate(AMBER, **asked)
     for last in (0, 1):
         part = slice(-(last + 1) * ticks, -last * ticks if last else None)
         t = history.time_s[part]
@@ -75,8 +77,7 @@ def test_windows_against_the_history() -> None:
             x = values[part]
             assert batch.mean(name, last)[0] == pytest.approx(x.mean(), rel=1e-12)
             assert batch.rms(name, last)[0] == pytest.approx(np.sqrt(np.mean(x**2)), rel=1e-12)
-            assert batch.span(name, last)[0][0] == x.min()
-            assert batch.span(name, last)[1][0] == x.max()
+            assert [end[0] for end in batch.span(name, last)] == [x.min(), x.max()]
             for harmonic in (1, 3):
                 e = np.exp(-2j * np.pi * frequency * harmonic * t)
                 expected = 2j * np.mean(x * e)
@@ -84,16 +85,12 @@ def test_windows_against_the_history() -> None:
 
 
 def test_step_figures_against_the_history() -> None:
-    design = load_design("ilr33-amber")
-    target = 0.01
-    kept = Reducers(step_target_rad=target)
-    step = simulate_many(
-        [Run(design=design, command=commands.step(target), duration_s=0.2, reducers=kept)]
-    ).step
-    history = simulate(design, commands.step(target), 0.2)
+    target, kept = 0.01, Reducers(step_target_rad=0.01)
+    asked = Run(design=AMBER, command=commands.step(target), duration_s=0.2, reducers=kept)
+    step, history = simulate_many([asked]).step, simulate(AMBER, commands.step(target), 0.2)
     y, t = history.output_angle_rad / target, history.time_s
-    rise = np.interp(0.9, y[: y.argmax()], t[: y.argmax()]) - np.interp(0.1, y[: y.argmax()], t[: y.argmax()])
-    assert step.rise_time_s[0] == pytest.approx(rise, rel=1e-9)
+    begin, end = np.interp([0.1, 0.9], y[: y.argmax()], t[: y.argmax()])
+    assert step.rise_time_s[0] == pytest.approx(end - begin, rel=1e-9)
     assert step.overshoot_percent[0] == pytest.approx(max(100.0 * (y.max() - 1.0), 0.0), abs=1e-9)
     outside = np.flatnonzero(np.abs(y - 1.0) > 0.02)
     assert step.settling_time_s[0] == pytest.approx(t[outside[-1] + 1])
@@ -101,35 +98,20 @@ def test_step_figures_against_the_history() -> None:
 
 
 def test_rows_are_the_same_as_runs() -> None:
-    design = load_design("ilr33-amber")
-    gains = np.array([0.1, 0.2, 0.3])
-    rows = Rows.of(design, 3)
+    gains, rows = np.array([0.1, 0.2, 0.3]), Rows.of(AMBER, 3)
     rows["ticks"] = 2000
     rows.ramp("bias", 0.1)
     rows.window(500, 5)
     rows.sine("i_ref", gains, 100.0)
-    batch = rows.run()
     probes = [Probe(point="i_ref", injection=commands.sine(g, 100.0)) for g in gains]
     asked = {"command": commands.hold(), "bias": commands.ramp(0.1), "duration_s": 0.2}
-    kept = Reducers(window_ticks=500, cycles=5)
-    runs = [Run(design=design, probes=(probe,), reducers=kept, **asked) for probe in probes]
-    assert np.array_equal(batch.outs, simulate_many(runs).outs)
-
-
-def test_refusals() -> None:
-    design = load_design("ilr33-amber")
-    with pytest.raises(InputError, match="at least one"):
-        simulate_many([])
-    kept = Reducers(window_ticks=800)
-    long_window = Run(design=design, command=commands.hold(), duration_s=0.1, reducers=kept)
-    with pytest.raises(InputError, match="must fit twice"):
-        simulate_many([long_window])
-    with pytest.raises(InputError, match="harmonics"):
-        Reducers(harmonics=40).write(np.zeros(layout.SIZE))
+    asked["reducers"] = Reducers(window_ticks=500, cycles=5)
+    runs = [Run(design=AMBER, probes=(probe,), **asked) for probe in probes]
+    assert np.array_equal(rows.run().outs, simulate_many(runs).outs)
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
-@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
+@BOTH_RATES
 @pytest.mark.parametrize("motion", [(5.0, 1.0, 4.0), (0.05, 10.0, 2.0), (10.0, 3.0, 0.0)])
 def test_the_simulator_agrees_with_it(name: str, motion: tuple[float, float, float]) -> None:
     from benchmarks.plain_servo import PlainServo
@@ -150,7 +132,7 @@ CRUISE = 300.0
 INJECTION = {"u": 0.02, "i_ref": 0.3, "w_ref": 10.0, "output": 1e-4}
 
 
-@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
+@BOTH_RATES
 @pytest.mark.parametrize("point", list(INJECTION))
 @pytest.mark.parametrize("frequency_hz", [20.0, 150.0])
 def test_open_loop_at_every_break_point(name: str, point: str, frequency_hz: float) -> None:
@@ -181,11 +163,10 @@ def test_open_loop_at_every_break_point(name: str, point: str, frequency_hz: flo
 
 
 def test_gain_and_delay_multiply_the_loop() -> None:
-    design = load_design("ilr33-amber")
     u = np.sin(0.3 * np.arange(200.0)) * 0.1
     for delay, tolerance in ((3.0, 0.0), (2.4, 2e-6), (0.5, 2e-3)):
         probe = Probe(point="w_ref", gain=1.5, delay_samples=delay, injection=u)
-        run = simulate(design, commands.sine(0.001, 20.0), 0.02, probes=[probe])
+        run = simulate(AMBER, commands.sine(0.001, 20.0), 0.02, probes=[probe])
         k, seen = np.arange(200), run.probes["w_ref"]
         delayed = np.interp(k - delay, k, seen.before) if tolerance else seen.before[:-3]
         expected = 1.5 * delayed + (u if tolerance else u[3:])
@@ -204,13 +185,25 @@ def test_fractional_delay_has_the_phase_of_a_delay(delay: float) -> None:
         assert error < (wT / 2.0) ** taps.size * 2.0
 
 
-def test_probes_that_cannot_be() -> None:
-    design = load_design("emps")
-    with pytest.raises(InputError, match="no such stage"):
-        simulate(design, commands.hold(), 0.1, probes=[Probe(point="i_ref")])
-    with pytest.raises(InputError, match="one a point"):
-        simulate(design, commands.hold(), 0.1, probes=[Probe(point="u"), Probe(point="u")])
-    with pytest.raises(InputError, match="must be one of"):
-        Probe(point="v")
-    with pytest.raises(InputError, match="zero or more"):
-        Probe(point="u", delay_samples=-1.0)
+def probed(*probes: Probe) -> object:
+    return simulate("emps", commands.hold(), 0.1, probes=probes)
+
+
+LONG = Run(design=AMBER, command=commands.hold(), duration_s=0.1, reducers=Reducers(window_ticks=800))
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: simulate_many([]), "at least one"),
+        (lambda: simulate_many([LONG]), "must fit twice"),
+        (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
+        (lambda: probed(Probe(point="i_ref")), "no such stage"),
+        (lambda: probed(Probe(point="u"), Probe(point="u")), "one a point"),
+        (lambda: Probe(point="v"), "must be one of"),
+        (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
+    ],
+)
+def test_refusals(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        make()

@@ -1,7 +1,7 @@
 """A biquad is (b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2), a = [a1, a2], wherever a drive is written."""
 
-from dataclasses import replace
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.errors import InputError
 from nonlinear import Drive, commands, simulate
 from nonlinear.row.filters import section
+from tests.changed import changed
 
 IDENTITIES = [
     ((1.0, 0.5, 0.2), (0.5, 0.2)),
@@ -28,13 +29,12 @@ FILTERS = [
     ((0.0, 0.0, 1.0), (0.0,)),  # two periods of delay
     ((0.5,), (-0.5,)),
 ]
+TS = load_design("ilr33-amber").controller.period_s
 
 
 def amber(*filters: Filter) -> Design:
-    design = load_design("ilr33-amber")
-    velocity = replace(design.controller.velocity, filters=filters, every=2)
-    position = replace(design.controller.position, every=4)
-    return replace(design, controller=replace(design.controller, velocity=velocity, position=position))
+    control = {"velocity": {"filters": filters, "every": 2}, "position": {"every": 4}}
+    return changed(load_design("ilr33-amber"), controller=control)
 
 
 def response(b: tuple[float, ...], a: tuple[float, ...], z: complex) -> complex:
@@ -44,7 +44,7 @@ def response(b: tuple[float, ...], a: tuple[float, ...], z: complex) -> complex:
 
 @pytest.mark.parametrize("place", ["torque", "speed"])
 @pytest.mark.parametrize(("b", "a"), IDENTITIES)
-def test_an_identity_is_no_filter(b: tuple[float, ...], a: tuple[float, ...], place: str) -> None:
+def test_an_identity_is_no_filter(b: Any, a: Any, place: str) -> None:
     plain, same = amber(), amber(Filter(kind="biquad", on=place, b=b, a=a))
     z = np.exp(1j * np.array([0.01, 0.3, 2.0]))
     for form in ("sampled", "continuous", "ideal"):
@@ -64,36 +64,28 @@ def test_an_identity_is_no_filter(b: tuple[float, ...], a: tuple[float, ...], pl
 
 @pytest.mark.parametrize("place", ["torque", "speed"])
 @pytest.mark.parametrize(("b", "a"), FILTERS)
-def test_the_velocity_loop_has_the_filter_as_factor(
-    b: tuple[float, ...], a: tuple[float, ...], place: str
-) -> None:
-    """At the velocity period the loop is the loop without the filter times H(z), in every form."""
-    plain, filtered = (
-        assemble_loops(each).velocity for each in (amber(), amber(Filter(kind="biquad", on=place, b=b, a=a)))
-    )
-    for angle in (0.02, 0.4, 1.5):
-        z = np.exp(1j * angle)
-        ratio = filtered.open_loop(z) / plain.open_loop(z)
-        assert complex(ratio) == pytest.approx(response(b, a, z), rel=1e-9)
-    T = plain.period_s
-    item = Filter(kind="biquad", on=place, b=b, a=a)
-    loops = [assemble_loops(each, form="ideal").velocity for each in (amber(), amber(item))]
-    for angle in (0.02, 0.4, 1.5):  # the inverse of Tustin's rule: s = (2/T) j tan(angle/2)
-        s = 2j / T * np.tan(angle / 2)
-        ratio = loops[1].open_loop(s) / loops[0].open_loop(s)
-        assert complex(ratio) == pytest.approx(response(b, a, np.exp(1j * angle)), rel=1e-9)
+def test_the_velocity_loop_has_the_filter_as_factor(b: Any, a: Any, place: str) -> None:
+    """At the velocity period the loop is the loop without the filter times H(z), in every form.
+
+    In the ideal one by the inverse of Tustin's rule, s = (2/T) j tan(angle/2).
+    """
+    drives = amber(), amber(Filter(kind="biquad", on=place, b=b, a=a))
+    for form in ("sampled", "ideal"):
+        plain, filtered = (assemble_loops(each, form=form).velocity for each in drives)
+        for angle in (0.02, 0.4, 1.5):
+            z, s = np.exp(1j * angle), 2j / (2.0 * TS) * np.tan(angle / 2)
+            at = z if form == "sampled" else s
+            ratio = filtered.open_loop(at) / plain.open_loop(at)
+            assert complex(ratio) == pytest.approx(response(b, a, z), rel=1e-9)
 
 
 @pytest.mark.parametrize(("b", "a"), FILTERS)
-def test_the_running_drive_and_the_facts_have_its_difference_equation(
-    b: tuple[float, ...], a: tuple[float, ...]
-) -> None:
+def test_the_running_drive_and_the_facts_have_its_difference_equation(b: Any, a: Any) -> None:
     """y_n = sum b_k x_(n-k) - sum a_k y_(n-k): the torque command of a P controller after a step of speed."""
     design = amber(Filter(kind="biquad", b=b, a=a))
-    control = design.controller
-    velocity = replace(control.velocity, integral_time_s=None, every=1, gain=0.01)
-    control = replace(control, velocity=velocity, position=None, current=None)
-    drive = Drive(replace(design, controller=control, limits=Limits(voltage_V=1e9)))
+    velocity = {"integral_time_s": None, "every": 1, "gain": 0.01}
+    alone = {"velocity": velocity, "position": None, "current": None}
+    drive = Drive(changed(design, controller=alone, limits=Limits(voltage_V=1e9)))
     expected: list[float] = []
     got = []
     for n in range(30):

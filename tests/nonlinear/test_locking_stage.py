@@ -12,12 +12,9 @@ from actuator_lti.design.model import Controller, Friction, Limits, Motor, Posit
 from nonlinear import commands, simulate
 
 AMBER = load_design("ilr33-amber")
+RATIOS = {"planetary": 66, "worm": 36, "chain": 2}
 CHAIN = {
-    "gear": [
-        {"name": "planetary", "ratio": 66},
-        {"name": "worm", "ratio": 36},
-        {"name": "chain", "ratio": 2},
-    ],
+    "gear": [{"name": name, "ratio": ratio} for name, ratio in RATIOS.items()],
     "coupling": {"stiffness": "50 N*m/rad", "damping": "0.3 N*m*s/rad", "after": "worm"},
     "load.inertia": "4e-3 kg*m^2",
 }
@@ -53,8 +50,7 @@ def test_the_motor_feels_the_load_as_friction_only(load_Nm: float) -> None:
     friction, kM = design.friction, design.motor.torque_constant_Nm_A
     w = rate * design.total_ratio
     wanted = (friction.dry_torque_Nm + friction.load_coefficient * 4.0 + friction.viscous_Nms_rad * w) / kM
-    last = slice(int(0.8 * len(run.time_s)), None)
-    assert np.mean(run.current_A[last]) == pytest.approx(wanted, rel=1e-6)
+    assert np.mean(run.current_A[int(0.8 * len(run.time_s)) :]) == pytest.approx(wanted, rel=1e-6)
     twist = run.motor_angle_rad[-1] / 2376.0 - 2.0 * run.output_angle_rad[-1]
     assert twist == pytest.approx(-load_Nm / 2.0 / 50.0, rel=1e-6)
 
@@ -85,8 +81,7 @@ def _integrator(position: PositionLoop | None) -> Design:
 
 def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
     """Speed at the ticks under voltages held over them: the sum of what each tick adds."""
-    gain = design.effective_motor.source_gain_Nm_V
-    step = gain * TICK / design.inertia_kgm2
+    step = design.effective_motor.source_gain_Nm_V * TICK / design.inertia_kgm2
     return np.concatenate([[0.0], step * np.cumsum(voltage_V)[:-1]])
 
 
@@ -106,9 +101,8 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     design = _integrator(PositionLoop(gain=0.5, every=4))
     command = commands.step(30.0 / design.total_ratio)
     run = simulate(design, command, 1.0, supply=commands.sampled(TIME, BUS), supply_scales=True)
-    gain = design.effective_motor.source_gain_Nm_V
     angle = speed = held = 0.0
-    a = gain / design.inertia_kgm2
+    a = design.effective_motor.source_gain_Nm_V / design.inertia_kgm2
     expected = np.empty(len(TIME))
     for k, bus in enumerate(BUS):
         if k % 4 == 0:

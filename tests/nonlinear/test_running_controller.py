@@ -13,6 +13,7 @@ from actuator_lti.design import model, shipped_designs
 from nonlinear import Drive
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.state_kinds import CONTINUOUS, KINDS, NOTE, WORK, state_kinds
+from tests.changed import changed
 
 TICKS = 240
 CASES = 120
@@ -46,7 +47,6 @@ def some_drive(rng: np.random.Generator) -> model.Design:
     def pick(*values):
         return values[rng.integers(len(values))]
 
-    base = load_design("ilr33-amber")
     Ts, n_v, wide = 10 ** rng.uniform(-5, -3), int(pick(1, 2, 5)), 10 ** rng.uniform(-1, 1)
     laws = ("conditional", "clamped", "back-calculation")
     has_position, has_velocity, has_current = (pick(True, True, False) for _ in range(3))
@@ -113,16 +113,15 @@ def some_drive(rng: np.random.Generator) -> model.Design:
         velocity=velocity if has_velocity else None, current=cascade if has_current else None,
     )  # fmt: skip
     behind = model.OutputEncoder(counts_per_rev=pick(None, 10**6))
-    return replace(
-        base, controller=control, limits=limits, encoder=encoder, command=command, output_encoder=behind
-    )
+    own = {"limits": limits, "encoder": encoder, "command": command, "output_encoder": behind}
+    return replace(load_design("ilr33-amber"), controller=control, **own)
 
 
 def some_measurements(rng: np.random.Generator, design: model.Design) -> np.ndarray:
     """Command, current, speed, angle and output angle at every tick: smooth, large enough to reach limits."""
     t, N = np.arange(TICKS), design.total_ratio
     waves = [
-        np.sin(t * rng.uniform(0.01, 0.3) + rng.uniform(0, 6)) - np.sin(rng.uniform(0, 6)) for _ in range(4)
+        np.sin(t * rng.uniform(0.01, 0.3) + rng.uniform(0, 6)) - np.sin(rng.uniform(0, 6)) for _ in "ciwy"
     ]
     size = {"position": 0.05, "velocity": 1.0, "current": 4.0, "voltage": 25.0}[design.controller.outermost]
     command = size * waves[0] + size * (t > 60) * rng.uniform(-1, 1)
@@ -163,17 +162,14 @@ def kinds_of(drive: Drive) -> np.ndarray:
 
 def drives() -> list[model.Design]:
     """Every shipped drive, random cascades, two masses with play, stick on both sides, and a supply."""
-    play = two_mass(
-        friction={"dry_torque_Nm": 0.02, "load_coefficient": 0.01}, load_friction={"dry_torque_Nm": 0.1}
-    )
-    play = replace(play, load=replace(play.load, moment_damping_Nms_rad=0.01))
-    weak = load_design("ilr33-amber")
-    weak = replace(weak, supply=model.Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3))
-    feeding = replace(
-        weak.controller, position=replace(weak.controller.position, acceleration_feedforward=0.5)
-    )
+    rubbing = {"dry_torque_Nm": 0.02, "load_coefficient": 0.01}
+    play = two_mass(friction=rubbing, load_friction={"dry_torque_Nm": 0.1})
+    play = changed(play, load={"moment_damping_Nms_rad": 0.01})
+    supply = model.Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3)
+    feeding = {"position": {"acceleration_feedforward": 0.5}}
+    weak = changed(load_design("ilr33-amber"), supply=supply, controller=feeding)
     random = [some_drive(np.random.default_rng(case)) for case in range(60)]
-    return [*map(load_design, shipped_designs()), *random, play, replace(weak, controller=feeding)]
+    return [*map(load_design, shipped_designs()), *random, play, weak]
 
 
 def command(tick: int) -> float:

@@ -111,9 +111,8 @@ def test_pages_and_notebooks_have_the_same_colours() -> None:
 def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     run = simulate("ilr33-amber", commands.step(0.01), 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(
-        InputError, match=r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
-    ):
+    told = r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
+    with pytest.raises(InputError, match=told):
         run.to_pandas()
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     with pytest.raises(InputError, match=r"plotting needs matplotlib"):

@@ -88,12 +88,9 @@ def type_value(page: Page, key: str, value: float) -> None:
 def read(page: Page) -> dict[str, dict[str, float]]:
     """Read every figure of the page, to all digits, once those have followed that come behind."""
     page.wait_for_selector("#hands-on[data-behind=done]")
-    cells = page.eval_on_selector_all(
-        ".now td[data-figure]",
-        "(all) => all.map((td) => [td.dataset.loop, td.dataset.figure, td.dataset.value])",
-    )
+    told = "all => all.map(td => [td.dataset.loop, td.dataset.figure, td.dataset.value])"
     result: dict[str, dict[str, float]] = {}
-    for loop, name, value in cells:
+    for loop, name, value in page.locator(".now td[data-figure]").evaluate_all(told):
         result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
     return result
 
@@ -107,10 +104,8 @@ def command_line(path: Path | str, part: str = "loops") -> Any:
 def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
     """Compare value and verdict of every requirement that the page judges."""
     page.wait_for_selector("#hands-on[data-behind=done]")
-    rows = page.eval_on_selector_all(
-        "table.demands tbody tr",
-        "(all) => all.map((row) => [row.dataset.id, row.dataset.loop, row.dataset.value, row.dataset.met])",
-    )
+    told = "all => all.map(({ dataset }) => [dataset.id, dataset.loop, dataset.value, dataset.met])"
+    rows = page.locator("table.demands tbody tr").evaluate_all(told)
     apart = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).apart")
     ours = {(id, loop or None): (value, met) for id, loop, value, met in rows}
     assert len(ours) + len(apart) == len(verdicts)

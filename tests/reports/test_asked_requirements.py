@@ -63,10 +63,8 @@ def test_every_requirement_reads_its_analysis(fin: Design) -> None:
     made = []
     for name, value in wanted.items():
         side = "minimum" if ANALYSIS_QUANTITIES[name].better > 0 else "maximum"
-        made += [
-            requirement(name, **{side: value * share + shift}) for share, shift in ((1.0, 1e-3), (1.0, -1e-3))
-        ]
-    made = [replace(one, id=f"{one.id}-{k}") for k, one in enumerate(made)]
+        for end, shift in (("above", 1e-3), ("below", -1e-3)):
+            made.append(replace(requirement(name, **{side: value + shift}), id=f"{name}-{end}"))
     verdicts = evaluate_requirements(replace(fin, requirements=tuple(made)))
     for one, (name, value) in zip(verdicts[::2], wanted.items(), strict=True):
         assert one.value == pytest.approx(value, rel=1e-9), name

@@ -55,9 +55,8 @@ def agree(found: dict[str, float], command: Command, load_Nm: float = 0.0, **cha
     run = simulate(design, command, load_Nm=load_Nm, duration_s=ticks * design.controller.period_s)
     k = ticks - 1
     assert found["output"] == pytest.approx(math.degrees(run.output_angle_rad[k]), rel=1e-9, abs=1e-12)
-    assert found["speed"] == pytest.approx(run.motor_speed_rad_s[k], rel=1e-7, abs=1e-9)
-    assert found["current"] == pytest.approx(run.current_A[k], rel=1e-7, abs=1e-9)
-    assert found["voltage"] == pytest.approx(run.voltage_V[k], rel=1e-7, abs=1e-9)
+    ends = {"speed": run.motor_speed_rad_s[k], "current": run.current_A[k], "voltage": run.voltage_V[k]}
+    assert {name: found[name] for name in ends} == pytest.approx(ends, rel=1e-7, abs=1e-9)
 
 
 def test_step_sine_and_ramp_are_those_of_the_simulator(page: Page) -> None:
@@ -111,11 +110,8 @@ def test_the_drive_is_drawn_as_it_stands_at_a_time(page: Page) -> None:
 
 def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
     """A step of 8 deg runs at the speed limit: shaded in the panel of the speed, for as long as it acts."""
-    found = ask(page, "step", Size=8.0, Duration=0.6)
-    design = load_design(DESIGN)
-    run = simulate(
-        design, step(math.radians(8.0)), duration_s=int(found["ticks"]) * design.controller.period_s
-    )
+    ticks, design = int(ask(page, "step", Size=8.0, Duration=0.6)["ticks"]), load_design(DESIGN)
+    run = simulate(design, step(math.radians(8.0)), duration_s=ticks * design.controller.period_s)
     acting = run.limit_active("speed").mean()
     boxes = page.eval_on_selector_all(
         '[data-chart="run"] .panel:nth-of-type(2) .cells rect',

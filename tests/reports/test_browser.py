@@ -79,9 +79,8 @@ def test_a_bar_is_as_long_as_its_figure(opens, built: Built) -> None:
             ".map(box => [box.left, box.right])"
         )
         (start, now), (low, high), _ = places
-        assert (now - start) / ((low + high) / 2 - start) == pytest.approx(
-            bar["value"] / bar["limit"], rel=0.02
-        )
+        part = (now - start) / ((low + high) / 2 - start)
+        assert part == pytest.approx(bar["value"] / bar["limit"], rel=0.02)
 
 
 def test_a_link_opens_the_fold_that_it_leads_into(opens, built: Built) -> None:
@@ -103,9 +102,8 @@ def test_the_summary_prints_on_four_pages(opens, built: Built) -> None:
     page.emulate_media(media="print")
     sheets = pypdf.PdfReader(io.BytesIO(page.pdf(prefer_css_page_size=True))).pages
     assert len(sheets) <= 4
-    printed = unicodedata.normalize(
-        "NFKC", "".join("".join(sheet.extract_text().split()) for sheet in sheets)
-    )
+    words = "".join("".join(sheet.extract_text().split()) for sheet in sheets)
+    printed = unicodedata.normalize("NFKC", words)
     for part in built.document["sections"]:
         assert "".join(part["title"].split()) in printed or part["id"] == "answer"
 

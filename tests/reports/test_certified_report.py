@@ -22,8 +22,8 @@ def survey():
 
 
 def test_every_margin_of_a_report_is_certified(survey):
-    figures = [f for result in survey.forms.values() for f in result.values()]
-    figures += [f for point in survey.operating_points for f in point.figures.values()]
+    groups = [*survey.forms.values(), *(point.figures for point in survey.operating_points)]
+    figures = [one for group in groups for one in group.values()]
     figures += [point.figures for point in survey.break_points.values()]
     figures.append(survey.figures["current"].locked)
     assert len(figures) > 20
@@ -51,9 +51,8 @@ def test_a_withheld_margin_gives_its_reason(survey):
     assert made["status"] == "warn"
     texts = [block["text"] for block in made["blocks"] if block["kind"] == "text"]
     assert any(text.startswith("Velocity loop, withheld: ") for text in texts)
-    assert (
-        margins.evidence_words(figures) == "current loop and position loop certified, velocity loop withheld"
-    )
+    words = "current loop and position loop certified, velocity loop withheld"
+    assert margins.evidence_words(figures) == words
     assert loop_json(result)["evidence"] == "withheld"
     assert loop_json(result)["evidence_reason"]
 

@@ -24,10 +24,6 @@ def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
     assert not any(docs.values()), docs
 
 
-def test_version(cli) -> None:
-    assert cli.text("--version").startswith("actuator-lti ")
-
-
 def loaded(code: str) -> set[str]:
     """What a process of its own has loaded after some code."""
     told = f"{code}\nimport sys; print(*sys.modules)"
@@ -67,6 +63,7 @@ def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() ->
 
 
 def test_margins_in_json_and_nothing_else(cli) -> None:
+    assert cli.text("--version").startswith("actuator-lti ")
     ran = cli("margins", "--json")
     assert (ran.status, ran.err) == (0, "")
     result = ran.data
@@ -140,9 +137,8 @@ def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
 
 def test_a_folder_that_is_a_file_is_named(tmp_path, cli) -> None:
     (tmp_path / "out").write_text("in the way")
-    assert str(tmp_path / "out") in cli.refused(
-        "report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation"
-    )
+    said = cli.refused("report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation")
+    assert str(tmp_path / "out") in said
     (tmp_path / "empty.json").touch()
     assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
 
@@ -167,12 +163,10 @@ def test_a_closed_pipe_is_no_error() -> None:
     code = "from reports.cli.main import main; import sys; sys.exit(main(['margins', '--json']))"
     read, write = os.pipe()
     os.close(read)
-    done = subprocess.run(
-        [sys.executable, "-c", code], stdout=write, stderr=subprocess.PIPE, text=True, check=False
-    )
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, stdout=write, stderr=subprocess.PIPE, text=True, check=False)
     os.close(write)
-    assert done.stderr == ""
-    assert done.returncode == 141
+    assert (done.stderr, done.returncode) == ("", 141)
 
 
 def test_progress_stays_off_where_nobody_looks(capsys) -> None:

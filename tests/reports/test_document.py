@@ -82,11 +82,8 @@ def test_a_document_is_as_good_as_its_worst_part(
 
 
 def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
-    assert doc.plain({"a": np.array([1.0, np.nan, np.inf]), 2: np.int64(3), "b": np.bool_(True)}) == {
-        "a": [1.0, None, None],
-        "2": 3,
-        "b": True,
-    }
+    held = {"a": np.array([1.0, np.nan, np.inf]), 2: np.int64(3), "b": np.bool_(True)}
+    assert doc.plain(held) == {"a": [1.0, None, None], "2": 3, "b": True}
     with pytest.raises(TypeError, match="complex"):
         doc.plain([1j])
 
@@ -116,13 +113,12 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
+ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
+
+
 @pytest.mark.parametrize(
     "change",
-    [
-        {"passed": True},
-        {"verdict": "not proven"},
-        {"parts": {"requirements": {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}}},
-    ],
+    [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}],
 )
 def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str, Any], tmp_path) -> None:
     path = tmp_path / "report.json"

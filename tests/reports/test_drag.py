@@ -6,7 +6,6 @@ The truth is the axis: what lies between two places on a scale in dB is a factor
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
@@ -15,7 +14,7 @@ from live_page import read, settled
 from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.control import Filter
-from actuator_lti.design.model import Design
+from tests.changed import changed
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -46,18 +45,11 @@ SCALE = """([chart, k]) => {
 }"""
 
 
-def drive() -> Design:
-    amber = load_design("ilr33-amber")
-    velocity = amber.controller.velocity
-    notch = Filter(
-        kind="notch", frequency_rad_s=2.0 * math.pi * 200.0, width_rad_s=2.0 * math.pi * 60.0, depth=0.3
-    )
-    return replace(amber, controller=replace(amber.controller, velocity=replace(velocity, filters=(notch,))))
-
-
 @pytest.fixture
 def page(opens) -> Page:
-    result = opens(drive())
+    turn = 2.0 * math.pi
+    notch = Filter(kind="notch", frequency_rad_s=turn * 200.0, width_rad_s=turn * 60.0, depth=0.3)
+    result = opens(changed(load_design("ilr33-amber"), controller={"velocity": {"filters": (notch,)}}))
     settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
     result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
     return result
@@ -182,14 +174,9 @@ def test_a_design_with_a_limit_that_fails_marks_only_that(opens) -> None:
     late = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 0.75})
     page = opens(late)
     settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
-    colours = page.eval_on_selector_all(
-        '[data-chart="bode"] .live-marks .stem', "(all) => all.map((n) => n.style.stroke)"
-    )
-    rows = page.eval_on_selector_all(
-        "table.demands tr[data-loop=velocity]", "(all) => all.map((r) => [r.dataset.id, r.dataset.met])"
-    )
-    met = dict(rows)
-    assert colours == [
-        f"var(--{'fail' if met[name] == 'false' else 'pass'})" for name in ("gain-margin", "phase-margin")
-    ]
+    stems, demands = '[data-chart="bode"] .live-marks .stem', "table.demands tr[data-loop=velocity]"
+    colours = page.locator(stems).evaluate_all("all => all.map(n => n.style.stroke)")
+    met = dict(page.locator(demands).evaluate_all("all => all.map(r => [r.dataset.id, r.dataset.met])"))
+    shown = {"false": "var(--fail)", "true": "var(--pass)"}
+    assert colours == [shown[met[name]] for name in ("gain-margin", "phase-margin")]
     assert "var(--fail)" in colours

@@ -40,10 +40,8 @@ def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(bui
     result = glance(built.document)
     assert result["believed"].startswith("Linear equals simulated to 10⁻⁹; ")
     assert result["believed"].endswith("checks by simulation met; nothing unproven.")
-    assert (
-        result["linear"]
-        == "A sine of full deflection (10 deg) stays linear up to 0.362 Hz; above, the speed limit acts."
-    )
+    linear = "A sine of full deflection (10 deg) stays linear up to 0.362 Hz; above, the speed limit acts."
+    assert result["linear"] == linear
     assert len(result["findings"]) == 3
     assert result["linear"] not in [item["text"] for item in result["findings"]]
     ids = {part["id"] for part in built.document["sections"]}
@@ -64,9 +62,12 @@ def test_the_pictures_are_of_the_weakest_view(built: Built) -> None:
     assert step["caption"].startswith("Position loop")
 
 
+def finding(text: str, where: str, severity: doc.Severity = "warn") -> doc.Finding:
+    return doc.Finding(severity=severity, text=text, where=where)
+
+
 def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
-    mild = doc.Finding(severity="info", text="b", where="two")
-    grave = doc.Finding(severity="fail", text="a", where="one")
+    mild, grave = finding("b", "two", "info"), finding("a", "one", "fail")
     sections = [
         doc.section("one", "One", [], findings=[mild, grave]),
         doc.section("two", "Two", [], findings=[mild]),
@@ -77,10 +78,6 @@ def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
 
 def test_sections_take_turns_on_the_first_screen() -> None:
     """One that has much to say leaves room for what the others have to say of the same weight."""
-
-    def finding(text: str, where: str, severity: doc.Severity = "warn") -> doc.Finding:
-        return doc.Finding(severity=severity, text=text, where=where)
-
     loud = [finding(text, "loud") for text in "abcd"]
     sections = [
         doc.section("loud", "Loud", [], findings=loud),

@@ -52,13 +52,9 @@ def document() -> dict[str, Any]:
     panel.curve(t, 3.0 - t, HOSTILE, **style.series(1))
     panel.x.label, panel.y.label = "time, s", "angle, deg"
     rows = [{"_loop": "current", "_hz": CROSSOVER_HZ, "what": "gain crossover"}]
-    blocks = [
-        doc.table("Crossings", [doc.column("what", "Crossing")], rows),
-        *(
-            doc.figure(name, data, caption=name, alt=name)
-            for name, data in (("bode", bode), ("nyquist", nyquist), ("curves", curves))
-        ),
-    ]
+    drawn = {"bode": bode, "nyquist": nyquist, "curves": curves}
+    blocks = [doc.table("Crossings", [doc.column("what", "Crossing")], rows)]
+    blocks += [doc.figure(name, data, caption=name, alt=name) for name, data in drawn.items()]
     head = {"name": "made", "revision": "", "title": "", "origin": "", "axis": "rotary"}
     origin = {"design_hash": "0" * 64, "time": "", "version": "0", "commit": ""}
     parts = [doc.section("loop-current", "Current loop", blocks, result="It is drawn.")]
@@ -154,9 +150,8 @@ def test_zoom_keeps_the_point_under_the_pointer_and_the_read_out_true(page: Page
 def test_both_panels_of_a_bode_figure_zoom_along_frequency_together(page: Page) -> None:
     figure = chart(page, 0)
     figure.get_by_role("button", name="Zoom in").click()
-    shifts = figure.evaluate(
-        "root => [...root.querySelectorAll('.world')].map(g => "
-        "g.getAttribute('transform').match(/[-\\d.]+/g))"
+    shifts = figure.locator(".world").evaluate_all(
+        "all => all.map(g => g.getAttribute('transform').match(/[-\\d.]+/g))"
     )
     assert float(shifts[0][0]) == float(shifts[1][0]) > 1.0
     assert shifts[0][4] == shifts[1][4]
@@ -195,8 +190,7 @@ def test_the_legend_switches_curves(page: Page, how: str) -> None:
         if how == "mouse":
             item.click()
         else:
-            item.focus()
-            page.keyboard.press("Enter")
+            item.press("Enter")
         assert item.get_attribute("aria-pressed") == ("true" if shown else "false")
         assert figure.locator(".curve[data-k='0']").is_visible() is shown
         page.mouse.move(*spot(figure, 0.5, 0.5))
@@ -207,14 +201,8 @@ def test_a_row_of_a_table_shows_its_crossing_in_every_figure_of_its_loop(page: P
     page.get_by_role("button", name="Show this crossing").click()
     assert chart(page, 0).locator(".crossing").count() == 2
     assert chart(page, 2).locator(".crossing").count() == 0
-    place = (
-        chart(page, 0)
-        .locator(".crossing")
-        .first.evaluate(
-            "node => [node.getBBox().x, ...node.closest('.panel').dataset.x.split(' ').slice(1).map(Number)]"
-        )
-    )
-    at, low, high, a, b = place
+    place = "node => [node.getBBox().x, ...node.closest('.panel').dataset.x.split(' ').slice(1).map(Number)]"
+    at, low, high, a, b = chart(page, 0).locator(".crossing").first.evaluate(place)
     assert low * (high / low) ** ((at - a) / (b - a)) == pytest.approx(CROSSOVER_HZ, rel=1e-3)
 
 
@@ -245,9 +233,8 @@ def test_a_tap_reads_and_two_fingers_zoom(page: Page) -> None:
     x, y = spot(figure, 0.5, 0.5)
     session = page.context.new_cdp_session(page)
     for kind, gap in (("touchStart", 20.0), ("touchMove", 35.0), ("touchMove", 50.0), ("touchEnd", 0.0)):
-        points = (
-            [] if kind == "touchEnd" else [{"x": x - gap, "y": y, "id": 0}, {"x": x + gap, "y": y, "id": 1}]
-        )
+        fingers = [{"x": x - gap, "y": y, "id": 0}, {"x": x + gap, "y": y, "id": 1}]
+        points = fingers * (kind != "touchEnd")
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
     figure.locator(".zoomed").first.wait_for()
     scale = figure.locator(".world").first.get_attribute("transform")
@@ -258,9 +245,8 @@ def test_a_tap_reads_and_two_fingers_zoom(page: Page) -> None:
 def test_a_curve_can_be_given_new_values(page: Page) -> None:
     figure = chart(page, 2)
     values = {"panel": 0, "curve": "parabola", "x": [0.0, 1.0, 2.0], "y": [1.0, 1.5, 2.0]}
-    figure.evaluate(
-        "(root, detail) => root.dispatchEvent(new CustomEvent('chart:redraw', { detail }))", values
-    )
+    redraw = "(root, detail) => root.dispatchEvent(new CustomEvent('chart:redraw', { detail }))"
+    figure.evaluate(redraw, values)
     page.mouse.move(*spot(figure, 0.3, 0.5))
     result = read(figure)
     assert result["parabola: angle"] == pytest.approx(1.0 + 0.5 * result["time"], abs=2e-3)

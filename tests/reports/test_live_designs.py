@@ -136,16 +136,13 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     design = load_design(name)
     page = opens(design)
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
-    page.wait_for_function(
-        "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
-    )
+    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    page.wait_for_function(drawn)
     page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert len(cells) == 18 * 12
     every = design.controller.position_loop.every
-    ticks, hertz, updates, amplitude = (
-        np.array([cell[k] for cell in cells], dtype=float) for k in range(1, 5)
-    )
+    ticks, hertz, updates, amplitude = np.array([cell[1:5] for cell in cells], dtype=float).T
     rows = Rows.of(design, len(cells))
     rows.sine("command", amplitude, hertz)
     rows.window(every * updates, np.round(hertz * updates * every * design.controller.period_s), 1)

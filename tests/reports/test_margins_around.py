@@ -60,9 +60,8 @@ def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
     assert result.stable
     limit = min(margin.ratio for margin in result.gain_margins if margin.ratio > 1.0)
     assert loop.period_s == table["sampling_period"]
-    assert (
-        growth(table, 0.97 * limit, tmp_path, seconds) < 1.0 < growth(table, 1.03 * limit, tmp_path, seconds)
-    )
+    below, above = (growth(table, share * limit, tmp_path, seconds) for share in (0.97, 1.03))
+    assert below < 1.0 < above
 
 
 def test_closed_forms_of_an_integrator_around_the_ideal_drive() -> None:

@@ -1,5 +1,7 @@
 """A measured response over the model: truth is the model itself times a known error."""
 
+from pathlib import Path
+
 import control
 import numpy as np
 import pytest
@@ -15,17 +17,22 @@ LOOPS = assemble_loops("ilr33-amber")
 HERTZ = np.geomspace(2.0, 1800.0, 160)
 
 
-def bench(
-    loop: str, kind: str = "L", gain: float = 1.05, delay_s: float = 0.0
-) -> control.FrequencyResponseData:
+Response = control.FrequencyResponseData
+
+
+def bench(loop: str, kind: str = "L", gain: float = 1.05, delay_s: float = 0.0) -> Response:
     """The loop as a bench with another gain and a delay would measure it."""
     at = LOOPS.present[loop]
     hertz = HERTZ[2.1 * HERTZ * at.period_s < 1.0]
     L = at.plain_open(np.exp(2j * np.pi * hertz * at.period_s)).reshape(-1)
     L = L * gain * np.exp(-2j * np.pi * hertz * delay_s)
-    return control.FrequencyResponseData(
-        {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[kind], 2.0 * np.pi * hertz
-    )
+    return Response({"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[kind], 2.0 * np.pi * hertz)
+
+
+def saved(path: Path, truth: Response, header: str, *columns: np.ndarray) -> Path:
+    rows = np.column_stack([truth.omega / (2.0 * np.pi), *columns])
+    np.savetxt(path, rows, delimiter=",", header=f"f_hz,{header}", comments="", fmt="%.17g")
+    return path
 
 
 @pytest.mark.parametrize("kind", ["L", "T", "S"])
@@ -50,9 +57,8 @@ def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
     rng, truth = np.random.default_rng(5), bench("position", gain=1.0)
     L, n = truth.frdata.ravel(), truth.omega.size
     noisy = L * (1.0 + 0.02 * (rng.normal(size=n) + 1j * rng.normal(size=n)) / np.sqrt(2.0))
-    rows = np.column_stack([truth.omega / (2.0 * np.pi), noisy.real, noisy.imag, np.full(n, 0.02)])
-    path = tmp_path / "r.csv"
-    np.savetxt(path, rows, delimiter=",", header="f_hz,real,imag,deviation", comments="", fmt="%.17g")
+    columns = (noisy.real, noisy.imag, np.full(n, 0.02))
+    path = saved(tmp_path / "r.csv", truth, "real,imag,deviation", *columns)
     one = measured_over(LOOPS, path)
     assert 0.95 * n <= one.within <= n  # 99 % of the circles
     assert main(["margins", "ilr33-amber", "--response", str(path), "--out", str(tmp_path / "x")]) == 0
@@ -60,9 +66,9 @@ def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
 
 def test_command_line(tmp_path, cli) -> None:
     truth = bench("velocity", gain=1.0)
-    path, L = tmp_path / "r.csv", truth.frdata.ravel()
-    rows = np.column_stack([truth.omega / (2.0 * np.pi), 20.0 * np.log10(np.abs(L)), np.degrees(np.angle(L))])
-    np.savetxt(path, rows, delimiter=",", header="f_hz,gain_db,phase_deg", comments="", fmt="%.17g")
+    L = truth.frdata.ravel()
+    columns = (20.0 * np.log10(np.abs(L)), np.degrees(np.angle(L)))
+    path = saved(tmp_path / "r.csv", truth, "gain_db,phase_deg", *columns)
     asked = ["margins", "ilr33-amber", "--response", str(path), "--response-of"]
     shown = cli.data(*asked, "velocity")["measured"]
     assert max(map(abs, shown["difference_db"])) < 1e-9
@@ -71,8 +77,7 @@ def test_command_line(tmp_path, cli) -> None:
     assert "velocity loop. The model explains the measurement within 0.00 dB" in section["result"]
     assert "--response-of speed: allowed: " in cli.refused(*asked, "speed")
     for command in ("margins", "report"):
-        assert "--averages: allowed with --response" in cli.refused(
-            command, "ilr33-amber", "--averages", "8", "--out", tmp_path / "x"
-        )
+        said = cli.refused(command, "ilr33-amber", "--averages", "8", "--out", tmp_path / "x")
+        assert "--averages: allowed with --response" in said
     with pytest.raises(InputError, match="no two frequencies below"):
-        measured_over(LOOPS, control.FrequencyResponseData([1.0, 1j], [1e6, 2e6]), "current")
+        measured_over(LOOPS, Response([1.0, 1j], [1e6, 2e6]), "current")

@@ -18,9 +18,8 @@ from reports.nightly.moves import Tolerances
 from reports.sections import answer, loop, margins
 
 DESIGN = load_design("ilr33-amber")
-NEW = replace(
-    QUANTITIES["modulus_margin"], title="New figure", at_a_glance="fix:3", followed=True, tolerance=1e-3
-)  # one that no list of the reports knows
+# one that no list of the reports knows
+NEW = replace(QUANTITIES["modulus_margin"], title="New figure", at_a_glance="fix:3", followed=True)
 
 
 def test_the_first_screen_and_the_loop_show_what_the_registry_says(monkeypatch) -> None:
@@ -75,8 +74,7 @@ def test_a_figure_of_the_corners_has_its_corner(monkeypatch) -> None:
     of = QUANTITIES["sensitivity_peak"]
     new = replace(of, name="corner_sensitivity_peak", reader="", source="analysis", cornered=of.name)
     monkeypatch.setitem(CORNERED, of.name, new)
-    tolerant = load_design("ilr33-amber")
-    result = {one.name: one for one in corners(tolerant).corners}
+    result = {one.name: one for one in corners(DESIGN).corners}
 
     def peak(name: str) -> float:
         return max(of.read(one) for one in result[name].figures.values())

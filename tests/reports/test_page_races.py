@@ -87,11 +87,8 @@ def test_presses_within_one_frame_are_as_many_steps_as_they_do(page: Page) -> No
 
 
 def test_nothing_is_no_step(page: Page) -> None:
-    assert at_once(
-        page,
-        f'''type("{GAIN}", "120"); await frame(); await frame();
-                         return find('[data-do="undo"]').disabled;''',
-    )
+    does = f'type("{GAIN}", "120"); await frame(); await frame();'
+    assert at_once(page, does + "return find('[data-do=\"undo\"]').disabled;")
 
 
 def test_a_move_under_way_is_reset(page: Page) -> None:
@@ -137,9 +134,8 @@ def test_a_slider_let_go_after_an_undo_holds_where_it_stands(page: Page) -> None
 
 def test_the_map_is_drawn_though_it_is_seen_before_the_page_is_ready(opens) -> None:
     page = opens(AMBER, first=WATCHED + EARLY)
-    page.wait_for_function(
-        "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length > 0"
-    )
+    drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
+    page.wait_for_function(drawn)
 
 
 def test_of_several_sights_told_at_once_the_last_counts(opens) -> None:

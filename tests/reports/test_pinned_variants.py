@@ -78,9 +78,8 @@ def test_one_cursor_goes_through_the_figures_of_a_loop(opens) -> None:
     step.locator(".plots").focus()
     for _ in range(6):
         page.keyboard.press("ArrowLeft")
-    told = dict(
-        re.findall(r"(time|half a period of)\s+([\d.]+) (?:ms|Hz)", step.locator(".readout").inner_text())
-    )
+    readout = step.locator(".readout").inner_text()
+    told = dict(re.findall(r"(time|half a period of)\s+([\d.]+) (?:ms|Hz)", readout))
     hertz = float(told["half a period of"])
     assert 2.0 * hertz * 1e-3 * float(told["time"]) == pytest.approx(1.0, rel=2e-3)
     assert page.locator('[data-chart="nyquist"] .over .probe').count() == 2

@@ -13,6 +13,8 @@ import pytest
 from built_report import Built
 from matplotlib.image import imread
 
+from reports import document as doc
+
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
@@ -50,18 +52,15 @@ def test_a_table_has_the_curves_of_the_document(page: Page, built: Built, tmp_pa
     assert path.name == "answer-1.csv"
     with path.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
-    chart = next(block for block in built.document["sections"][0]["blocks"] if block["kind"] == "figure")[
-        "chart"
-    ]
+    chart = doc.figures(built.document)[0]["chart"]
     for k, panel in enumerate(chart["columns"][0]["panels"], start=1):
         own = next(item for item in panel["items"] if item["kind"] == "curve" and item.get("label"))
         found = [row for row in rows if row["panel"] == str(k) and row["y is"] == panel["y"]["label"]]
         x, y = ([float(row[key]) for row in found] for key in ("x", "y"))
         assert found[0]["x is"] == "frequency, Hz"
         assert len(x) > 100
-        inside = [
-            (a, b) for a, b in zip(own["x"], own["y"], strict=True) if x[0] < a < x[-1] and b is not None
-        ]
+        drawn = zip(own["x"], own["y"], strict=True)
+        inside = [(a, b) for a, b in drawn if x[0] < a < x[-1] and b is not None]
         between = np.interp(np.log([a for a, _ in inside]), np.log(x), y)
         room = SIZE * (panel["y"]["high"] - panel["y"]["low"])
         assert between == pytest.approx([b for _, b in inside], abs=20 * room)
@@ -75,10 +74,8 @@ def test_a_drawing_stands_alone(page: Page, tmp_path: Path) -> None:
     root = ET.fromstring(text)
     words = {"".join(node.itertext()) for node in root.iter() if node.tag.endswith("text")}
     assert {"magnitude, dB", "phase, deg", "frequency, Hz", "as designed", "as changed", "−180"} <= words
-    assert (
-        len([node for node in root.iter() if node.tag.endswith("path") and len(node.get("d", "")) > 2000])
-        >= 4
-    )
+    paths = [node.get("d", "") for node in root.iter() if node.tag.endswith("path")]
+    assert sum(len(path) > 2000 for path in paths) >= 4
 
 
 def test_a_picture_has_ink_on_paper(page: Page, tmp_path: Path) -> None:

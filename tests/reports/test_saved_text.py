@@ -47,9 +47,8 @@ def as_page(key: Tree, factor: float) -> str:
 
 def changed(text: str, keys: list[Tree], places: list[tuple[int, int, str, str]], factor: float) -> str:
     made, last = "", 0
-    for (begin, end, before, after), key in sorted(
-        zip(places, keys, strict=True), key=lambda pair: pair[0][:2]
-    ):
+    pairs = sorted(zip(places, keys, strict=True), key=lambda pair: pair[0][:2])
+    for (begin, end, before, after), key in pairs:
         made += text[last:begin] + before + as_page(key, factor) + after
         last = end
     return made + text[last:]

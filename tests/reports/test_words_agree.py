@@ -91,6 +91,7 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
 
 
 SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
+SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 
 
 @pytest.mark.parametrize(
@@ -98,10 +99,7 @@ SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
     [
         ({}, ""),
         ({"control.position.feedforward": 1.0}, ": feed-forward included"),
-        (
-            {f"command.{key}": value for key, value in SHAPED.items()},
-            ": mean of its profile and filter included",
-        ),
+        (SHAPED, ": mean of its profile and filter included"),
     ],
 )
 def test_a_response_to_the_command_names_what_the_drive_has(changes: dict[str, float], parts: str) -> None:
@@ -126,10 +124,7 @@ def test_a_current_loop_says_how_its_rotor_stands() -> None:
 
 
 def test_the_first_screen_counts_what_is_not_met() -> None:
-    items = [
-        doc.verdict(str(k), "check", value=None, limit=None, unit="", passed=passed)
-        for k, passed in enumerate((True, False, None))
-    ]
+    items = [doc.verdict(str(passed), "check", passed=passed) for passed in (True, False, None)]
     part = doc.section("any", "Any", [doc.verdicts(items, what="checks")])
     assert believed([part]) == "1 of 3 checks by simulation met; 1 not met; 1 not proven."
 
@@ -170,10 +165,8 @@ def test_a_drive_that_stands_still_unproven_is_not_said_to_rest_after_every_step
         "The drive as it is comes to rest after every step, but after 57.3 mdeg it stands still 319000 s "
         "later; whether it stays is not known; no cycle is predicted."
     )
-    assert [row["end"] for row in made["blocks"][-1]["rows"]] == [
-        "stands still, not known for how long",
-        "at rest",
-    ]
+    ends = [row["end"] for row in made["blocks"][-1]["rows"]]
+    assert ends == ["stands still, not known for how long", "at rest"]
 
 
 def test_gain_margins_of_predictions_are_in_decibels_as_elsewhere() -> None:

@@ -67,14 +67,11 @@ def test_what_cannot_be_met_is_refused_with_its_distance():
     assert (reachable.feasible, asked.feasible) == (True, False)
     both = {r.id: r for r in asked.requirements}
     assert all(r.binds for r in both.values())
-    assert both["position-phase_margin"].relative == pytest.approx(
-        both["position-bandwidth"].relative, abs=0.01
-    )
-    width = both["position-bandwidth"]
+    margin, width = both["position-phase_margin"], both["position-bandwidth"]
+    assert margin.relative == pytest.approx(width.relative, abs=0.01)
     assert width.value == pytest.approx(60.0 + width.distance)
-    loops = assemble_loops(asked.design)
-    truth = stability_margins(loops.position.open_loop).phase_margin_deg
-    assert both["position-phase_margin"].value == pytest.approx(truth, abs=1e-3)
+    truth = stability_margins(assemble_loops(asked.design).position.open_loop).phase_margin_deg
+    assert margin.value == pytest.approx(truth, abs=1e-3)
     assert "Cannot be met together" in asked.notes[0]
 
 
@@ -134,11 +131,9 @@ def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
 
 
 def test_gains_are_whole_steps_of_the_controller_s_objects(tuned):
-    exported = export_objects(tuned.design)
-    gains = {g.object: g for g in tuned.gains}
+    exported, gains = export_objects(tuned.design), {g.object: g for g in tuned.gains}
     written = {item.label: item.value for item in exported.objects.values}
-    for label, gain in gains.items():
-        assert written[label] == gain.steps
+    assert {label: written[label] for label in gains} == {label: g.steps for label, g in gains.items()}
     assert not {r.label for r in exported.rounded} & set(gains)
     assert 1 <= gains["0x2348.01"].steps <= 250
     assert gains["0x2342.02"].steps >= 150

@@ -1,0 +1,19 @@
+"""What is refused: in one line that can be printed."""
+
+from collections.abc import Callable
+
+import pytest
+
+from actuator_lti.errors import InputError
+
+
+def refused(call: Callable[..., object], *arguments: object, words: tuple[str, ...] = ()) -> str:
+    """What is said of it, these words among it."""
+    with pytest.raises(InputError) as caught:
+        call(*arguments)
+    line = str(caught.value)
+    assert line.isprintable()
+    assert len(line) < 400
+    for word in words:
+        assert word in line
+    return line
