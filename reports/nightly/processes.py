@@ -81,6 +81,10 @@ class Apart:
         self._running: set[subprocess.Popen[bytes]] = set()
         self._closed = False
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Carried to a worker, or on from one to the next, without what runs there."""
+        return Apart, (self._limits,)
+
     def build(self, task: Task) -> Answer:
         late, start, limit_s = Event(), time.monotonic(), self._limits.time_limit_s * task.limits
 
