@@ -1,6 +1,7 @@
-"""Jobs of a night, each in a process of its own; how many at once says `analyses.studies.engine`.
+"""Jobs of a night, each in a process that can be ended; how many at once says `analyses.studies.engine`.
 
-Such a process is ended when it takes too long or too much memory, and a job that kills it takes nobody along.
+A process of its own can be ended when it takes too long or too much memory, and a job that kills it takes
+nobody along. Here a process a thread stays warm from job to job, on a Dask cluster each job has a fresh one.
 Its result comes home as an entry of the cache; a lost Dask worker's jobs are done again elsewhere.
 """
 
@@ -16,9 +17,11 @@ import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing, suppress
+from functools import partial
 from pkgutil import resolve_name
-from threading import Event, Thread, Timer
-from typing import Any, BinaryIO, NamedTuple
+from queue import SimpleQueue
+from threading import Lock, Thread, Timer, get_ident
+from typing import Any, NamedTuple
 
 from actuator_lti.errors import InputError
 from analyses.studies.engine import Engine
@@ -26,9 +29,11 @@ from reports.arithmetic import ONE_THREAD  # the jobs themselves are what runs i
 from reports.nightly.cache import sealed
 from reports.nightly.text import one_line
 
-START_LIMIT_S = 180.0  # beside the limit of the job, whose clock is the process's own
+START_LIMIT_S = 180.0
 END_S = 10.0
-ALARM = getattr(signal, "SIGALRM", 0)
+# A process that hangs in compiled code without its parent is ended by the system this long after its limit.
+GRACE_S = 15
+READY = b"ready"
 _CHILD = "import sys; from reports.nightly.processes import main; main(sys.argv[1], int(sys.argv[2]))"
 
 
@@ -66,93 +71,140 @@ def build_each(
     Without an engine they are built in this process: with no limit, and in the order of the tasks.
     """
     if engine is None:
+        function = resolve_name(limits.build)
         for task in tasks:
-            sink(task, execute(limits.build, task.key, task.payload))
+            start = time.monotonic()
+            answer = execute(function, task.key, task.payload)
+            sink(task, answer._replace(seconds=time.monotonic() - start))
+    elif engine.distributed:
+        engine.map(partial(build_apart, limits), tasks, sink)
     else:
-        with closing(Apart(limits)) as apart:
-            engine.map(apart.build, tasks, sink)
+        with closing(Warm(limits)) as warm:
+            engine.map(warm.build, tasks, sink)
 
 
-class Apart:
-    """Builds each task in a process of its own, here or where Dask has carried it."""
+def build_apart(limits: Limits, task: Task) -> Answer:
+    with closing(_Child(limits)) as child:
+        return child.build(task)
+
+
+# ---- the side of the night -----------------------------------------------------------------------------
+
+
+class Warm:
+    """Processes that go from task to task: one for each thread that asks."""
 
     def __init__(self, limits: Limits) -> None:
         self._limits = limits
-        self._running: set[subprocess.Popen[bytes]] = set()
+        self._lock = Lock()
+        self._children: dict[int, _Child] = {}
         self._closed = False
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Carried to a worker, or on from one to the next, without what runs there."""
-        return Apart, (self._limits,)
-
     def build(self, task: Task) -> Answer:
-        late, start, limit_s = Event(), time.monotonic(), self._limits.time_limit_s * task.limits
-
-        def too_late() -> None:
-            late.set()
-            process.kill()
-
-        with tempfile.TemporaryFile() as said:
-            process = self._started(said)
-            clock = Timer(START_LIMIT_S + limit_s, too_late)
-            clock.daemon = True
-            clock.start()
-            try:
-                _say(process.stdin, (task.key, dict(task.payload), limit_s))
-                answer: Answer = pickle.load(process.stdout)  # type: ignore[arg-type]
-                return answer
-            except (EOFError, OSError, pickle.UnpicklingError, ValueError):
-                with suppress(subprocess.TimeoutExpired):
-                    process.wait(END_S)  # it ends by itself, and its status says why
-                end = _end(process, said, late.is_set(), limit_s)
-                return end._replace(seconds=time.monotonic() - start)
-            finally:
-                clock.cancel()
-                self._ended(process)
-
-    def _started(self, said: BinaryIO) -> subprocess.Popen[bytes]:
-        process = subprocess.Popen(
-            [sys.executable, "-P", "-c", _CHILD, self._limits.build, str(self._limits.memory_bytes)],
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said,
-            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
-        )  # fmt: skip
-        self._running.add(process)
-        if self._closed:
-            process.kill()
-        return process
-
-    def _ended(self, process: subprocess.Popen[bytes]) -> None:
-        process.kill()
-        process.wait()
-        self._running.discard(process)
-        for stream in filter(None, (process.stdin, process.stdout)):
-            with suppress(OSError):  # a question that nobody has read
-                stream.close()
+        """Build a task in the process of this thread, in a new one where that has ended."""
+        with self._lock:
+            if self._closed:
+                raise RuntimeError("no task after the end")
+            child = self._children.get(get_ident())
+            if child is None or not child.alive:
+                if child is not None:
+                    child.close()
+                child = self._children[get_ident()] = _Child(self._limits)
+        return child.build(task)
 
     def close(self) -> None:
-        """End all processes; a thread that awaits an answer then has the end of its process."""
-        self._closed = True
-        for process in list(self._running):
-            process.kill()
-            process.wait()
+        """End all processes, also one whose answer is awaited: its thread then has its end."""
+        with self._lock:
+            self._closed = True
+            for child in self._children.values():
+                child.close()
 
 
-def _end(process: subprocess.Popen[bytes], said: BinaryIO, late: bool, limit_s: float) -> Answer:
-    """How a process ended that gave no answer, with its last words."""
-    code = process.poll()
-    if late or code == -ALARM:
-        return Answer("timeout", f"did not end within {limit_s:g} s")
-    size = said.seek(0, os.SEEK_END)
-    said.seek(max(0, size - 2000))
-    how = "does not end" if code is None else f"signal {-code}" if code < 0 else f"status {code}"
-    return Answer("crash", f"its process ended ({how})", said.read().decode("latin-1"))
+class _Child:
+    """A process that builds one task after the other, seen from its parent."""
+
+    def __init__(self, limits: Limits) -> None:
+        self._limits = limits
+        self._said = tempfile.TemporaryFile()  # noqa: SIM115 - closed with the process
+        self._late = self._ready = False
+        self._asked = Lock()
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", _CHILD, limits.build, str(limits.memory_bytes)],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._said,
+            env={**os.environ, **ONE_THREAD, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+        )  # fmt: skip
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can take another task."""
+        return not self._late and self._process.poll() is None
+
+    def build(self, task: Task) -> Answer:
+        """Build a task within its time; where that fails the process is at its end."""
+        with self._asked:
+            if not self._ready:
+                self._ready = self._answer(START_LIMIT_S) == READY
+                if not self._ready:
+                    why = f"the worker process could not start: {self._end(START_LIMIT_S)}"
+                    return Answer("crash", why, self._last_words(0))
+            said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
+            limit_s = self._limits.time_limit_s * task.limits
+            answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
+            if answer is None:
+                last = "" if self._late else self._last_words(said)
+                answer = Answer("timeout" if self._late else "crash", self._end(limit_s), last)
+            return answer._replace(seconds=time.monotonic() - start)
+
+    def _answer(self, limit_s: float, question: Any = None) -> Any:
+        """What the process says within the limit; None where it ends instead."""
+        clock = Timer(limit_s, self._too_late)
+        clock.daemon = True
+        clock.start()
+        try:
+            if question is not None:
+                _say(self._process.stdin, question)
+            return pickle.load(self._process.stdout)  # type: ignore[arg-type]
+        except (EOFError, OSError, pickle.UnpicklingError, ValueError):
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(END_S)  # it ends by itself, and its status says why
+            self._process.kill()
+            self._process.wait()
+            return None
+        finally:
+            clock.cancel()
+            clock.join()  # from here on it ends nobody
+
+    def _too_late(self) -> None:
+        self._late = True
+        self._process.kill()
+
+    def _end(self, limit_s: float) -> str:
+        if self._late:
+            return f"did not end within {limit_s:g} s"
+        code = self._process.returncode
+        return f"its process ended ({f'signal {-code}' if code < 0 else f'status {code}'})"
+
+    def _last_words(self, since: int) -> str:
+        size = self._said.seek(0, os.SEEK_END)
+        self._said.seek(max(since, size - 2000))
+        return self._said.read().decode("latin-1")
+
+    def close(self) -> None:
+        """End the process, whatever it does; then whoever waits for its answer has none, and its pipes go."""
+        self._process.kill()
+        with self._asked:
+            self._process.wait()
+            for stream in (self._process.stdin, self._process.stdout, self._said):
+                if stream is not None:
+                    with suppress(OSError):  # a question that nobody has read
+                        stream.close()
 
 
 # ---- the side of the process ---------------------------------------------------------------------------
 
 
 def main(build: str, memory_bytes: int) -> None:
-    """Read ``(key, payload, limit)`` from standard input, build within it, answer on standard output."""
+    """Read ``(key, payload, limit)`` from standard input, build, answer on standard output; never returns."""
     if sys.platform == "linux":  # the system ends this process with its parent, in whatever build it is
         import ctypes
 
@@ -161,30 +213,32 @@ def main(build: str, memory_bytes: int) -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a build prints is no answer
     _limit_memory(memory_bytes)
-    resolve_name(build)
-    key, payload, limit_s = pickle.load(sys.stdin.buffer)
-    Thread(target=_end_with_parent, daemon=True).start()
-    if ALARM:
-        signal.signal(ALARM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, limit_s)
-    _say(answers, execute(build, key, payload))
+    questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
+    source = os.fdopen(os.dup(0), "rb")
+
+    def listen() -> None:
+        """Hand on what is asked; the end of the pipe is that of the parent."""
+        try:
+            while True:
+                questions.put(pickle.load(source))
+        except EOFError:
+            os._exit(0)
+
+    Thread(target=listen, daemon=True).start()
+    function = resolve_name(build)
+    _say(answers, READY)
+    while True:
+        key, payload, time_limit_s = questions.get()
+        _alarm(time_limit_s + GRACE_S)
+        _say(answers, execute(function, key, payload))
+        _alarm(0)
 
 
-def _end_with_parent() -> None:
-    os.read(0, 1)  # nothing more is asked: the end of the pipe is that of the parent
-    os._exit(0)
-
-
-def execute(build: str, key: str, payload: Mapping[str, Any]) -> Answer:
-    """Build one report; its entry, or what went wrong and where, and how long it took.
+def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
+    """Build one report; its entry, or what went wrong and where.
 
     Any error of the build belongs to its design and is reported as such.
     """
-    function, start = resolve_name(build), time.monotonic()
-    return _executed(function, key, payload)._replace(seconds=time.monotonic() - start)
-
-
-def _executed(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
     try:
         meta, files = function(dict(payload))
     except InputError as error:
@@ -203,6 +257,12 @@ def _executed(function: Callable[..., Any], key: str, payload: Mapping[str, Any]
 def _say(pipe: Any, what: Any) -> None:
     pickle.dump(what, pipe)
     pipe.flush()
+
+
+def _alarm(seconds: float) -> None:
+    if hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, signal.SIG_DFL)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _limit_memory(limit_bytes: int) -> None:

@@ -16,6 +16,7 @@ from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study
 from site_checks import check_whole
 
 from analyses.studies.engine import Engine
+from reports.nightly.cache import Cache
 from reports.nightly.night import run_night
 from reports.nightly.processes import Answer, Limits, Task, build_each
 
@@ -81,11 +82,36 @@ def ends_of(build: str, tasks: list[Task]) -> dict[str, Answer]:
 def test_a_build_that_cannot_be_imported_fails_every_task_and_ends() -> None:
     ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)])
     assert [d.status for d in ends.values()] == ["crash"] * 3
-    assert all("status 1" in d.message and "no_such_module" in d.detail for d in ends.values())
+    assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends.values())
 
 
 def test_nothing_to_do_starts_no_process() -> None:
     assert ends_of("no_such_module:build", []) == {}
+
+
+def test_a_process_goes_from_job_to_job(tmp_path) -> None:
+    tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode="pid").payload) for k in range(6)]
+    ends = ends_of(BUILD, tasks)
+    assert {answer.status for answer in ends.values()} == {"done"}
+    pids = {Cache(tmp_path).take(key, answer.entry).meta["pid"] for key, answer in ends.items()}
+    assert 1 <= len(pids) <= 2
+
+
+def test_a_process_that_died_while_it_waited_is_replaced() -> None:
+    """By the system, short of memory, say: the next job does not pay for it."""
+    from reports.nightly.processes import Warm
+
+    warm = Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))
+    try:
+        first = warm.build(Task(key="0" * 64, payload=job("a", mode="pid").payload))
+        (waiting,) = warm._children.values()
+        waiting._process.kill()
+        waiting._process.wait()
+        second = warm.build(Task(key="1" * 64, payload=job("b", mode="pid").payload))
+    finally:
+        warm.close()
+    assert (first.status, second.status) == ("done", "done")
+    assert workers_left() == []
 
 
 def test_an_interrupted_night_ends_the_jobs_under_way() -> None:
