@@ -15,9 +15,10 @@ import tomllib
 import unicodedata
 from collections import Counter
 from difflib import get_close_matches
+from io import BufferedReader
 from os import PathLike
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 from actuator_lti.bounds import (
     CAMPAIGN_BYTES,
@@ -73,7 +74,7 @@ def as_path(path: str | PathLike[str]) -> Path:
     return Path(os.fspath(path))
 
 
-def open_regular(path: str | PathLike[str], what: str = "file") -> BinaryIO:
+def open_regular(path: str | PathLike[str], what: str = "file") -> BufferedReader:
     """Open a regular file for reading; a directory, a device or a pipe is refused without waiting for it.
 
     Raises
