@@ -57,6 +57,7 @@ def _samples(figures: LoopFigures) -> float | None:
 
 
 HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
+DOUBTS = {"not stable": False, "stability not known": None}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
     doc.of(lambda figures: EVIDENCE[figures.margins.evidence], "evidence", "Margins are"),
@@ -152,7 +153,7 @@ def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
-    for words, sound in (("not stable", False), ("stability not known", None)):
+    for words, sound in DOUBTS.items():
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
     held = [
@@ -165,12 +166,13 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
 
 def _elsewhere(result: Margins) -> str:
     """Name the operating points at which a loop that is stable as asked for is not."""
-    places: dict[str, list[str]] = {}
+    places: dict[tuple[str, str], list[str]] = {}
     for point in result.operating_points:
         for name, one in point.figures.items():
-            if one.sound is False and name in result.loops and result.loops[name].sound:
-                places.setdefault(point.place or "sliding", []).append(LOOPS[name])
-    return "".join(f"; not stable {place}: {', '.join(names)}" for place, names in places.items())
+            if not one.sound and name in result.loops and result.loops[name].sound:
+                words = next(words for words, sound in DOUBTS.items() if one.sound is sound)
+                places.setdefault((words, point.place or "sliding"), []).append(LOOPS[name])
+    return "".join(f"; {' '.join(said)}: {', '.join(names)}" for said, names in places.items())
 
 
 def _cogging(result: Margins) -> str:
@@ -287,8 +289,10 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
         name, own = figures.loop.name, ranges.get(figures.loop.name, {})
         row: doc.Row = {"loop": next(iter(with_held({label: figures})))}
         row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
-        doubts = [p.place or "sliding" for p in seen if name in p.figures and not p.figures[name].sound]
-        row |= {"gain": f"not stable {'; '.join(doubts)}"} if doubts else {}
+        known = [(p.place or "sliding", p.figures[name].sound) for p in seen if name in p.figures]
+        doubts = {words: [place for place, each in known if each is sound] for words, sound in DOUBTS.items()}
+        said = [f"{words} {'; '.join(where)}" for words, where in doubts.items() if where]
+        row |= {"gain": "; ".join(said)} if said else {}
         rows += [row] if len(row) > 1 else []
     gains = [own["gain_margin"] for own in ranges.values() if "gain_margin" in own]
     note = f"Operating points: {places}."

@@ -57,6 +57,17 @@ def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
     assert DOWNWARDS not in margin_table(points[0].figures)["note"]
 
 
+def test_a_loop_that_is_not_known_to_be_stable_somewhere_is_not_called_unstable_there() -> None:
+    points = operating_points(load_design("ilr33-amber"), [], described=False, certify=False)
+    name = next(iter(points[-1].figures))
+    for point, stable in zip(points[:2], (False, None), strict=True):
+        figures = point.figures[name]
+        point.figures[name] = replace(figures, margins=replace(figures.margins, stable=stable))
+    row = spread_table(points, points[-1].figures)["rows"][0]
+    places = [point.place or "sliding" for point in points[:2]]
+    assert row["gain"] == f"not stable {places[0]}; stability not known {places[1]}"
+
+
 @pytest.mark.parametrize(("point", "other"), [("rest", True), ("sliding", False)])
 def test_requirements_beside_other_loops_say_on_which_they_are_judged(
     point: str, other: bool, capsys: pytest.CaptureFixture[str]
