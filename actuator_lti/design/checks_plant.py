@@ -192,8 +192,9 @@ def _locking(design: Design) -> Iterator[Refusal]:
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     drivable = 'or load.path = "back-drivable"'  # the default locks itself
     if design.gears_before_coupling < locks:
+        behind = ", ".join(f"{name}" for name in names[locks - 1 :])  # stops at one that could not be read
         allowed = (
-            f"lies before the self-locking stage; allowed: {', '.join(names[locks - 1 :])}, "
+            f"lies before the self-locking stage; allowed: {behind}, "
             f"load.locking_gear with a gear before the coupling, {drivable}"
         )
         yield "coupling.after", f'"{coupling.after or ""}"', allowed

@@ -118,6 +118,11 @@ def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() 
     assert told == sorted(told, key=lambda line: int(line.split(":")[1].split()[1]))
 
 
+def test_a_gear_without_a_name_hides_whether_it_locks_behind_the_coupling() -> None:
+    told = _told_lines(design_text("ilr33-amber-compliant") + "[[gear]]\nratio = 2\n")
+    assert ["gear[3].name: missing" in line for line in told] == [True]
+
+
 KE, KM = 'back_emf_constant = { value = "5.9 mV*s/rad"', 'torque_constant = { value = "5.9 mN*m/A"'
 
 
