@@ -47,14 +47,17 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
 
 
 def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path, identify
+    right: Columns, tmp_path, identify, cli
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
     for accepted in ((), ("--accept",)):
         assert identify(noisy, "ilr33-amber", "--cutoff", "400", *accepted).status == 1
         assert bool(list((tmp_path / "o").glob("*.toml"))) == bool(accepted)
-    assert "accepted, a check failed" in (tmp_path / "o" / "identification.html").read_text()
+    words = "accepted, a check failed"
+    assert words in (tmp_path / "o" / "identification.html").read_text()
+    asked = ("--design", "ilr33-amber", "--cutoff", "400", "--accept", "--out", tmp_path / "o")
+    assert words in " ".join(cli.text("identify", tmp_path / "r.csv", *asked, status=1).split())
 
 
 def test_every_column_is_accounted_for(right: Columns, identify) -> None:
