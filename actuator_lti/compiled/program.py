@@ -28,7 +28,7 @@ _MINMAX = {
 
 # a form of a loop, once for processors with AVX2 and once for all others; the arithmetic is the same
 _CLONES = """\
-#if defined(__GLIBC__) && defined(__x86_64__) && !defined(__clang__)
+#if defined(__GLIBC__) && !defined(__UCLIBC__) && defined(__x86_64__) && !defined(__clang__)
 #define @clones __attribute__((target_clones("avx2", "default")))
 #else
 #define @clones

@@ -65,11 +65,11 @@ def check_motor(design: Design) -> Iterator[Refusal]:
             yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
     kM, kE = _constants(design)
     if kM is not None and kE is not None and _apart(kM, kE):
-        wanted = given["back_emf_constant"] * kM / kE
+        wanted, ratio = given["back_emf_constant"] * kM / kE, _ratio(motor, kE / kM)
         allowed = (
             f"allowed: within 10 % of {wanted:g}{_as_written(design, 'back_emf_constant', kM / kE)}, as "
             f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
-            f"constant){_ratio(given['torque_constant'] / given['back_emf_constant'], kE / kM)}"
+            f"constant){ratio}"
         )
         yield "motor.back_emf_constant", _stated(design, "back_emf_constant"), allowed
 
@@ -84,9 +84,10 @@ def _apart(kM: Any, kE: Any) -> Any:
     return abs(kE - kM) > 0.1 * kM * (1 + 1e-12)
 
 
-def _ratio(stated: Any, off: Any) -> str:
-    """What would explain the ratio of kM to kE, as stated and of the model's."""
-    near = {words: abs(log(stated / ratio)) for words, ratio in _SHEETS.items()}
+def _ratio(motor: Any, off: Any) -> str:
+    """What would explain the ratio of kM to kE: a convention that is not the stated one, or a factor."""
+    stated = motor.torque_constant_Nm_A / motor.back_emf_constant_Vs_rad
+    near = {words: abs(log(stated / ratio)) for words, ratio in _SHEETS.items() if words != motor.constants}
     words = min(near, key=near.__getitem__)
     if near[words] < 0.04:
         closed = words if '"' in words else f'{words}"'

@@ -106,6 +106,7 @@ def amplitude_map(
     design: Design,
     loops: Loops,
     *,
+    load_Nm: float = 0.0,
     friction_on: bool = True,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
 ) -> AmplitudeMap:
@@ -118,7 +119,7 @@ def amplitude_map(
     given, counts = counts, (max(int(part * counts[0]), 2), max(int(part * counts[1]), 2))
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
-    threshold = static_threshold(design).smallest_rad if friction_on else None
+    threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
     levels = amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
     border, slow = onset(loops, omega), slow_protection(design, loops)
@@ -126,18 +127,20 @@ def amplitude_map(
     amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])
     result = run_tones(
-        design, frequencies, which, amplitude, start, begin, friction_on=friction_on, insist=True
-    )
+        design, frequencies, which, amplitude, start, begin,
+        load_Nm=load_Nm, friction_on=friction_on, insist=True,
+    )  # fmt: skip
     cause = causes(result, linear, amplitude, friction_on)
     off = np.flatnonzero(cause == CAUSES.index("friction"))
     if len(off):  # the same runs without dry friction: is it that?
         free = run_tones(
-            design, frequencies, which[off], amplitude[off], start, begin[off], friction_on=False
-        )
+            design, frequencies, which[off], amplitude[off], start, begin[off],
+            load_Nm=load_Nm, friction_on=False,
+        )  # fmt: skip
         cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
-        load_Nm=0.0,
+        load_Nm=load_Nm,
         amplitude_rad=levels,
         frequency_hz=omega / (2.0 * np.pi),
         cause=cause.reshape(shape),

@@ -234,6 +234,7 @@ def run_tones(
     start: LinearSteadyState,
     start_amplitude_rad: np.ndarray,
     *,
+    load_Nm: float = 0.0,
     friction_on: bool = True,
     harmonics: int = HARMONICS,
     insist: bool = False,
@@ -250,7 +251,7 @@ def run_tones(
     for place, values in start.states.items() if start.stable else ():
         rows[place] = start_amplitude_rad * values.imag[which]
     triangle_start(design, rows, amplitude_rad, amplitude_rad > BEYOND * start_amplitude_rad)
-    rows["tanh_tolerance"] = TANH_TOLERANCE
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
     rows["ticks"] = start.settling_ticks + 2 * windows
     if not insist:
         return rows.run()

@@ -164,6 +164,7 @@ class Running:
         history, flags, out = self.history()
         before, steps = self.s[at.S_EVENTS], self.s[at.S_STEPS]
         status = resume(p, self.s, self.tables, history, flags, out, np.zeros(2))
+        history[:, (int(out[at.OUT_TICKS]) + every - 1) // every :] = np.nan
         self.s[at.S_TICK] = 0.0
         self.work += ticks + int(self.s[at.S_STEPS] - steps)
         return Piece(history, flags, int(self.s[at.S_EVENTS] - before), STATUS[status])

@@ -19,7 +19,7 @@ from analyses.validation import validate
 from analyses.validation.settings import QUICK
 from nonlinear import commands, simulate
 from nonlinear.settling.rest import judge
-from reports.sections import cycles, validation
+from reports.sections import cycles
 from reports.sections.names import fine_unit
 from tests.validation.random_drives import stable_drives
 
@@ -53,7 +53,7 @@ def contradictions(design: Design) -> Iterator[str]:
         yield from simulated(design, failures(design, asked).before)
     except InputError as error:
         yield f"failures: {error}"
-    swing, said = waited.hunting, [cycles.summary(waited), validation.result(checked)]
+    swing, said = waited.hunting, [cycles.summary(waited), checked.words]
     wanted = ["", ""]
     if swing is not None:
         wanted = [words(swing.rest, *fine_unit(design.axis)), ending_of(design, swing)]
