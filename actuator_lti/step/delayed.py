@@ -21,7 +21,7 @@ from actuator_lti.systems.delay_stepper import step_of
 from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to step at first
-_MEET = 1e-8
+_MEET = 1e-5
 _POINTS = 32
 _PARTS = np.linspace(0.0, 1.0, 5)  # of a step, at which the response is kept
 _SERIES = np.linalg.inv(np.vander(_PARTS))  # from its values there to the quartic through them
@@ -63,7 +63,7 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
 
     The first delays are stepped; after them the response is the free motion of the exact poles, which the
     collocation of the delays starts and integrals of T about them sharpen. The two have to agree
-    where they meet, to 1e-8 of the final value; otherwise stepping goes on.
+    where they meet, to 1e-5 of the final value; otherwise stepping goes on.
     """
     form = delay_form(system)
     form = replace(form, whole=balanced(form.whole))

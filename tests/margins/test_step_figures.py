@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import brentq, newton
 
 from actuator_lti.errors import InputError
 from actuator_lti.step import step_figures
@@ -43,6 +44,25 @@ def test_integrator_with_delay_by_the_method_of_steps(KT: float) -> None:
     assert f.rise_time_s == pytest.approx(t[np.argmax(y > 0.9)] - t[np.argmax(y > 0.1)], rel=2e-4)
     if KT < 1:
         assert f.settling_time_s == pytest.approx(t[np.flatnonzero(np.abs(y - 1) > 0.02)[-1]], rel=1e-3)
+
+
+def test_a_hardly_damped_loop_of_two_delays_without_a_common_measure() -> None:
+    """0.01 % below its border: what rings is one pole of T, by Newton and the residue of its closed form."""
+    inner, outer, integrator = 1e-3 * math.sqrt(2.0), 1e-3 * math.e, DelaySystem.from_system(1 / s)
+    loop = (300 * integrator * DelaySystem.delay(inner)).feedback() * DelaySystem.delay(outer) * integrator
+
+    def open_loop(x: complex) -> complex:
+        late = 300.0 * np.exp(-inner * x)
+        return late / (x + late) * np.exp(-outer * x) / x
+
+    border = brentq(lambda w: np.angle(-open_loop(1j * w)), 100.0, 300.0, xtol=1e-13)
+    k = 0.9999 / abs(open_loop(1j * border))
+    pole = newton(lambda x: 1.0 + k * open_loop(x), 1j * border, tol=1e-13)
+    circle = 1e-2 * np.exp(2j * np.pi * np.arange(64) / 64)
+    weight = np.mean(circle / ((1.0 + 1.0 / (k * open_loop(pole + circle))) * (pole + circle)))
+    envelope = np.log(2.0 * abs(weight) / 0.02) / -pole.real
+    settling = step_figures((k * loop).feedback()).settling_time_s
+    assert envelope - np.pi / pole.imag <= settling <= envelope
 
 
 def test_small_delays_approach_the_loop_without() -> None:
