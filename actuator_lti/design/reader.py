@@ -62,7 +62,7 @@ def _torque(design: model.Design) -> Any:
 
 
 GAINS: dict[str, dict[str, Per]] = {
-    "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H},
+    "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H or UNREAD},
     "control.velocity.gain": {
         "rad/s": lambda design: design.inertia_kgm2 / _torque(design),
         "{torque}*s/{angle}": lambda design: 1.0 / _torque(design),
@@ -329,7 +329,7 @@ class Reader:
             if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
                 line = field.section == "motor" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
-        raise refused[-1 if field.section in ("load", "command") else 0]
+        raise refused[-1 if field.section in ("load", "command", "validation") else 0]
 
     def _said(self, text: Any, field: Field, value: float) -> float:
         """The value, unless an AC motor has several amperes that the text may mean."""
