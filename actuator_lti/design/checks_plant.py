@@ -115,7 +115,8 @@ def with_stand_ins(design: Design) -> Design:
         if kM is UNREAD or not _apart(*_constants(way)):
             return way
     usual = kM / _TORQUE_OVER_VOLTAGE[motor.constants][0]
-    return replace(design, motor=replace(motor, back_emf_constant_Vs_rad=usual))
+    least = usual if kE is UNREAD else min(kE, usual)  # kM may be the wrong one: no speed is refused for it
+    return replace(design, motor=replace(motor, back_emf_constant_Vs_rad=least))
 
 
 def _stated(design: Design, key: str) -> str:
