@@ -315,9 +315,9 @@ def plot_map(
     from matplotlib.patches import Patch
 
     factor = 1e3 if linear_axis else np.degrees(1.0)
-    present, places = np.unique(kind, return_inverse=True)
+    present = [k for k in range(len(names)) if np.any(kind == k)]
     shades = {k: COLOURS[k % len(COLOURS)] if names[k] != "none" else "#ffffff" for k in present}
-    colours, codes = ListedColormap(list(shades.values())), places.reshape(kind.shape)
+    colours, codes = ListedColormap(list(shades.values())), np.searchsorted(present, kind)
     look: Any = {"vmin": -0.5, "vmax": len(present) - 0.5, "alpha": 0.45, "shading": "nearest"}
     panel.pcolormesh(frequency_hz, factor * amplitude_rad, codes, cmap=colours, **look)
     for amplitude in (onset_rad or {}).values():
