@@ -515,12 +515,16 @@ def _time_said(word: str, table: Tree, key: str) -> str:
     if not word.startswith(("integral_time =", "derivative_time =")):
         return ""
     named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
-    gain, own = (_CONVENTION.sub("", f"{table.get(one)}") for one in (named, key))
+    texts = [f"{table.get(one)}" for one in (named, key)]
+    if _CONVENTION.findall(texts[0]) != _CONVENTION.findall(texts[1]):  # amperes of two kinds
+        return ""
+    gain, own = (_CONVENTION.sub("", text) for text in texts)
     quotients = [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]
     for quotient in quotients:
         with suppress(ValueError, ZeroDivisionError):
             (a, of), (b, per) = map(split_quantity, quotient)
-            return f"; here {parse_quantity(f'{a / b!r} ({of or 1})/({per})', 's/rad'):.4g} s"
+            time_s = parse_quantity(f"{a / b!r} ({of or 1})/({per})", "s/rad")
+            return f"; here {time_s:.4g} s" if time_s > 0.0 else ""
     return ""
 
 
