@@ -90,10 +90,10 @@ class _Gain:
 
     def crossings(self, level: float) -> list[float]:
         """Where the gain passes a level, rad/s, up to the first zero of the mean; at least one."""
-        w = self.factors.passages(0.0, self._top(self.mean.first_zero_rad_s), math.log(level))
-        between = 0.5 * (w[1:] + w[:-1])
-        low, high = np.maximum(0.5 * w, [0.0, *between]), np.minimum(2.0 * w, [*between, np.inf])
-        pairs = zip(low, high, strict=True)
+        top = self._top(self.mean.first_zero_rad_s)
+        w = self.factors.passages(0.0, top, math.log(level))
+        edges = np.array([0.0, *(0.5 * (w[1:] + w[:-1])), top])  # one passage between two of them
+        pairs = zip(np.maximum(0.5 * w, edges[:-1]), np.minimum(2.0 * w, edges[1:]), strict=True)
         found = [brentq(lambda w: self.at(w) - level, *pair, xtol=1e-300, rtol=1e-14) for pair in pairs]
         return [self.loop.frequency(each) for each in found]
 

@@ -2,6 +2,7 @@
 
 from contextlib import nullcontext
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuator_lti import assemble_loops, load_design, stability_margins
-from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.design import design_hash, read_design_text, with_overrides, write_design
+from actuator_lti.bandwidth import Bandwidth, closed_loop_bandwidth
+from actuator_lti.design import design_hash, read_design_text, with_overrides, with_values, write_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.profile import CommandMean, command_mean
 from actuator_lti.errors import InputError
@@ -113,18 +114,40 @@ def test_the_profile_acts_from_its_closed_form_on(screw: Design, hz: float) -> N
         assert bool(((run.limit_flags & 128) != 0).any()) is acts
 
 
-@settings(max_examples=12)
-@given(samples=st.integers(2, 900))
-def test_the_bandwidth_behind_a_mean_is_that_of_a_dense_grid(samples: int) -> None:
-    response = assemble_loops(load_design("ilr33-amber")).plain_response
-    mean = CommandMean(samples, response.dt)
-    band = commanded_bandwidth(response, mean)
-    omega = np.linspace(0.0, 2.0 * np.pi / (samples * mean.period_s), 20_001)[1:-1]
+def behind_a_mean(response: Any, samples: int) -> tuple[np.ndarray, np.ndarray, Bandwidth]:
+    """A response behind the mean of the last samples on a dense grid up to its first zero, and its bandwidth.
+
+    The bandwidth is that of the grid, too.
+    """
+    band = commanded_bandwidth(response, CommandMean(samples, response.dt))
+    omega = np.linspace(0.0, 2.0 * np.pi / (samples * response.dt), 20_001)[1:-1]
     omega = omega[omega < np.pi / response.dt]
     z = np.exp(-1j * omega * response.dt)
     total = response_at(response, omega) * (1.0 - z**samples) / (1.0 - z) / samples
     below = int(np.argmax(np.abs(total) < np.sqrt(0.5)))
     assert omega[below - 1] * (1 - 1e-9) <= band.minus3db_rad_s <= omega[below] * (1 + 1e-9)
+    return omega, total, band
+
+
+@pytest.mark.parametrize("gain", [2000.0, 2300.0, 2500.0])
+@pytest.mark.parametrize("behind", [0.9, 1.02, 1.15, 1.4, 2.0])
+def test_a_resonance_beside_the_first_zero_of_the_mean_hides_no_crossing(gain: float, behind: float) -> None:
+    design = with_values(load_design("ilr33-amber"), {"control.position.gain": gain})
+    response = assemble_loops(design).plain_response
+    omega = np.linspace(0.0, np.pi / response.dt, 100_001)[1:-1]
+    resonance = omega[np.abs(response_at(response, omega)).argmax()]
+    samples = round(2.0 * np.pi * behind / (resonance * response.dt))
+    omega, total, band = behind_a_mean(response, samples)
+    passed = np.flatnonzero(np.diff(np.abs(total) < np.sqrt(0.5)))
+    assert len(band.crossings_rad_s) == len(passed)
+    assert ((omega[passed] <= band.crossings_rad_s) & (band.crossings_rad_s <= omega[passed + 1])).all()
+
+
+@settings(max_examples=12)
+@given(samples=st.integers(2, 900))
+def test_the_bandwidth_behind_a_mean_is_that_of_a_dense_grid(samples: int) -> None:
+    response = assemble_loops(load_design("ilr33-amber")).plain_response
+    omega, total, band = behind_a_mean(response, samples)
     turned = int(np.argmax(np.unwrap(np.angle(total)) < -0.5 * np.pi))
     assert omega[turned - 1] * (1 - 1e-9) <= band.minus90deg_rad_s <= omega[turned] * (1 + 1e-9)
     assert band.resonance_peak_db == pytest.approx(max(20.0 * np.log10(np.abs(total)).max(), 0.0), abs=1e-5)
