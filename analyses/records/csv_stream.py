@@ -41,30 +41,32 @@ def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = MAX_R
     line, the column and the reason.
     """
     counts, rows = RowCounts(), BoundedRows(columns=1 + len(spec.signals), limit=max_rows)
-    for chunk in stream_csv(path, spec, counts):
+    digest = hashlib.sha256()
+    for chunk in stream_csv(path, spec, counts, digest):
         rows.add(chunk)
-    with open_regular(path, "CSV file") as stream:
-        digest = hashlib.file_digest(stream, "sha256").hexdigest()
-    return record_of_rows(rows.array(), spec, Path(path), counts, digest, rows.factor)
+    return record_of_rows(rows.array(), spec, Path(path), counts, digest.hexdigest(), rows.factor)
 
 
-def stream_csv(path: str | Path, spec: RecordSpec, counts: RowCounts | None = None) -> Iterator[FloatArray]:
+def stream_csv(
+    path: str | Path, spec: RecordSpec, counts: RowCounts | None = None, digest: hashlib._Hash | None = None
+) -> Iterator[FloatArray]:
     """Yield blocks of rows, shape (n, 1 + signals): time in s, then each signal in SI.
 
-    Memory does not depend on the length of the file. ``counts`` is filled in on the way.
+    Memory does not depend on the length of the file. ``counts`` is filled in on the way, ``digest`` fed with
+    the bytes that are read.
     """
     counts = RowCounts() if counts is None else counts
     in_si = SiRows(spec, counts, str(path))
-    for block in _blocks(Path(path), spec, counts):
+    for block in _blocks(Path(path), spec, counts, digest or hashlib.sha256()):
         rows = in_si(block)
         if len(rows):
             yield rows
 
 
-def _blocks(path: Path, spec: RecordSpec, counts: RowCounts) -> Iterator[Block]:
+def _blocks(path: Path, spec: RecordSpec, counts: RowCounts, digest: hashlib._Hash) -> Iterator[Block]:
     layout, origin, header = spec.format, str(path), tuple[str, ...]()
     with open_regular(path, "CSV file") as stream:
-        for data in _line_blocks(stream, origin):
+        for data in _line_blocks(stream, origin, digest):
             line = counts.lines + 1
             counts.lines += data.count(b"\n") + (not data.endswith(b"\n"))
             text = _clean(data, layout, counts)
@@ -84,9 +86,10 @@ def _blocks(path: Path, spec: RecordSpec, counts: RowCounts) -> Iterator[Block]:
             yield block
 
 
-def _line_blocks(stream: BinaryIO, origin: str) -> Iterator[bytes]:
+def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterator[bytes]:
     """Blocks that end at a line end; the last one may lack it."""
     rest, data = b"", stream.read(BLOCK_BYTES)
+    digest.update(data)
     if data[:2] in (b"\xff\xfe", b"\xfe\xff"):
         raise InputError("is UTF-16; save it as UTF-8", where=origin)
     data = data.removeprefix(b"\xef\xbb\xbf")
@@ -102,6 +105,7 @@ def _line_blocks(stream: BinaryIO, origin: str) -> Iterator[bytes]:
             yield rest + data[:cut]
         rest = data[cut:] if cut else rest + data
         data = stream.read(BLOCK_BYTES)
+        digest.update(data)
     if rest:
         yield rest
 

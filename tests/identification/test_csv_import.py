@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti.errors import InputError
 from analyses.records import csv_stream as module
-from analyses.records.csv_stream import read_csv_record, stream_csv
+from analyses.records.csv_stream import BoundedRows, read_csv_record, stream_csv
 from analyses.records.open_record import open_record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 
@@ -112,10 +112,18 @@ def test_a_long_file_streams_in_blocks_and_is_averaged(tmp_path, monkeypatch) ->
     assert "averaged over 16 rows" in record.notes[0]
 
 
-def test_the_checksum_is_that_of_the_file_also_behind_a_byte_order_mark(tmp_path) -> None:
-    path = tmp_path / "marked.csv"
+def test_the_checksum_is_that_of_what_was_read_with_a_byte_order_mark(tmp_path, monkeypatch) -> None:
+    path, rows = tmp_path / "marked.csv", BoundedRows.array
     path.write_bytes(b"\xef\xbb\xbft,n\n0,1\n1,2\n")
-    assert read_csv_record(path, _spec()).sha256 == hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+
+    def and_a_row_comes(self: BoundedRows) -> np.ndarray:
+        with path.open("ab") as file:
+            file.write(b"2,3\n")
+        return rows(self)
+
+    monkeypatch.setattr(BoundedRows, "array", and_a_row_comes)
+    assert read_csv_record(path, _spec()).sha256 == digest
 
 
 def test_careful_and_fast_reading_agree(tmp_path) -> None:
