@@ -158,7 +158,7 @@ def part_at(design: model.Design, path: str) -> Any:
     section = BY_PATH[path.rpartition(".")[0]]
     if not section.many:
         raise KeyError(path)
-    return dict(section.items(design)).get(path)
+    return next((item for one, item in section.items(design) if one == path), None)
 
 
 def with_part(design: model.Design, path: str, part: Any) -> model.Design:

@@ -284,7 +284,7 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         size = number * value.factor
         period = 2.0 * pi / size if size > 0.0 else 0.0
         return f"; {said.format(size=size, period=period)}" if period or "{period" not in said else ""
-    if "[count]" in dict(value.dimension):
+    if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
     if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
         return "; write rev or rad into it, whichever is meant"

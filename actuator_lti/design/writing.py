@@ -17,7 +17,7 @@ from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, d
 from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import field_of, fields_in
 from actuator_lti.design.loader import as_design, design_from_tree
-from actuator_lti.design.mistakes import Findings
+from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
@@ -180,7 +180,10 @@ def read_value(design: Design, path: str, text: str | float) -> float:
     with suppress(ValueError):
         text = with_units(design, {path: float(text)})[path]
     findings = Findings(design.origin or design.name)
-    value = Reader(design_tree(design), findings).number(field, text, path)
+    reader = Reader(design_tree(design), findings)
+    value = reader.entry(field, text, path, {})
+    if value is UNREAD:  # a gain that says what it does with the drive
+        value = getattr(located(reader.with_gains(design), path)[1], field.attribute)
     findings.refuse()
     return cast("float", value)
 

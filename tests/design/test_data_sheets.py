@@ -16,6 +16,7 @@ from actuator_lti.design import (
     write_design,
 )
 from actuator_lti.design.key_reference import explained
+from actuator_lti.design.writing import read_value
 from actuator_lti.drive.facts import capability, steady_torque_Nm
 from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops
@@ -497,6 +498,7 @@ def test_a_gain_may_be_stated_by_what_it_does(constants: str, over: float, to_dc
         kept = drive.parameters["control.velocity.gain"]
         assert drive.controller.velocity.gain == pytest.approx(gain, rel=1e-12) == kept.value
         assert kept.source == f"from {stated}; tuned"
+        assert read_value(drive, "control.velocity.gain", stated) == pytest.approx(gain, rel=1e-12)
         assert kept.tolerance.half_width == pytest.approx(0.1 * gain)
         assert drive.controller.current.gain_V_A == pytest.approx(1000 * pi * 0.082e-3 * coil, rel=1e-12)
         # in amperes from there on: the controller does not follow another load

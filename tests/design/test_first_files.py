@@ -202,6 +202,7 @@ def test_counts_are_no_angle_of_a_gain() -> None:
     """1.1e-4 A/(count/s) at 2^19 counts is 9.2 A s/rad, not 1.1e-4."""
     text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"\n'
     assert "one is 2 pi/counts_per_rev rad" in told(text)
+    assert "counts_per_rev" not in told(f'{DRIVE}[limits]\nvoltage = "3 counts"\n')
 
 
 @pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
