@@ -40,10 +40,8 @@ _FACTORS = {
     "9.549 V/krpm": 1e3 / 9.549296585513721,
 }
 """The usual factors between conventions of data sheets."""
-_SHEETS = {
-    "dc": 1.0,
-    "rms-line": 3**0.5,
-    "peak-phase": 1.5,
+_SHEETS: dict[str, float] = {
+    **{constants: ratio for constants, (ratio, _) in _TORQUE_OVER_VOLTAGE.items()},
     'rms-line", kM in A peak or kE in V peak': 1.5**0.5,
     'rms-line", kM in A peak and kE in V peak': 0.75**0.5,
 }

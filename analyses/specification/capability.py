@@ -151,15 +151,16 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     motor, limits = design.effective_motor, design.limits
     top = top_speed_rad_s if 0.0 < top_speed_rad_s < math.inf else 1.0
     speed = np.linspace(0.0, 1.25 * top, PLANE_POINTS)
-    bounds, levels = [], {"drive signal at its limit": stall_torque_Nm(design)}
-    if motor.source_gain_Nm_V is None:
+    bounds, levels = list[Curve](), dict[str, float]()
+    if motor.source_gain_Nm_V is not None:
+        levels["drive signal at its limit"] = stall_torque_Nm(design)
+    else:
         if math.isfinite(limits.voltage_V):
             line = np.linspace(0.0, no_load_speed(design), PLANE_POINTS)
             bounds.append(Curve("voltage limit", line, voltage_limit_torque_Nm(design, line)))
-        currents = {"peak current": limits.peak_current_A, "continuous current": limits.continuous_current_A}
-        levels = {name: motor_torque_Nm(design, current, math.nan) for name, current in currents.items()}
-        if design.controller.current is None:
-            del levels["peak current"]
+        if design.controller.current is not None:
+            levels["peak current"] = motor_torque_Nm(design, limits.peak_current_A, math.nan)
+        levels["continuous current"] = motor_torque_Nm(design, limits.continuous_current_A, math.nan)
     ends = speed[[0, -1]]
     bounds += [Curve(name, ends, np.full(2, level)) for name, level in levels.items() if math.isfinite(level)]
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):

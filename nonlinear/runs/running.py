@@ -164,7 +164,7 @@ class Running:
         history, flags, out = self.history()
         before, steps = self.s[at.S_EVENTS], self.s[at.S_STEPS]
         status = resume(p, self.s, self.tables, history, flags, out, np.zeros(2))
-        history[:, (int(out[at.OUT_TICKS]) + every - 1) // every :] = np.nan
+        self.blank(history, out)
         self.s[at.S_TICK] = 0.0
         self.work += ticks + int(self.s[at.S_STEPS] - steps)
         return Piece(history, flags, int(self.s[at.S_EVENTS] - before), STATUS[status])
@@ -184,6 +184,11 @@ class Running:
             message = f"{p[at.TICKS]:.0f} ticks: a history of {rows} rows does not fit into memory"
             raise InputError(f"{message}; use record_every, or simulate_many with reducers")
         return np.empty((columns, rows)), np.zeros(rows, np.uint16), np.zeros(at.OUT_SIZE)
+
+    def blank(self, history: Floats, out: Floats) -> None:
+        """Make NaN of the rows that a run, with these results, has not reached."""
+        every = int(self.p[at.RECORD_EVERY])
+        history[:, (int(out[at.OUT_TICKS]) + every - 1) // every :] = np.nan
 
     def returned(self, piece: Piece, point: str) -> Floats:
         """The signal in front of the instrument at a break point, of a piece."""

@@ -151,12 +151,11 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     """Run one row of parameters with its history."""
     from nonlinear.native import parameters
 
-    every, drive = int(row[at.RECORD_EVERY]), Running(*parameters(row), tables)
+    drive = Running(*parameters(row), tables)
     history, flags, out = drive.history()
     begun = drive.copy()
     status = _call(drive, history, flags, out, progress)
-    done = (int(out[at.OUT_TICKS]) + every - 1) // every
-    history[:, done:] = np.nan
+    drive.blank(history, out)
     digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
     run = wrap(design, row, history, flags, out, STATUS[status], drive.probing, digest)
     left = drive if begun.held() is None else begun

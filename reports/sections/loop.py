@@ -96,8 +96,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"
-        with np.errstate(divide="ignore"):
-            values.append(20.0 * np.log10(np.abs(response_at(system, grid))))
+        values.append(style.decibels(response_at(system, grid)))
         panel.curve(grid_hz, values[k], words, colour=colour, dash=k)
         if db is not None and at and grid_hz[0] <= at <= grid_hz[-1] * 1.001:
             panel.points([at], [db], marker="^", colour=colour, size=7.0, read=False)

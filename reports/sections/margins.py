@@ -57,7 +57,7 @@ def _samples(figures: LoopFigures) -> float | None:
 
 
 HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
-DOUBTS = {"not stable": False, "stability not known": None}
+DOUBTS = {False: "not stable", None: "stability not known"}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
     doc.of(lambda figures: EVIDENCE[figures.margins.evidence], "evidence", "Margins are"),
@@ -153,7 +153,7 @@ def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
-    for words, sound in DOUBTS.items():
+    for sound, words in DOUBTS.items():
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
     held = [
@@ -170,8 +170,7 @@ def _elsewhere(result: Margins) -> str:
     for point in result.operating_points:
         for name, one in point.figures.items():
             if not one.sound and name in result.loops and result.loops[name].sound:
-                words = next(words for words, sound in DOUBTS.items() if one.sound is sound)
-                places.setdefault((words, point.place or "sliding"), []).append(LOOPS[name])
+                places.setdefault((DOUBTS[one.sound], point.place or "sliding"), []).append(LOOPS[name])
     return "".join(f"; {' '.join(said)}: {', '.join(names)}" for said, names in places.items())
 
 
@@ -289,8 +288,10 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
         name, own = figures.loop.name, ranges.get(figures.loop.name, {})
         row: doc.Row = {"loop": next(iter(with_held({label: figures})))}
         row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
-        known = [(p.place or "sliding", p.figures[name].sound) for p in seen if name in p.figures]
-        doubts = {words: [place for place, each in known if each is sound] for words, sound in DOUBTS.items()}
+        doubts = {words: list[str]() for words in DOUBTS.values()}
+        for point in seen:
+            if name in point.figures and not (sound := point.figures[name].sound):
+                doubts[DOUBTS[sound]].append(point.place or "sliding")
         said = [f"{words} {'; '.join(where)}" for words, where in doubts.items() if where]
         row |= {"gain": "; ".join(said)} if said else {}
         rows += [row] if len(row) > 1 else []

@@ -98,9 +98,9 @@ def decibels_and_degrees(
     measured: np.ndarray, model: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Magnitude in dB and unwrapped phase in degrees of a measurement and of its model, on the same turn."""
-    phases = [np.degrees(np.unwrap(np.angle(L))) for L in (measured, model)]
+    phases = [style.phases(L) for L in (measured, model)]
     phases[1] += 360.0 * np.round((phases[0][0] - phases[1][0]) / 360.0)
-    return tuple((20.0 * np.log10(np.abs(L)), y) for L, y in zip((measured, model), phases, strict=True))
+    return tuple((style.decibels(L), y) for L, y in zip((measured, model), phases, strict=True))
 
 
 def _nyquist(one: Measured) -> doc.Block:
