@@ -49,6 +49,7 @@ _UPSIDE_DOWN = {
     "motor.cogging_periods": (2.0 * pi, "{angle}"),
     "control.period": (2.0 * pi, "rad/s"),
 }
+_BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
 
@@ -215,6 +216,8 @@ class Reader:
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
         for template, per in GAINS.get(field.path, {}).items() if isinstance(table["value"], str) else ():
+            if template == "rad/s" and not _BANDWIDTH.search(table["value"]):
+                continue
             with suppress(InputError):
                 size = self.quantity(table["value"], replace(field, unit_template=template))
                 self.gains[path] = field, table, size, per

@@ -15,6 +15,7 @@ from decimal import Decimal
 from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
+from itertools import product
 from math import isfinite, pi
 from operator import ne
 
@@ -261,8 +262,7 @@ _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     (_FREQUENCY, "s"): "a period of {period:.6g} s",
-    ("gain or rate", "A*s/rad"): _IN_HZ,
-    ("gain or rate", "V*s/rad"): _IN_HZ,
+    **dict.fromkeys(product((_FREQUENCY, "gain or rate"), ("A*s/rad", "V*s/rad", "V/A")), _IN_HZ),
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",

@@ -198,6 +198,12 @@ def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
     assert design.encoder.counts_per_rev == counts
 
 
+@pytest.mark.parametrize("stated", ["2400 rpm", "40 rev/s", "250 1/s"])
+def test_a_speed_is_no_bandwidth_of_a_gain(stated: str) -> None:
+    text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "{stated}"\n'
+    assert "a bandwidth is written in Hz or rad/s" in told(text)
+
+
 def test_counts_are_no_angle_of_a_gain() -> None:
     """1.1e-4 A/(count/s) at 2^19 counts is 9.2 A s/rad, not 1.1e-4."""
     text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"\n'
