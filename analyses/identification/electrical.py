@@ -14,6 +14,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import parameter
+from analyses.identification.joint_model import Recipe
 from analyses.identification.rows import motion_of, recipe_for
 from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
@@ -30,17 +31,17 @@ class ElectricalFit(Fit):
     relative_residual: float
 
 
-def fit_electrical(design: Design, records: Sequence[Record]) -> ElectricalFit:
+def fit_electrical(design: Design, records: Sequence[Record], recipe: Recipe | None = None) -> ElectricalFit:
     """Fit the voltage equation to records of voltage, current and motion.
 
-    All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts
-    later by the design's computing delay and half a tick; what this shift does to the values is an error of
-    theirs. The inductance is kept out where it is not five times its standard error: a record sampled too
-    slowly, or too calm, does not show it, and none is invented.
+    All signals pass the same filter without phase, by default that of each record's period. The recorded
+    voltage is the drive's own, which acts later by the design's computing delay and half a tick; what this
+    shift does to the values is an error of theirs. The inductance is kept out where it is not five times its
+    standard error: a record sampled too slowly, or too calm, does not show it, and none is invented.
     """
     control = design.controller
     shifts = control.computing_delay_s + 0.5 * control.period_s, 0.0
-    late, early = ([_rows(design, record, shift) for record in records] for shift in shifts)
+    late, early = ([_rows(design, record, recipe, shift) for record in records] for shift in shifts)
     whole = _fitted(late, early, NAMES)
     if "inductance" not in whole.names:
         return whole
@@ -73,12 +74,12 @@ def _fitted(late: Sequence[FloatArray], early: Sequence[FloatArray], only: tuple
     )
 
 
-def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
+def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> FloatArray:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
         if name not in record.signals:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
-    recipe, period = recipe_for(record), period_of(record)
+    recipe, period = recipe or recipe_for(record), period_of(record)
     motion, _ = motion_of(record.drive(design), record, recipe)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))
