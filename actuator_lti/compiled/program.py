@@ -26,8 +26,8 @@ _MINMAX = {
     "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
 }
 
-# a form of a loop, or a wide one, once for processors with AVX2 and once for all others; the arithmetic is the
-# same; what a wide one calls is put into it
+# a form of a loop, or a wide one, once for processors with AVX2 and once for all others, with the same
+# arithmetic; what a wide one calls is put into it
 _CLONES = """\
 #if defined(__GLIBC__) && !defined(__UCLIBC__) && defined(__x86_64__) && !defined(__clang__)
 #define @clones __attribute__((target_clones("avx2", "default")))
