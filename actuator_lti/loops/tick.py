@@ -158,7 +158,7 @@ class TickWalk(Walk):
             rest += total(gain * held[j] for j, gain in gains.items())
             self.next[name] = rest + total(gain * row for gain, row in zip(kept, x, strict=True))
             if angle is not None and name in angle.terms:
-                moved = [*kept[:r], _nonzero(kept[r] - 1.0), *kept[r + 1 :]]  # exactly 0 for the motor's angle
+                moved = [*kept[:r], _nonzero(kept[r] - 1.0), *kept[r + 1 :]]  # exactly 0: the motor's angle
                 change[name] = rest + total(gain * row for gain, row in zip(moved, x, strict=True))
         for j in range(1, hold.memory + 1):
             self.next[f"u{j}"] = held[j - 1]
