@@ -210,6 +210,15 @@ def no_load_speed(design: "Design") -> float:
     return inf if kE is None else design.limits.voltage_V / kE
 
 
+def torque_per_command(design: "Design") -> Any:
+    """Torque per ampere of the current loop, or per volt where there is none."""
+    motor = design.effective_motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V
+    kM: Any = motor.torque_constant_Nm_A
+    return kM if design.controller.current is not None else kM / motor.resistance_ohm
+
+
 def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, str]:
     """Largest order of a wave over an angle that turns at the top speed of the motor over ``ratio``."""
     if not peak_Nm:

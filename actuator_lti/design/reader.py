@@ -21,6 +21,7 @@ from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
@@ -40,20 +41,11 @@ _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
 
-def _torque(design: model.Design) -> Any:
-    """Torque per ampere of the current loop, or per volt."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V
-    kM: Any = motor.torque_constant_Nm_A
-    return kM if design.controller.current is not None else kM / motor.resistance_ohm
-
-
 GAINS: dict[str, dict[str, Per]] = {
     "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H or UNREAD},
     "control.velocity.gain": {
-        "rad/s": lambda design: design.inertia_kgm2 / _torque(design),
-        "{torque}*s/{angle}": lambda design: 1.0 / _torque(design),
+        "rad/s": lambda design: design.inertia_kgm2 / torque_per_command(design),
+        "{torque}*s/{angle}": lambda design: 1.0 / torque_per_command(design),
     },
 }
 """Gains that controllers state by what they do, the loop's bandwidth or a torque: unit, gain per that."""
