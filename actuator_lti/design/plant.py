@@ -318,7 +318,7 @@ class FrictionPoint:
 class Friction:
     """Friction at the motor shaft: dry ``Tc = C0 + CM |M_ext|`` plus viscous ``Cv w`` (paper, equation 9).
 
-    ``points`` is a friction map that takes the place of C0 and Cv (model.md section 6); CM and the offset add.
+    ``points`` is a map in place of C0 and Cv (model.md section 6), to which CM and the offset add.
     """
 
     law: Annotated[FrictionLaw, choice("dry friction with stick, or smoothed by tanh")] = "coulomb"

@@ -64,7 +64,7 @@ def design_tree(design: Design) -> Tree:
             "values": {item.label: object_entry(item) for item in design.objects.values},
             **({"family": design.objects.family} if design.objects.family else {}),
         }
-    return {key: value for key, value in tree.items() if value not in ({}, [])}
+    return {key: value for key, value in tree.items() if value != []}  # an empty [supply] is one
 
 
 def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
