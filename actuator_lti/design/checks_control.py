@@ -57,8 +57,8 @@ def _biquad(item: Filter, path: str, values: Any, most: int, words: str) -> Iter
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
     velocity = design.controller.velocity
-    for place in () if velocity is None else get_args(FilterPlace):
-        count = len(velocity.filters_on(place))
+    for place in get_args(FilterPlace):
+        count = 0 if velocity is None else len(velocity.filters_on(place))
         if count > MAX_FILTERS:
             yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"
 

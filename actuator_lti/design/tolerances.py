@@ -83,7 +83,7 @@ def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
     if nominal == 0.0:
         return None
     width = abs(nominal) * parse_quantity(tolerance.text, "1")
-    return replace(tolerance, **{"half_width" if tolerance.kind == "uniform" else "std": width})
+    return replace(tolerance, half_width=width) if tolerance.std is None else replace(tolerance, std=width)
 
 
 def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
