@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import needs_compiler, ran
 from random_drives import random_drive, random_elastic_drive, random_inputs
 
 from actuator_lti import load_design
-from actuator_lti.compiled.compiler import compile_files, system_compiler
+from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.design import design_hash
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
@@ -24,7 +25,6 @@ from nonlinear.native import LIBRARY, parameters, tick
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
-needs_compiler = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 
 
 def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
@@ -40,7 +40,7 @@ def said_by(folder: Path, texts: dict[str, str], *arguments: str, compiler: list
     program = folder / "program"
     program.write_bytes(compile_files(texts, "program", "linux64", STRICT, command=compiler))
     program.chmod(0o755)
-    return subprocess.run([str(program), *arguments], capture_output=True, text=True, check=True).stdout
+    return ran(folder, str(program), *arguments)
 
 
 @pytest.fixture(scope="module")

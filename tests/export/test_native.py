@@ -8,6 +8,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
+from programs import needs_compiler
 from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import load_design
@@ -154,7 +155,7 @@ def test_a_library_is_named_by_its_sources(library: Library, tmp_path) -> None:
     assert other.path("win32-AMD64").suffix == ".dll"
 
 
-@pytest.mark.skipif(compiler.system_compiler() is None, reason="no C compiler on this machine")
+@needs_compiler
 def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Library) -> None:
     old = library.path().with_name(f"figures-0123456789abcdef-{compiler.HERE}.so")
     old.parent.mkdir()

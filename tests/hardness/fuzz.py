@@ -29,7 +29,7 @@ from targets import Target, targets  # noqa: E402 - needs the path
 
 from actuator_lti.errors import InputError, NumericalError  # noqa: E402
 
-LIMIT_S = 120
+LIMIT_S, SLICE_S = 120, 0.5
 
 
 @dataclass(frozen=True)
@@ -114,14 +114,17 @@ def place(error: BaseException | None) -> str:
     return f"{Path(last.filename).name}:{last.lineno} {last.name}" if last else ""
 
 
-def rounds(seed: int, chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
-    """Inputs without end, each target by its share."""
+def rounds(chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
+    """Inputs without end, of each target for some time."""
     number = Counter[str]()
     while True:
         for target in chosen:
-            for _ in range(target.share):
+            end = time.monotonic() + SLICE_S
+            while True:
                 yield target, number[target.name]
                 number[target.name] += 1
+                if time.monotonic() > end:
+                    break
 
 
 def main() -> int:
@@ -138,7 +141,7 @@ def main() -> int:
     finds: dict[tuple[str, str], Find] = {}
     done, begin = Counter[str](), time.monotonic()
     say, end = begin + asked.say, begin + asked.seconds
-    for count, (target, number) in enumerate(rounds(asked.seed, chosen)):
+    for count, (target, number) in enumerate(rounds(chosen)):
         now = time.monotonic()
         if count >= asked.inputs or now > end:
             break

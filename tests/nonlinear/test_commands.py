@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+import mpmath
 import numpy as np
 import pytest
 from scipy import signal
@@ -34,6 +35,14 @@ T = np.arange(2000) * TS
 )
 def test_values(command: Command, expected: np.ndarray) -> None:
     np.testing.assert_allclose(command.values(TS, T.size), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("frequency_hz", [1e-3, 0.7, 31.0, 499.0, 7e5])
+def test_a_sine_is_right_to_its_last_digits(frequency_hz: float) -> None:
+    values = commands.sine(1.0, frequency_hz, 0.3).values(TS, T.size)
+    turned = 2 * np.pi * frequency_hz * T + 0.3  # as rounded: what is asked is its sine
+    truth = np.array([float(mpmath.sin(mpmath.mpf(float(x)))) for x in turned])
+    assert np.max(np.abs(values - truth) / np.spacing(np.abs(truth))) <= 2.0
 
 
 def test_stepped_sine_joins_whole_periods() -> None:
