@@ -1,6 +1,7 @@
 """The linear models of a file give the margins and responses of the loops that they were written of."""
 
 import json
+from collections.abc import Callable
 from math import isqrt
 from pathlib import Path
 from typing import Any
@@ -8,23 +9,24 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.io import loadmat
-from typer.testing import CliRunner
 
 from actuator_lti import assemble_loops
 from actuator_lti.loops import exact_margins
 from actuator_lti.systems.plain_system import PlainDelaySystem, PlainSystem
-from reports.cli.app import build
 from reports.linear_models import margins_tree
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ballscrew", "ctms-motor-position", "emps")
 OTHERS = [("ilr33-amber-multirate", "json"), ("ctms-motor-position", "python"), ("emps", "json")]
 
 
-def written(name: str, to: str, folder: Path) -> Path:
-    path = folder / f"models.{'py' if to == 'python' else to}"
-    done = CliRunner().invoke(build(), ["export", "linear", name, "--to", to, "--out", str(path)])
-    assert done.exit_code == 0, done.exception
-    return path
+@pytest.fixture
+def written(cli, tmp_path) -> Callable[[str, str], Path]:
+    def call(name: str, to: str) -> Path:
+        path = tmp_path / f"models.{'py' if to == 'python' else to}"
+        cli.text("export", "linear", name, "--to", to, "--out", path)
+        return path
+
+    return call
 
 
 def read(path: Path) -> dict[str, Any]:
@@ -57,8 +59,8 @@ def same(found: Any, known: Any) -> bool:
 
 
 @pytest.mark.parametrize(("name", "to"), [*((name, "mat") for name in NAMES), *OTHERS])
-def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, tmp_path) -> None:
-    tree = read(written(name, to, tmp_path))
+def test_read_back_they_have_the_same_margins_and_responses(name: str, to: str, written) -> None:
+    tree = read(written(name, to))
     for form in ("sampled", "continuous"):
         loops, kept = assemble_loops(name, form), tree[form]
         for place, ours in (("loops", loops.present), ("break_points", loops.break_points)):
@@ -86,10 +88,10 @@ def responds_alike(found: Any, known: Any) -> bool:
     return same(found(points), known(points)) and tuple(found.states) == tuple(known.states)
 
 
-def test_the_python_file_makes_python_control_systems(tmp_path) -> None:
+def test_the_python_file_makes_python_control_systems(written) -> None:
     """A program that knows nothing but the file, numpy and python-control."""
     scope: dict[str, Any] = {}
-    exec(written("emps", "python", tmp_path).read_text(encoding="utf-8"), scope)
+    exec(written("emps", "python").read_text(encoding="utf-8"), scope)
     ours = scope["system"](scope["MODELS"]["sampled"]["loops"]["position"]["open_loop"])
     known = assemble_loops("emps").position
     z = np.exp(1j * 100.0 * ours.dt)
@@ -97,9 +99,3 @@ def test_the_python_file_makes_python_control_systems(tmp_path) -> None:
     delayed = scope["system"](scope["MODELS"]["continuous"]["loops"]["position"]["open_loop"])
     continuous = assemble_loops("emps", "continuous").position
     assert delayed(100j) == pytest.approx(continuous.open_loop(100j), rel=1e-12)
-
-
-def test_a_file_that_is_there_is_not_overwritten(tmp_path) -> None:
-    (tmp_path / "a.json").write_text("{}")
-    call = ["export", "linear", "emps", "--out", str(tmp_path / "a.json")]
-    assert "exists already" in str(CliRunner().invoke(build(), call).exception)

@@ -5,20 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from flint import acb, arb, fmpz, fmpz_poly
+from flint import acb, arb, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.roots import (
-    Split,
-    all_roots,
-    at_enough_bits,
-    free_of,
-    positive_roots,
-    split,
-)
+from actuator_lti.margins.exact.real_roots import positive_roots
+from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96
@@ -71,11 +65,16 @@ def _crossings(
     off: Callable[[arb], arb],
     touched_ends: Sequence[bool] = (False, False),
 ) -> list[Crossing]:
-    """The positive roots of p, touches merged; ``off`` is the distance to the line."""
+    """The positive roots of p, touches merged; ``off`` is the distance to the line.
+
+    A line just missed is a pair of complex roots, with a turn of p between; few loops have one.
+    """
+    with ctx.workprec(_FIRST_BITS):
+        missed = any(abs(off(v).mid()) <= 10.0 * TOUCH for v, _ in positive_roots(p.derivative()))
 
     def accurate() -> list[Crossing] | None:
-        roots = all_roots(p)
-        met = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
+        roots = all_roots(p) if missed or any(touched_ends) else []
+        met = [(v, times % 2 == 0) for v, times in positive_roots(p)]
         met = _merged(met, roots, off, touched_ends)
         values = [(v, N.at(v) / D.at(v), touch) for v, touch in met]
         if not all(L.rel_accuracy_bits() >= _ACCURATE for _, L, _ in values):
@@ -125,7 +124,7 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
     slope = above.derivative() * below - above * below.derivative()
 
     def stationary() -> list[tuple[float, float]] | None:
-        values = [(above(v) / below(v), v) for v, _ in positive_roots(all_roots(slope))]
+        values = [(above(v) / below(v), v) for v, _ in positive_roots(slope)]
         if not all(_settled(value) for value, _ in values):
             return None
         return [

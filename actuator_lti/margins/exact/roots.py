@@ -67,12 +67,6 @@ def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]
         return [(acb(root), times) for root, times in result]
 
 
-def positive_roots(roots: list[tuple[acb, int]]) -> list[tuple[arb, int]]:
-    """The positive real ones among certified roots, in order."""
-    real = [(root.real, times) for root, times in roots if root.imag.is_zero() and root.real > 0]
-    return sorted(real, key=lambda pair: float(pair[0].mid()))
-
-
 @dataclass(frozen=True)
 class HalfPlanes:
     """Where the roots of a polynomial lie."""
@@ -113,7 +107,8 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         mirrored = symmetric(_SQUARE)
         p = p // (mirrored // mirrored.content())
         squares = all_roots(symmetric)
-        border = [(v.sqrt(), times) for v, times in positive_roots(squares)]
+        real = [(v.real.sqrt(), times) for v, times in squares if v.imag.is_zero() and v.real > 0]
+        border = sorted(real, key=lambda pair: float(pair[0].mid()))
         right = symmetric.degree() - sum(times for _, times in border)
         placed += [(side * _root_of(v), times) for v, times in squares for side in (1, -1)]
     roots = at_enough_bits(partial(_told_from_axis, p), ctx.prec, "a closed-loop pole")
