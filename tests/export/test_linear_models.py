@@ -21,8 +21,6 @@ OTHERS = [("ilr33-amber-multirate", "json"), ("ctms-motor-position", "python"), 
 
 @pytest.fixture
 def written(cli, tmp_path) -> Callable[[str, str], Path]:
-    """Write the models of a design in a form."""
-
     def call(name: str, to: str) -> Path:
         path = tmp_path / f"models.{'py' if to == 'python' else to}"
         cli.text("export", "linear", name, "--to", to, "--out", path)

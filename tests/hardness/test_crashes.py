@@ -47,7 +47,6 @@ def one_line(printed: pytest.CaptureFixture[str]) -> str:
 
 
 def traceback_of(line: str) -> str:
-    """What is in the file that a line names, which is removed."""
     result = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
     assert result, line
     text = Path(result[1]).read_text(encoding="utf-8")
