@@ -126,7 +126,7 @@ def identify_bench(
         refined = refine_records(made, used, values.names, progress=progress)
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
     written = read_design_text(write_design(made))
-    again = tuple(resimulate(written, record, model) for record in (*used, *unseen))
+    again = tuple(resimulate(written, record, model.form) for record in (*used, *unseen))
     allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
     for record in unseen:
         label = f"Relative residual of {record.name}, not seen by the fit"

@@ -17,7 +17,7 @@ from analyses.correlation.driving import command_of
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import FrictionForm, default_value
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
@@ -185,11 +185,11 @@ def refine_records(
     )
 
 
-def resimulate(design: Design, record: Record, model: JointModel) -> Resimulated:
+def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
     A record without a command is held against the torque that the design's own inertia and friction need for
-    its motion, by the recipe and the form of the ``model`` that the design came of.
+    its motion, by the record's own recipe, whatever cut-off the fit had.
     """
     why = ""
     if command_of(design, record) is not None:
@@ -202,7 +202,7 @@ def resimulate(design: Design, record: Record, model: JointModel) -> Resimulated
         except InputError as refusal:  # a part that the simulator does not have
             why = f" ({refusal.message})"
     knots = [point.speed_rad_s for point in design.friction.map(1)] or None
-    rows = record_rows(design, record, model.form, model.asked, knots_rad_s=knots)
+    rows = record_rows(design, record, form, None, knots_rad_s=knots)
     rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
     error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
     how = f"torque needed for its motion{why}"

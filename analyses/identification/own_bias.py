@@ -17,7 +17,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
 from analyses.identification.inverse import fit_records, with_scatter
-from analyses.identification.joint_model import JointModel, Recipe, RecordFit, default_value
+from analyses.identification.joint_model import JointModel, RecordFit, default_value
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
@@ -64,7 +64,7 @@ def without_bias(
             reason = "" if driven else _cannot(made, records)
             if reason:
                 return replace(model, bias_told=reason)
-            driven = driven or tuple(_driven(made, record, model.asked) for record in records)
+            driven = driven or tuple(_driven(made, record) for record in records)
             less = replace(less, simulated=tuple(_with_model_signals(made, record) for record in driven))
             again = fit(less.simulated)
         except (InputError, NumericalError) as error:
@@ -141,15 +141,15 @@ def _cannot(design: Design, records: Sequence[Record]) -> str:
     return ""
 
 
-def _driven(design: Design, record: Record, recipe: Recipe | None) -> Record:
+def _driven(design: Design, record: Record) -> Record:
     """The record, or its first part; without a command it gets one that moves the drive as recorded."""
     record = simulated_part(design, record)
     if command_of(design, record) is not None:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"
 
-    def place(record: Record) -> FloatArray:
-        return motion_of(design, record, recipe or recipe_for(record))[0].position
+    def place(record: Record) -> FloatArray:  # as recorded, whatever cut-off the fit has
+        return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)
     assert design.controller.position is not None  # _cannot has seen to it

@@ -18,7 +18,6 @@ from analyses.identification.rows import recipe_for
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure
 from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
-from benchmarks.random_records import random_records
 from tests.identification.bench_records import record_of
 
 PERIOD = 1e-3
@@ -191,17 +190,6 @@ def test_a_cutoff_keeps_out_of_the_voltage_equation_what_is_above_it() -> None:
     record = replace(record, signals={**record.signals, "voltage": record["voltage"] + tone})
     far, near = (fit_electrical(_joint(), [record], recipe_for(record, hertz)) for hertz in (20.0, None))
     assert far.relative_residual < 0.05 * near.relative_residual
-
-
-def test_a_cutoff_holds_for_a_record_without_a_command_too() -> None:
-    """The written design is held against the torque below it: a tone above is none of its errors."""
-    design, _, (record,) = random_records("without a command", 1)
-    tone = np.sin(2.0 * np.pi * 90.0 * record.time_s)
-    record = replace(record, signals={**record.signals, "current": record["current"] + 0.3 * tone})
-    asked = (Settings(cutoff_hz=20.0), Settings())
-    far, near = (identify_bench(design, [record], settings=one).resimulated[0] for one in asked)
-    assert far.how == near.how == "torque needed for its motion"
-    assert far.relative_error < 0.5 * near.relative_error
 
 
 def test_the_motors_one_constant_goes_into_the_design_as_one() -> None:
