@@ -43,6 +43,7 @@ Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
 GAINS: dict[str, dict[str, Per]] = {
     "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H or UNREAD},
+    "control.position.gain": {"rad/s": lambda _: 1.0},
     "control.velocity.gain": {
         "rad/s": lambda design: design.inertia_kgm2 / torque_per_command(design),
         "{torque}*s/{angle}": lambda design: 1.0 / torque_per_command(design),
@@ -207,10 +208,12 @@ class Reader:
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
         for template, per in GAINS.get(field.path, {}).items() if isinstance(table["value"], str) else ():
-            if template == "rad/s" and not _BANDWIDTH.search(table["value"]):
+            outer = field.section != "control.position" or self.structure.has_velocity
+            if template == "rad/s" and not (outer and _BANDWIDTH.search(table["value"])):
                 continue
             with suppress(InputError):
-                size = self.frame.quantity(table["value"], replace(field, unit_template=template))
+                said = replace(field, path=f"{field.path}, as stated", unit_template=template)
+                size = self.frame.quantity(table["value"], said)
                 self.gains[path] = field, table, size, per
                 return UNREAD
         return self.kept(field, table, self.number(field, table["value"], path), path, into)
@@ -280,7 +283,8 @@ class Reader:
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
-            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}")
+            percent = f'; or is it "{value:g} %"' * (field.high == 1.0 and 2.0 <= value <= 100.0)
+            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}{percent}")
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
