@@ -183,10 +183,7 @@ def _named(name: str, units: Units) -> Exact:
 def parse_unit(unit: str) -> UnitValue:
     """Read a unit such as ``"N*m/A"``; the empty text and ``"1"`` are dimensionless.
 
-    Raises
-    ------
-    ValueError
-        If it is no unit, with the nearest known one where there is one.
+    A ValueError if it is no unit, with the nearest known one where there is one.
     """
     if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
@@ -332,10 +329,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     float
         In ``unit`` (which is to be an SI unit without prefix).
 
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, has an unknown unit or the wrong dimension.
+    An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
     Examples
     --------

@@ -58,10 +58,7 @@ class Started:
 def start(asked: Asked) -> Started:
     """Write a commented design file, named as the file is.
 
-    Raises
-    ------
-    InputError
-        If there is such a file already, or the source is no design.
+    An InputError if there is such a file already, or the source is no design.
     """
     from actuator_lti.design import read_design_text
     from actuator_lti.files.atomic import write_text
