@@ -112,10 +112,9 @@ def _changed(design: Design, path: str, value: float) -> Parameter:
     return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
-def unit_in_file(design: Design, path: str, field: Field | None) -> str:
-    """The SI unit of a key as a file has to say it; ``"1"`` for what is no key with one."""
-    unit = "1" if field is None else field.unit(Structure.of(design))
-    return ampere_unit(path, unit, design.motor.constants)
+def unit_in_file(design: Design, path: str, field: Field) -> str:
+    """The SI unit of a key as a file has to say it."""
+    return ampere_unit(path, field.unit(Structure.of(design)), design.motor.constants)
 
 
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:
