@@ -269,15 +269,12 @@ _ADVICE = {
 """Where engineers mix two up: what is written, the unit wanted, and how to get there."""
 
 
-@lru_cache(maxsize=1)
-def _advices() -> dict[tuple[str, Dimension], str]:
-    return {(kind, parse_unit(unit).dimension): said for (kind, unit), said in _ADVICE.items()}
-
-
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted."""
-    said = _advices().get((_kinds().get(value.dimension, ""), wanted.dimension))
-    if said is not None:
+    kind = _kinds().get(value.dimension)
+    advices = (said for (one, unit), said in _ADVICE.items()
+               if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip
+    if (said := next(advices, None)) is not None:
         size = number * value.factor
         period = 2.0 * pi / size if size > 0.0 else 0.0
         return f"; {said.format(size=size, period=period)}" if period or "{period" not in said else ""
