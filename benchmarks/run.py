@@ -1,4 +1,8 @@
-"""Run every ``bench_*.py`` of this folder, a line a figure: ``python -m benchmarks.run [NAME ...]``."""
+"""Run every ``bench_*.py`` of this folder, a line a figure: ``python -m benchmarks.run [NAME ...]``.
+
+Linear algebra runs as on the command line (`reports.arithmetic`): threads that wait for each other over small
+matrices would be counted as processor time.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +13,12 @@ import time
 
 import benchmarks
 from benchmarks.row import Row
+from reports import arithmetic
 
 
 def main(names: list[str]) -> int:
     """Measure the named groups (all where none is named); 1 if a target is missed."""
+    arithmetic.settle()
     modules = [m.name for m in pkgutil.iter_modules(benchmarks.__path__) if m.name.startswith("bench_")]
     missed, start = 0, time.perf_counter()
     for name in (m for m in modules if not names or m.removeprefix("bench_") in names):

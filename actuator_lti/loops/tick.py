@@ -66,6 +66,19 @@ class TickProgram(Program):
     def _ticks(self) -> dict[tuple[bool, ...], Tick]:
         return {kind: walk.finish(self.states) for kind, walk in self._walked.items()}
 
+    @cached_property
+    def plant_steps(self) -> dict[str, tuple[list[Any], dict[int, Any], list[Any]]]:
+        """What makes each state of the plant after a tick: gains of torque and moment, voltages, states."""
+        hold = self.drive.hold
+        return {
+            name: (
+                [_nonzero(hold.Gamma_T[..., r, c]) for c in (0, 1)],
+                {j: _nonzero(gain[..., r]) for j, gain in hold.gains.items()},
+                [_nonzero(hold.Phi[..., r, c]) for c in range(hold.Phi.shape[-1])],
+            )
+            for r, name in enumerate(self.drive.plant.states)
+        }
+
     def tick(self, k: int) -> Tick:
         """The map of tick k (only k modulo `ticks` matters)."""
         return self._ticks[self._kind(k % self.ticks)]
@@ -140,13 +153,13 @@ class TickWalk(Walk):
         angle = self.sensed_angle()
         x = [self.state(name) for name in plant.states]
         change: dict[str, Row] = {}
-        for r, name in enumerate(plant.states):
-            rest = total(_nonzero(hold.Gamma_T[..., r, c]) * outer[c] for c in (0, 1))
-            rest += total(_nonzero(gain[..., r]) * held[j] for j, gain in hold.gains.items())
-            own = [hold.Phi[..., r, c] for c in range(len(x))]
-            self.next[name] = rest + total(_nonzero(own[c]) * x[c] for c in range(len(x)))
-            own[r] = own[r] - 1.0  # exactly 0 for the motor's angle
-            change[name] = rest + total(_nonzero(own[c]) * x[c] for c in range(len(x)))
+        for r, (name, (driven, gains, kept)) in enumerate(self.program.plant_steps.items()):
+            rest = total(gain * row for gain, row in zip(driven, outer, strict=True))
+            rest += total(gain * held[j] for j, gain in gains.items())
+            self.next[name] = rest + total(gain * row for gain, row in zip(kept, x, strict=True))
+            if angle is not None and name in angle.terms:
+                moved = [*kept[:r], _nonzero(kept[r] - 1.0), *kept[r + 1 :]]  # exactly 0: the motor's angle
+                change[name] = rest + total(gain * row for gain, row in zip(moved, x, strict=True))
         for j in range(1, hold.memory + 1):
             self.next[f"u{j}"] = held[j - 1]
         if angle is not None:

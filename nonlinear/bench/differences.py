@@ -170,6 +170,7 @@ class Differences:
             (int(np.flatnonzero(self.moved == place)[0]), far) for place, far in found if place in self.moved
         )
 
+    @cached_property
     def _largest(self) -> Floats:
         """Steps far above the kick's own motion that in no tick move the speed out of the flat part of tanh.
 
@@ -194,7 +195,7 @@ class Differences:
         Of each column until it had three without an event, and the last did not bend.  Where events forbid
         the larger ones, they begin with the largest without one, found by halves.
         """
-        steps, going, seen = self._largest(), np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
+        steps, going, seen = self._largest, np.ones(self.scale.size, bool), np.zeros(self.scale.size, bool)
         felt, tried = list[Pair](), list[Pair]()
         for tries in range(1, MOST_DECADES + 1):
             values, rounding = self._differences(np.where(going, steps, 0.0))
@@ -226,7 +227,7 @@ class Differences:
 
         A number that hardly moves beside large ones is lost in their rounding at steps by its own motion.
         """
-        steps = self._largest()
+        steps = self._largest
         for _ in range(GROWN):
             columns = [_Columns(tried, each) for each in rows]
             going = np.any([one.grow(*each) for one, each in zip(columns, felt, strict=True)], axis=0)
