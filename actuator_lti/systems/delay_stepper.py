@@ -177,8 +177,8 @@ class DelayStepper:
         k = self._count
         if k > _MOST:
             raise InputError(
-                f"{self._t - self.start_s:g} s take {k - 1} pieces between the instants at which jumps return "
-                f"(sums of the delays, the shortest {self._shortest:g} s): ask for fewer seconds"
+                f"{self._t - self.start_s:g} s take {k - 1} pieces between the instants at which jumps "
+                f"return (sums of the delays, the shortest {self._shortest:g} s): ask for fewer seconds"
             )
         if k == len(self._begins):
             for name in ("_begins", "_lengths", "_series"):
