@@ -60,7 +60,8 @@ LAW = '[control.position.law]\ninputs = ["error"]\n'
 STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]\n"
 CURRENT = '[control.current]\ngain = "1 V/A"\n'
 NO_BANDWIDTH, ANGLE = "a bandwidth is written in Hz or rad/s", "write rev or rad into it"
-COUNTS = 'write "lines" (4 counts each) or "counts"'  # 1024 ppr are of one maker 4096 counts, of another 1024
+# 1024 ppr are of one maker 4096 counts after quadrature, of another 1024
+COUNTS = 'write "1024 lines" (4096 counts) or "1024 counts"'
 TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
 
 
@@ -77,7 +78,7 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
           for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
         # at 2^19 counts it is 9.2 A s/rad, not 1.1e-4
         (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
-        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1) for word in ("ppr", "CPT", "pulses")),
+        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1) for word in ("ppr", "CPT", "pulses", "CPR")),
         # makers state it at the output as often as at the motor
         (f'{CURRENT}[control.position]\ngain = "50 Nm/rev"', "over kM, and over the ratio squared", 1),
         ('[command]\nacceleration = "1500 1/s²"', ANGLE, 1),
