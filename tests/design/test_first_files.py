@@ -78,7 +78,8 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
           for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
         # at 2^19 counts it is 9.2 A s/rad, not 1.1e-4
         (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
-        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1) for word in ("ppr", "CPT", "pulses", "CPR")),
+        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
+          for word in ("ppr", "CPT", "pulses", "CPR")),
         # makers state it at the output as often as at the motor
         (f'{CURRENT}[control.position]\ngain = "50 Nm/rev"', "over kM, and over the ratio squared", 1),
         ('[command]\nacceleration = "1500 1/s²"', ANGLE, 1),
