@@ -214,7 +214,7 @@ def test_volts(run, tmp_path) -> None:
     assert made.facts | told == made.facts
     assert np.all(made.rows["voltage_reference_V"] == 6.0)
     speed = (6.0 - AMBER.motor.resistance_ohm * C0 / kM) / kE
-    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(speed, rel=1e-6)
+    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(speed, rel=1e-9)
 
 
 def test_amperes(run, tmp_path) -> None:
@@ -226,6 +226,9 @@ def test_amperes(run, tmp_path) -> None:
     lag = kE / AMBER.inertia_kgm2 * loop.integral_time_s / loop.gain_V_A
     current = (1.0 + lag * C0) / (1.0 + lag * kM)
     assert made.rows["current_A"][-1] == pytest.approx(current, rel=1e-3)
+    still = run(f"{without(CURRENT, tmp_path)} --amplitude 0.1 --duration 0.1")  # less than its dry friction
+    assert still.rows["current_A"][-1] == pytest.approx(0.1, rel=1e-9)
+    assert not still.rows["motor_speed_rad_s"].any()
 
 
 def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_path) -> None:
@@ -235,7 +238,8 @@ def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_
     made = run(f"{drive} --amplitude 20 --duration 3")
     assert made.facts["status"] == "becomes steady"
     assert np.all(made.rows["output_speed_reference_rad_s"] == rate)
-    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(wanted, rel=1e-3)
+    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(wanted, rel=1e-6)
+    assert made.rows["speed_command_rad_s"][-1] == pytest.approx(wanted, rel=1e-12)
     assert made.facts["largest_error_rad_s"] == pytest.approx(rate, rel=0.2)
     assert made.facts["final_response_rad_s"] == pytest.approx(rate, rel=1e-3)
     cut = run(f"{drive} --amplitude 20 --duration 0.001")
