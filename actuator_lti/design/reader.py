@@ -22,7 +22,7 @@ from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
-from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children, part_at, with_part
+from actuator_lti.design.sections import BY_PATH, HEAD, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.spellings import split_quantity
@@ -56,7 +56,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     """The design of a tree, `UNREAD` where there are findings; relations between its keys are `checks`."""
     reader = Reader(tree, findings)
     head, _ = reader.values("design", tree.get("design"), "design")
-    meant = reader.known(tree, [*(item.key for item in (_HEAD, *children(""), *RECORDS)), "objects"], "")
+    meant = reader.known(tree, [*(item.key for item in (HEAD, *children(""), *RECORDS)), "objects"], "")
     parts = reader.tables("", tree, meant)
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
@@ -74,9 +74,6 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     with suppress(UnreadError):
         return replace(design, friction=UNREAD) if contradicted else sheet.read_into(design)
     return replace(design, friction=UNREAD)
-
-
-_HEAD = Section("design", "", model.Design)
 
 
 class Reader:

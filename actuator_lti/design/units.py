@@ -188,10 +188,7 @@ def _named(name: str, units: Units) -> Exact:
 def parse_unit(unit: str) -> UnitValue:
     """Read a unit such as ``"N*m/A"``; the empty text and ``"1"`` are dimensionless.
 
-    Raises
-    ------
-    ValueError
-        If it is no unit, with the nearest known one where there is one.
+    A ValueError if it is no unit, with the nearest known one where there is one.
     """
     if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
@@ -281,15 +278,12 @@ _ADVICE = {
 """Where engineers mix two up: what is written, the unit wanted, and how to get there."""
 
 
-@lru_cache(maxsize=1)
-def _advices() -> dict[tuple[str, Dimension], str]:
-    return {(kind, parse_unit(unit).dimension): said for (kind, unit), said in _ADVICE.items()}
-
-
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted."""
-    said = _advices().get((_kinds().get(value.dimension, ""), wanted.dimension))
-    if said is not None:
+    kind = _kinds().get(value.dimension)
+    advices = (said for (one, unit), said in _ADVICE.items()
+               if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip
+    if (said := next(advices, None)) is not None:
         size = number * value.factor
         corner = 1.0 / size if size > 0.0 else nan
         here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
@@ -343,10 +337,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     float
         In ``unit`` (which is to be an SI unit without prefix).
 
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, has an unknown unit or the wrong dimension.
+    An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
     Examples
     --------
