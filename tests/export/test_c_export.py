@@ -28,7 +28,6 @@ STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror"
 
 
 def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
-    """The exported files as a library."""
     sources = {name: text for name, text in texts.items() if name[-2:] in (".c", ".h") and name != "main.c"}
     path = folder / "drive.so"
     path.write_bytes(compile_files(sources, "drive.so", "linux64", (*STRICT, "-shared", "-fPIC")))

@@ -19,12 +19,10 @@ CC = shutil.which("gcc") or shutil.which("clang")
 
 
 def block(title: str, language: str, number: int = 0) -> str:
-    """A block of code of the page."""
     return re.findall(rf"(?ms)^```{language}\n(.*?)^```", PARTS[title])[number]
 
 
 def exported(folder: Path, title: str) -> None:
-    """Runs the commands of a section."""
     for line in block(title, "sh").splitlines():
         words = line.split()
         assert words[0] == "actuator-lti"

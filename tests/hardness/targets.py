@@ -46,8 +46,6 @@ Fault = Callable[[bytes, random.Random], bytes]
 
 @dataclass(frozen=True)
 class Target:
-    """Something that takes a file."""
-
     name: str
     seeds: tuple[bytes, ...]  # valid inputs
     # Gets the path of a damaged file in a folder of its own; InputError is a good end
@@ -123,7 +121,6 @@ SPEC = RecordSpec(
 
 @cache
 def base() -> Design:
-    """What overrides and settings are for."""
     return load_design("ilr33-amber")
 
 
@@ -200,14 +197,12 @@ def command(*words: str) -> Callable[[Path], None]:
 
 
 def command_line(path: Path) -> None:
-    """Run the command whose words the file holds, in the file's folder."""
     words = json.loads(path.read_bytes())
     with contextlib.chdir(path.parent):
         called([word.replace("OUT", str(path.parent)).replace("FILE", str(path)) for word in words])
 
 
 def called(given: list[str]) -> None:
-    """Run a command; its status and its words are looked at."""
     from reports.cli.main import main
 
     out, err = io.StringIO(), io.StringIO()
@@ -276,7 +271,6 @@ def toml_fault(data: bytes, draw: random.Random) -> bytes:
 
 
 def without_none(value: Any) -> Any:
-    """Plain data as TOML has it."""
     if isinstance(value, dict):
         return {str(k): without_none(v) for k, v in value.items() if v is not None}
     return [without_none(v) for v in value if v is not None] if isinstance(value, list) else value
@@ -332,7 +326,6 @@ def xml_seed() -> bytes:
 
 @cache
 def targets() -> tuple[Target, ...]:
-    """All targets."""
     designs = tuple(design_text(name).encode() for name in shipped_designs())
     to_pdf = command("pdf", "FILE", "--out", "FOLDER/x.pdf")
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")

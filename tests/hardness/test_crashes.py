@@ -4,16 +4,13 @@ import json
 import re
 import subprocess
 import sys
-import time
 from importlib import import_module
 from pathlib import Path
 
 import pytest
 import typer
 
-from actuator_lti import design
 from actuator_lti.errors import InputError, NumericalError
-from reports.cli import time_limit
 from reports.cli.errors import run
 from reports.cli.main import main
 
@@ -51,7 +48,6 @@ def one_line(printed: pytest.CaptureFixture[str]) -> str:
 
 
 def traceback_of(line: str) -> str:
-    """What is in the file that a line names, which is removed."""
     result = re.search(r"(/\S+\.traceback\.txt)$", line.strip())
     assert result, line
     text = Path(result[1]).read_text(encoding="utf-8")
@@ -121,13 +117,6 @@ def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, 
     assert words in line
     if "traceback: " in line:
         traceback_of(line)
-
-
-def test_a_command_ends_at_its_time_limit(capsys, monkeypatch) -> None:
-    monkeypatch.setattr(design, "load_design", lambda _name: time.sleep(60))
-    assert main(["--time-limit", "1", "margins", "ilr33-amber"]) == 3
-    assert "not finished within 1 s" in capsys.readouterr().err
-    assert not time_limit._timers
 
 
 def test_the_hard_limit_ends_what_the_soft_one_cannot() -> None:

@@ -49,13 +49,11 @@ BY_NAME = {target.name: target for target in targets()}
 
 
 def refused(name: str, data: bytes) -> str:
-    """What is said of an input."""
     target = BY_NAME[name]
     return refusals.refused(target.attack, written(data, target.suffix))
 
 
 def first(kind: str, made: dict) -> dict:
-    """The first block of a kind."""
     return next(block for block in made["sections"][0]["blocks"] if block["kind"] == kind)
 
 

@@ -9,7 +9,7 @@ from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import Drive, State, commands, loads, simulate
+from nonlinear import State, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
@@ -142,18 +142,6 @@ def test_progress_and_interruption() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         simulate(AMBER, commands.hold(), 100.0, record_every=1000, progress=stop)
-
-
-def test_speed_from_counts_is_floored_differenced_and_filtered() -> None:
-    encoder = {"speed": "difference", "difference_samples": 2, "filter_time_s": 3e-4}
-    drive, period = Drive(changed(AMBER, encoder=encoder)), 1e-4
-    count, expected = 2.0 * np.pi / 1024, 0.0
-    th = np.linspace(-3.5, 6.2, 9) * count
-    floors = np.concatenate(([0.0, 0.0], np.floor(th / count) * count))
-    for k, angle in enumerate(th):
-        drive.control(0.0, 0.0, 0.0, angle)
-        expected += 0.25 * ((floors[k + 2] - floors[k]) / (2 * period) - expected)
-        assert drive.value("measured_speed") == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_record_holds_the_whole_load() -> None:

@@ -22,7 +22,6 @@ TORQUE = changed(AMBER, controller={"position": None, "velocity": None})
 
 
 def torque_drive(gain: float, integral_time_s: float | None, **limits: float) -> model.Design:
-    """A current loop alone."""
     current = model.CurrentLoop(gain_V_A=gain, integral_time_s=integral_time_s)
     return changed(TORQUE, controller={"current": current}, limits=model.Limits(**limits))
 
