@@ -9,7 +9,8 @@ from flint import arb, arb_poly, ctx, fmpq, fmpz_poly
 
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.crossings import smallest
-from actuator_lti.margins.exact.roots import V, all_roots, positive_roots, split
+from actuator_lti.margins.exact.real_roots import positive_roots
+from actuator_lti.margins.exact.roots import V, split
 from actuator_lti.systems.exact_fraction import Fraction, double
 
 _BITS = 128
@@ -69,4 +70,4 @@ class RationalResponse:
 def _passages(p: fmpz_poly) -> list[tuple[arb, arb]]:
     """w and v = w^2 of the positive real roots of odd multiplicity, in order."""
     with ctx.workprec(_BITS):
-        return [(v.sqrt(), v) for v, times in positive_roots(all_roots(p)) if times % 2]
+        return [(v.sqrt(), v) for v, times in positive_roots(p) if times % 2]

@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any, TypeVar
 
 Written = TypeVar("Written", bound=Callable[..., Any])
-_MARK, _SELDOM = "is_kernel", "is_seldom"
+_MARK, _SELDOM, _WIDE = "is_kernel", "is_seldom", "is_wide"
 
 
 def kernel(function: Written) -> Written:
@@ -22,6 +22,17 @@ def seldom(function: Written) -> Written:
     """Mark a kernel that is called where something happens: `Form` leaves it as it is."""
     setattr(function, _SELDOM, True)
     return function
+
+
+def wide(function: Written) -> Written:
+    """Mark a kernel whose loop becomes vector instructions: it is there for AVX2 too."""
+    setattr(function, _WIDE, True)
+    return function
+
+
+def is_wide(value: object) -> bool:
+    """Whether something is marked by `wide`."""
+    return bool(getattr(value, _WIDE, False))
 
 
 def is_seldom(value: object) -> bool:

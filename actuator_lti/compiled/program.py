@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.compiled.expressions import Constant, Expressions
 from actuator_lti.compiled.form import Form, Known
-from actuator_lti.compiled.kernel import is_seldom
+from actuator_lti.compiled.kernel import is_seldom, is_wide
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name, tree_of
 from actuator_lti.compiled.statements import INDENT, Statements, result_type
 
@@ -26,12 +26,15 @@ _MINMAX = {
     "max_int": "static inline int @max_int(int a, int b) { return (b > a) ? b : a; }",
 }
 
-# a form of a loop, once for processors with AVX2 and once for all others; the arithmetic is the same
+# a form of a loop, or a wide one, once for processors with AVX2 and once for all others, with the same
+# arithmetic; what a wide one calls is put into it
 _CLONES = """\
 #if defined(__GLIBC__) && !defined(__UCLIBC__) && defined(__x86_64__) && !defined(__clang__)
 #define @clones __attribute__((target_clones("avx2", "default")))
+#define @wide @clones __attribute__((flatten))
 #else
 #define @clones
+#define @wide
 #endif
 """
 _INLINED = "static inline __attribute__((always_inline)) "
@@ -48,7 +51,6 @@ class Program:
     functions: str  # definitions, callees first; entries have external linkage, all others are static
     declarations: Mapping[str, str]  # prototype of each entry function
     prefix: str  # in front of every function and type name
-    cloned: bool = False  # whether it has forms
 
     @property
     def helpers(self) -> list[str]:
@@ -59,7 +61,8 @@ class Program:
     @property
     def source(self) -> str:
         """All of it as one file."""
-        clones = _CLONES.replace("@", self.prefix) if self.cloned else ""
+        cloned = any(f"{self.prefix}{mark} " in self.functions for mark in ("clones", "wide"))
+        clones = _CLONES.replace("@", self.prefix) if cloned else ""
         parts = [_INCLUDES + clones, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
         return "\n".join([*parts, self.types, *self.declarations.values(), self.functions])
 
@@ -111,11 +114,13 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
             types.append(f"typedef struct {{ {fields} }} {result_type(function)};")
         root = any(function is formed.root for formed in second)
         inner = function.prefix != prefix and not root
-        linkage = "" if public else _INLINED if inner else f"static {prefix}clones " if root else "static "
+        linkage = "" if public else _INLINED if inner else "static "
+        linkage += f"{prefix}clones " if root else ""
+        linkage += f"{prefix}wide " if is_wide(function.scope.get(function.name)) else ""
         texts.append(collector.definition(function, linkage + head, lines))
     texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
     parts = "\n".join(types), "\n".join(texts)
-    return Program(collector.constants, *parts, declarations, prefix, cloned=bool(second))
+    return Program(collector.constants, *parts, declarations, prefix)
 
 
 class Collector:

@@ -70,20 +70,10 @@ def parameter_value(design: Design, path: str) -> float:
 
 
 def with_values(design: Design, values: Mapping[str, float], *, check: bool = True) -> Design:
-    """A copy of a design with some numeric keys changed to SI values.
+    """A copy of a design with some numeric keys, by their dotted paths, changed to SI values.
 
-    Parameters
-    ----------
-    design : Design
-    values : mapping of dotted path to SI value
-    check : bool
-        Whether the relations between keys are checked too (kE against kM, speed against supply);
-        each value alone is always held to its allowed range.
-
-    Returns
-    -------
-    Design
-        Its parameters carry the new values; a tolerance in percent follows them.
+    Its parameters carry the new values; a tolerance in percent follows them. ``check``: whether the relations
+    between keys are checked too (kE against kM, speed against supply); each value alone always is.
 
     Raises
     ------
@@ -96,11 +86,10 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
     0.06
     """
-    numbers = {path: _allowed(design, path, value) for path, value in values.items()}
-    parameters = {path: _changed(design, path, number) for path, number in numbers.items()}
+    parameters = {path: _changed(design, path, value) for path, value in values.items()}
     gone = {path for path, item in parameters.items() if item.tolerance is None}
     changed = replace(
-        stacked(design, numbers),
+        stacked(design, {path: item.value for path, item in parameters.items()}),
         parameters=FrozenMap({**design.parameters, **parameters}),
         correlations=tuple(pair for pair in design.correlations if not gone & {pair.first, pair.second}),
     )
@@ -109,35 +98,30 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     return changed
 
 
-def _allowed(design: Design, path: str, value: float) -> float | int:
-    field, _ = located(design, path)
+def _changed(design: Design, path: str, value: float) -> Parameter:
+    """A changed value, which its key allows, with its pedigree."""
+    (field, _), old = located(design, path), design.parameters.get(path)
     if isinstance(value, bool) or not hasattr(value, "__float__"):
         raise InputError(f"{path} = {shown(value)}: allowed: a number")
-    number, whole = float(value), field.kind == "integer"
+    number, unit, whole = float(value), field.unit(Structure.of(design)), field.kind == "integer"
     if not field.fits(number):
-        allowed = "a whole number, " * whole + field.allowed(field.unit(Structure.of(design)))
-        raise InputError(f"{path} = {number!r}: allowed: {allowed}")
-    return int(number) if whole else number
+        raise InputError(f"{path} = {number!r}: allowed: {'a whole number, ' * whole}{field.allowed(unit)}")
+    number = int(number) if whole else number
+    if old is not None and old.value == number:
+        return old
+    text = si_text(number, unit_in_file(design, path, field))
+    new = Parameter(path=path, text=text, value=number, unit=unit, symbol=field.symbol, source="changed")
+    if old is None:
+        return new
+    grade = old.grade if old.source.startswith("changed") else ""
+    tolerance = None if old.tolerance is None else rescaled(old.tolerance, number)
+    return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
 def unit_in_file(design: Design, path: str, field: Field | None) -> str:
     """The SI unit of a key as a file has to say it; ``"1"`` for what is no key with one."""
     unit = "1" if field is None else field.unit(Structure.of(design))
     return ampere_unit(path, unit, design.motor.constants)
-
-
-def _changed(design: Design, path: str, value: float) -> Parameter:
-    """The pedigree of a changed value."""
-    old, (field, _) = design.parameters.get(path), located(design, path)
-    if old is not None and old.value == value:
-        return old
-    text, unit = si_text(value, unit_in_file(design, path, field)), field.unit(Structure.of(design))
-    new = Parameter(path=path, text=text, value=value, unit=unit, symbol=field.symbol, source="changed")
-    if old is None:
-        return new
-    grade = old.grade if old.source.startswith("changed") else ""
-    tolerance = None if old.tolerance is None else rescaled(old.tolerance, value)
-    return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:

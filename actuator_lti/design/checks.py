@@ -18,7 +18,7 @@ from actuator_lti.design.checks_plant import (
     with_stand_ins,
 )
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
-from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.design.sections import part_at, parts_of
 from actuator_lti.files.reading import shown
@@ -96,17 +96,16 @@ RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 
 def _requirements(design: Design) -> Iterator[Refusal]:
     for number, item in enumerate(design.requirements):
-        yield from readable(_named_once(item, design.requirements[:number]))
-        yield from readable(_limit(item))
-        yield from readable(_asked_of(item, design))
+        for check in (_named_once, _limit, _asked_of):
+            yield from readable(check(design, number, item))
 
 
-def _named_once(item: Requirement, before: tuple[Requirement, ...]) -> Iterator[Refusal]:
-    if any(item.id == other.id for other in before):
+def _named_once(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
+    if any(item.id == other.id for other in design.requirements[:number]):
         yield f"requirement.{item.id}.id", shown(item.id), "allowed: each id once"
 
 
-def _limit(item: Requirement) -> Iterator[Refusal]:
+def _limit(_design: Design, _number: int, item: Requirement) -> Iterator[Refusal]:
     path = f"requirement.{item.id}"
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
@@ -114,7 +113,7 @@ def _limit(item: Requirement) -> Iterator[Refusal]:
         yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
 
 
-def _asked_of(item: Requirement, design: Design) -> Iterator[Refusal]:
+def _asked_of(design: Design, _number: int, item: Requirement) -> Iterator[Refusal]:
     """The loop, the rotor and the response that it is of."""
     path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
     present = {"every", *design.controller.stages}
@@ -122,26 +121,21 @@ def _asked_of(item: Requirement, design: Design) -> Iterator[Refusal]:
         given = "missing" if item.loop is None else shown(item.loop)
         yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
     elif quantity.scope != "loop" and item.loop is not None:
-        yield f"{path}.loop", shown(item.loop), f"{item.quantity} is of the drive, no loop"
+        yield f"{path}.loop", told(item.loop), f"{item.quantity} is of the drive, no loop"
     if item.rotor is not None and not ("current" in present and item.loop in ("current", "every")):
-        yield f"{path}.rotor", shown(item.rotor), "allowed: of the current loop only"
+        yield f"{path}.rotor", told(item.rotor), "allowed: of the current loop only"
     answers = item.loop in ("position", "every") and quantity.of_response
     if item.to is not None and not (answers and "position" in present):
-        yield (
-            f"{path}.to",
-            shown(item.to),
-            "allowed: of bandwidth, resonance and step of the position loop only",
-        )
+        allowed = "allowed: of bandwidth, resonance and step of the position loop only"
+        yield f"{path}.to", told(item.to), allowed
 
 
 def _waivers(design: Design) -> Iterator[Refusal]:
     """Each for a requirement of the file, on one loop or on all, or for a check by simulation."""
     known = {item.id for item in design.requirements}
     seen: set[str] = set()
-    for item in design.waivers:
-        id = item.requirement
-        named = id in known or id.rpartition("/")[0] in known
-        if id in seen or not (named or id.startswith(CHECKS)):
+    for id in (item.requirement for item in design.waivers):
+        if id in seen or not ({id, id.rpartition("/")[0]} & known or id.startswith(CHECKS)):
             allowed = f"each once: a requirement's id, id/loop, or the id of a check ({CHECKS}...)"
             yield f"waiver.{id}.requirement", shown(id), f"allowed: {allowed}"
         seen.add(id)

@@ -11,6 +11,7 @@ from actuator_lti.design.fields import FIELDS, Field, fields_in
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
+from actuator_lti.design.sections import part_at
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
@@ -30,8 +31,8 @@ def _filters(design: Design) -> Iterator[Refusal]:
         path = f"control.velocity.filter.{number}"
         for field in fields_in("control.velocity.filter.*"):
             yield from readable(_filter_key(item, field, f"{path}.{field.key}", nyquist))
-        yield from readable(_biquad(item, path, "b", 3, "1 to 3, b0 b1 b2"))
-        yield from readable(_biquad(item, path, "a", 2, "1 or 2, a1 a2, after a leading 1"))
+        for key, most, words in (("b", 3, "1 to 3, b0 b1 b2"), ("a", 2, "1 or 2, a1 a2, after a leading 1")):
+            yield from readable(_biquad(item, f"{path}.{key}", getattr(item, key), most, words))
 
 
 def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterator[Refusal]:
@@ -46,23 +47,18 @@ def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterat
         yield path, f"{value:.6g} rad/s", allowed
 
 
-def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterator[Refusal]:
-    """Its numerator ``b`` or its denominator ``a``."""
-    if item.kind != "biquad":
-        return
-    values = getattr(item, key)
-    if len(values) > most:
-        yield f"{path}.{key}", f"{len(values)} values", f"allowed: {words}"
-    elif key == "a" and not stable_pair(*(*values, 0.0, 0.0)[:2]):
-        yield f"{path}.a", f"{list(values)}", "allowed: poles inside the unit circle"
+def _biquad(item: Filter, path: str, values: Any, most: int, words: str) -> Iterator[Refusal]:
+    """Its numerator or its denominator, of two at most."""
+    if item.kind == "biquad" and len(values) > most:
+        yield path, f"{len(values)} values", f"allowed: {words}"
+    elif item.kind == "biquad" and most == 2 and not stable_pair(*(*values, 0.0, 0.0)[:2]):
+        yield path, f"{list(values)}", "allowed: poles inside the unit circle"
 
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
     velocity = design.controller.velocity
-    if velocity is None:
-        return
     for place in get_args(FilterPlace):
-        count = len(velocity.filters_on(place))
+        count = 0 if velocity is None else len(velocity.filters_on(place))
         if count > MAX_FILTERS:
             yield "control.velocity.filter", f"{count} on {place}", f"allowed: at most {MAX_FILTERS}"
 
@@ -80,19 +76,19 @@ def _tracking(design: Design) -> Iterator[Refusal]:
         yield "encoder.bandwidth", f"{w0:.6g} rad/s", allowed
 
 
-def _anti_windup(design: Design) -> Iterator[Refusal]:
-    for name in ("velocity", "current"):
-        loop, path = getattr(design.controller, name), f"control.{name}"
-        if loop is not None and loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
-            allowed = 'allowed with anti_windup = "back-calculation"'
-            yield f"{path}.tracking_time", f"{loop.tracking_time_s:g} s", allowed
-
-
 def _windup(design: Design) -> Iterator[Refusal]:
     for name in ("velocity", "current"):
         loop = getattr(design.controller, name)
         if loop is not None and loop.integral_time_s is None and loop.anti_windup != "conditional":
             yield f"control.{name}.anti_windup", f'"{loop.anti_windup}"', "needs integral_time"
+
+
+def _tracking_time(design: Design) -> Iterator[Refusal]:
+    for name in ("velocity", "current"):
+        loop = getattr(design.controller, name)
+        if loop is not None and loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
+            allowed = 'allowed with anti_windup = "back-calculation"'
+            yield f"control.{name}.tracking_time", f"{loop.tracking_time_s:g} s", allowed
 
 
 def _multiples(design: Design) -> Iterator[Refusal]:
@@ -111,9 +107,9 @@ def _fed_forward(key: str) -> Rule:
     )
 
 
-# of a key of the command: power of its unit, the key that it needs, the limit that it has to keep
-_PROFILE = {"rate": ("", "", "speed"), "acceleration": ("^2", "rate", "acceleration"),
-            "jerk": ("^3", "acceleration", "")}  # fmt: skip
+# of a key of the command: SI unit, the key that it needs, the limit that it has to keep
+_PROFILE = {"rate": ("/s", "", "speed"), "acceleration": ("/s^2", "rate", "acceleration"),
+            "jerk": ("/s^3", "acceleration", "")}  # fmt: skip
 
 
 def _command_filter(design: Design) -> Iterator[Refusal]:
@@ -121,52 +117,45 @@ def _command_filter(design: Design) -> Iterator[Refusal]:
     control, filter_time_s = design.controller, design.command.filter_time_s
     period_s = control.period_s * _every(design, control.outermost)
     if 0.0 < filter_time_s <= period_s / pi:
-        least = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
-        yield "command.filter_time", _written(design, "filter_time", filter_time_s), least
+        allowed = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
+        yield _written(design, "filter_time", filter_time_s, "s", allowed)
 
 
 def _command(design: Design) -> Iterator[Refusal]:
-    for key, (_, outer, limiter) in _PROFILE.items():
-        value = _of(design.command, f"command.{key}")
-        yield from readable(_needed(design, key, value, outer))
-        yield from readable(_slow_enough(design, key, value, limiter))
+    for key, (per, outer, limiter) in _PROFILE.items():
+        value, unit = _of(design, f"command.{key}"), ("m" if design.axis == "linear" else "rad") + per
+        yield from readable(_needed(design, key, value, unit, outer))
+        yield from readable(_slow_enough(design, key, value, unit, limiter))
 
 
-def _of(part: Any, path: str) -> Any:
-    """The value of a key in the part that holds it."""
-    return getattr(part, FIELDS[path].attribute)
+def _of(design: Design, path: str) -> Any:
+    """The value of a key of a table that is always there."""
+    return getattr(part_at(design, FIELDS[path].section), FIELDS[path].attribute)
 
 
-def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refusal]:
+def _needed(design: Design, key: str, value: float, unit: str, outer: str) -> Iterator[Refusal]:
     if value == inf:
         return
     if design.controller.position is None:
-        yield f"command.{key}", _written(design, key, value), "allowed with a position loop"
-    if outer and _of(design.command, f"command.{outer}") == inf:
-        yield f"command.{key}", _written(design, key, value), f"needs command.{outer}"
+        yield _written(design, key, value, unit, "allowed with a position loop")
+    if outer and _of(design, f"command.{outer}") == inf:
+        yield _written(design, key, value, unit, f"needs command.{outer}")
 
 
-def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
-    limit = _of(design.limits, f"limits.{limiter}") if limiter else inf
-    ratio, unit = design.total_ratio, _unit(design, key)
+def _slow_enough(design: Design, key: str, value: float, unit: str, limiter: str) -> Iterator[Refusal]:
+    limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
         allowed = f"faster than limits.{limiter}; allowed: at most {most} at the output"
-        yield f"command.{key}", _written(design, key, value), allowed
+        yield _written(design, key, value, unit, allowed)
 
 
-def _unit(design: Design, key: str) -> str:
-    """SI unit of a key of the command."""
-    angle = "m/s" if design.axis == "linear" else "rad/s"
-    return angle + _PROFILE[key][0] if key in _PROFILE else "s"
-
-
-def _written(design: Design, key: str, value: float) -> str:
+def _written(design: Design, key: str, value: float, unit: str, allowed: str) -> Refusal:
     """A key of the command as the file has it, else in SI."""
     parameter = design.parameters.get(f"command.{key}")
-    return f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
+    return f"command.{key}", f"{value:.6g} {unit}" if parameter is None else parameter.text, allowed
 
 
 def _jitter(design: Design) -> Iterator[Refusal]:
@@ -247,7 +236,7 @@ CONTROL_CHECKS: tuple[Check, ...] = (
     Rule("control.computing_delay", "{d.controller.computing_delay_s:g} s",
          "allowed: at most 100 ticks of {d.controller.period_s:g} s",
          lambda d: d.controller.computing_delay_s > 100 * d.controller.period_s),
-    _filters, _filter_count, _tracking, _anti_windup, _windup,
+    _filters, _filter_count, _tracking, _tracking_time, _windup,
     *map(_fed_forward, FEED_FORWARD),
     _command, _command_filter, _laws, _jitter,
 )  # fmt: skip

@@ -8,12 +8,11 @@ from dataclasses import replace
 from math import inf, isclose, log, pi
 from typing import Any
 
-from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
+from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import MotorConstants, Temperature, no_load_speed
+from actuator_lti.design.plant import MotorConstants, no_load_speed
 from actuator_lti.design.sections import part_at
 from actuator_lti.design.spellings import split_quantity
-from actuator_lti.files.reading import shown
 
 MAX_MAP_POINTS = 16  # of each direction
 _ELECTRICAL = {
@@ -63,13 +62,13 @@ def check_motor(design: Design) -> Iterator[Refusal]:
             yield f"motor.{key}", "", f"missing; allowed: {words}{_without(key, design)}"
     kM, kE = _constants(design)
     if kM is not None and kE is not None and _apart(kM, kE):
-        wanted, ratio = given["back_emf_constant"] * kM / kE, _ratio(motor, kE / kM)
+        key, wanted = "back_emf_constant", given["back_emf_constant"] * kM / kE
         allowed = (
-            f"allowed: within 10 % of {wanted:g}{_as_written(design, 'back_emf_constant', kM / kE)}, as "
+            f"allowed: within 10 % of {wanted:g}{_as_written(design, key, kM / kE)}, as "
             f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
-            f"constant){ratio}"
+            "constant)"
         )
-        yield "motor.back_emf_constant", _stated(design, "back_emf_constant"), allowed
+        yield f"motor.{key}", _stated(design, key), f"{allowed}{_ratio(motor, kE / kM)}"
 
 
 def _constants(design: Design) -> tuple[Any, Any]:
@@ -135,32 +134,33 @@ def _as_written(design: Design, key: str, times: float) -> str:
 
 def _without(key: str, design: Design) -> str:
     """What to write where the sheet does not have it."""
-    other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key, "")
+    if key == "inductance":
+        small = "0.1 to 1 ms of a small motor"
+        return f"; where the sheet has none, R times the electrical time constant, {small}"
+    other = {"torque_constant": "back_emf_constant", "back_emf_constant": "torque_constant"}.get(key)
     held = getattr(design.motor, _ELECTRICAL[other]) if other else None
-    if held is not None:
-        ratio, words = _TORQUE_OVER_VOLTAGE[design.motor.constants]
-        sign = "times" if key == "torque_constant" else "over"
-        same = f"of a DC motor it is the number of motor.{other}"
-        if words != "1":
-            same = f"with these motor.constants it is motor.{other} {sign} {words}"
-        p = 1.0 if design.screw is None else design.screw.travel_m_rad  # constants of the motor's own shaft
-        angle = "m" if design.axis == "linear" and design.screw is None else "rad"
-        unit = "N*m/A" if key == "torque_constant" else f"V*s/{angle}"
-        unit = unit.replace("N*m", "N") if angle == "m" else unit
-        return f"; {same} in SI, {held * p * (ratio if sign == 'times' else 1.0 / ratio):g} {unit}"
-    usual = "; where the sheet has none, R times the electrical time constant, 0.1 to 1 ms of a small motor"
-    return usual if key == "inductance" else ""
+    if held is None:
+        return ""
+    torque, (ratio, words) = key == "torque_constant", _TORQUE_OVER_VOLTAGE[design.motor.constants]
+    same = f"with these motor.constants it is motor.{other} {'times' if torque else 'over'} {words}"
+    same = f"of a DC motor it is the number of motor.{other}" if words == "1" else same
+    p = 1.0 if design.screw is None else design.screw.travel_m_rad  # constants of the motor's own shaft
+    linear = design.axis == "linear" and design.screw is None
+    units = ("N/A", "V*s/m") if linear else ("N*m/A", "V*s/rad")
+    number = held * p * (ratio if torque else 1.0 / ratio)
+    return f"; {same} in SI, {number:g} {units[0] if torque else units[1]}"
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:
     """What heat leaves of R, kM and kE."""
     if (heat := design.temperature) is not None:
-        yield from readable(_hot(heat, "winding", heat.winding_degC, heat.resistance_per_K))
-        yield from readable(_hot(heat, "magnet", heat.magnet_degC, heat.magnet_per_K))
+        yield from readable(_hot(heat, "winding", "resistance_per_K"))
+        yield from readable(_hot(heat, "magnet", "magnet_per_K"))
 
 
-def _hot(heat: Temperature, key: str, value: float, per_K: float) -> Iterator[Refusal]:
-    if 1.0 + per_K * (value - heat.reference_degC) < 0.05:
+def _hot(heat: Any, key: str, per_K: str) -> Iterator[Refusal]:
+    value = getattr(heat, f"{key}_degC")
+    if 1.0 + getattr(heat, per_K) * (value - heat.reference_degC) < 0.05:
         yield f"temperature.{key}", f"{value:g} degC", "R, kM and kE must keep 5 % of their value"
 
 
@@ -174,8 +174,7 @@ def _no_gear(design: Design, path: str, attribute: str) -> Iterator[Refusal]:
     name, names = getattr(part_at(design, path), attribute, None), [gear.name for gear in design.gears]
     if name is not None and name not in names:
         known = ", ".join(names) or "none, as there are no gears; leave it out"
-        given = "" if name is UNREAD else shown(name)
-        yield f"{path}.{attribute}", given, f"is no gear; allowed: {known}"
+        yield f"{path}.{attribute}", told(name), f"is no gear; allowed: {known}"
 
 
 def _locking(design: Design) -> Iterator[Refusal]:
@@ -193,11 +192,9 @@ def _locking(design: Design) -> Iterator[Refusal]:
     drivable = 'or load.path = "back-drivable"'  # the default locks itself
     if design.gears_before_coupling < locks:
         behind = ", ".join(f"{name}" for name in names[locks - 1 :])  # stops at one that could not be read
-        allowed = (
-            f"lies before the self-locking stage; allowed: {behind}, "
-            f"load.locking_gear with a gear before the coupling, {drivable}"
-        )
-        yield "coupling.after", f'"{coupling.after or ""}"', allowed
+        ways = f"{behind}, load.locking_gear with a gear before the coupling, {drivable}"
+        given = f'"{coupling.after or ""}"'
+        yield "coupling.after", given, f"lies before the self-locking stage; allowed: {ways}"
     elif coefficient < least * (1 - 1e-12):
         reason = "a self-locking stage with less than 1/N gives energy"
         allowed = f"{reason}; allowed: at least {least:g}, {drivable}"

@@ -38,12 +38,9 @@ ABSENT = 0.0
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
-    """The speed measurement: w itself, a difference of angles, or a tracking loop; perhaps filtered.
+    """The measurement of angle and speed at the motor (model.md section 7).
 
-    The difference spans ``difference_samples`` m velocity periods.
-
-    ``counts_per_rev`` is per motor revolution after quadrature (linear axis: per metre); ``None`` is an
-    encoder without quantisation.  ``bandwidth_rad_s`` is w0 of the tracking loop (model.md section 7).
+    Without ``counts_per_rev`` there is no quantisation.
     """
 
     counts_per_rev: Annotated[int | None, integer("counts per motor revolution after quadrature (linear "
@@ -67,11 +64,7 @@ class OutputEncoder:
 
 @dataclass(frozen=True, kw_only=True)
 class Instruments:
-    """Errors of the drive's own measurements; 0 is an ideal one.
-
-    Noise is white, normal, of the stated rms value, new at every sample; jitter is the rms deviation of the
-    sampling instant.  ``seed`` makes a run repeatable.
-    """
+    """Errors of the drive's own measurements; noise is white, normal, new at every sample."""
 
     current_resolution_A: Annotated[float, not_negative("step of the measured current", example="5 mA")] = 0.0
     current_noise_A: Annotated[float, not_negative("noise of the current, rms", example="2 mA")] = 0.0
@@ -82,12 +75,6 @@ class Instruments:
     jitter_s: Annotated[float, not_negative("deviation of the sampling instant, rms", high=1.0,
         example="1 us")] = 0.0
     seed: Annotated[int, integer("seed of the noise, so that a run can be repeated", 2**31, low=0)] = 0
-
-    @property
-    def ideal(self) -> bool:
-        """Whether nothing is to be simulated."""
-        errors = (self.current_resolution_A, self.current_noise_A, self.angle_noise_rad)
-        return not any((*errors, self.output_angle_noise_rad, self.jitter_s))
 
 
 def stable_pair(a1: float, a2: float) -> bool:
@@ -156,10 +143,7 @@ class Filter:
 
 @dataclass(frozen=True, kw_only=True)
 class CurrentLoop:
-    """Current PI, every tick: V = gain (e + integral of e / integral_time) + feed-forward.
-
-    The shares of back-EMF and resistance voltage that are fed forward, kE w_meas and R i_ref, are 0 to 1.
-    """
+    """Current PI, every tick: V = gain (e + integral of e / integral_time) + feed-forward."""
 
     gain_V_A: Annotated[float, positive("gain of the current PI; of a dq controller in V/A phase; a "
         "bandwidth, 500 Hz, is taken times L", "Kp_i", example="20 mohm", required=True)] = ABSENT
@@ -176,10 +160,7 @@ class CurrentLoop:
 
 @dataclass(frozen=True, kw_only=True)
 class VelocityLoop:
-    """Velocity PI (P where integral_time_s is None), every ``every`` ticks.
-
-    The gain is in A s/rad where a current loop follows, in V s/rad where the voltage does.
-    """
+    """Velocity PI; its gain is in A s/rad where a current loop follows, in V s/rad where the voltage does."""
 
     gain: Annotated[float, positive("gain of the velocity PI; in N*m*s/rad it is taken over kM, a "
         "bandwidth, 40 Hz, times J/kM", "Kp_w", unit="{drive}*s/{angle}",
@@ -204,11 +185,10 @@ FEED_FORWARD = ("feedforward", "acceleration_feedforward", "friction_feedforward
 
 @dataclass(frozen=True, kw_only=True)
 class PositionLoop:
-    """Position P, PI or PID, every ``every`` ticks (model.md section 7).
+    """Position P, PI or PID (model.md section 7).
 
-    The gain is in 1/s where a velocity loop follows, else in A/rad or V/rad (motor side).  The acceleration
-    feed-forward is a share of J/kM times the command's acceleration; the friction feed-forward is the current
-    (A; V without a current loop) whose sign follows the command's motion.
+    The gain is in 1/s where a velocity loop follows, else in A/rad or V/rad (motor side); the friction
+    feed-forward in A, without a current loop in V.
     """
 
     gain: Annotated[float, positive("gain of the position P controller; without a velocity loop in A or V "
@@ -239,11 +219,7 @@ class PositionLoop:
 
 @dataclass(frozen=True, kw_only=True)
 class Command:
-    """What the drive makes of a command before its outermost loop: a profile, then a filter.
-
-    Rate, acceleration and jerk limits hold at the output shaft (``inf``: none).  The filter is a low-pass of
-    order 1 or 2 with the time constant ``filter_time_s`` (order 2: damping ``filter_damping``).
-    """
+    """What the drive makes of a command before its outermost loop: a profile, then a low-pass filter."""
 
     filter_time_s: Annotated[float, not_negative("time constant of the command filter", high=1e4,
         example="5 ms")] = 0.0

@@ -41,11 +41,6 @@ def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
     name_or_path : str or path
         A shipped name (see :func:`shipped_designs`), else the path of a TOML file of at most 1 MiB.
 
-    Returns
-    -------
-    Design
-        In SI units, checked.
-
     Raises
     ------
     InputError
@@ -111,10 +106,9 @@ def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -
     """
     if not isinstance(text, str):
         raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
-    tree = parse_toml(text, origin)
-    if not tree:
-        raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
-    return design_from_tree(tree, origin, lines_of(text, tree), folder)
+    if tree := parse_toml(text, origin):
+        return design_from_tree(tree, origin, lines_of(text, tree), folder)
+    raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
 
 
 def design_from_tree(

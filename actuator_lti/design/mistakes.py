@@ -40,6 +40,11 @@ def refusal_text(refusal: Refusal) -> str:
     return f"{shown(path, 200)[1:-1]}{f' = {value}' if value else ''}: {reason}"
 
 
+def told(value: object) -> str:
+    """A value as `Refusal` has it: quoted and short, nothing of one that could not be read."""
+    return "" if value is UNREAD else shown(value)
+
+
 class UnreadError(Exception):
     """Something was to be decided by a value that could not be read."""
 

@@ -89,10 +89,10 @@ class Gear:
 
 @dataclass(frozen=True, kw_only=True)
 class Screw:
-    """A screw, rack or belt between a rotary motor and a linear axis: travel per revolution.
+    """A screw, rack or belt between a rotary motor and a linear axis.
 
-    It lets the motor's data sheet stand in its own units: with p = lead/2 pi a torque T is the force T/p, an
-    angle x the travel p x, an inertia J the mass J/p^2.  Gears before the screw keep their ratios.
+    With p = lead/2 pi a torque T is the force T/p, an angle x the travel p x, an inertia J the mass J/p^2.
+    Gears before the screw keep their ratios.
     """
 
     lead_m: Annotated[float, positive("travel per revolution of the screw: with it the motor's values may "
@@ -108,9 +108,8 @@ class Screw:
 class Coupling:
     """The elastic coupling between the motor's side and the load's side (model.md section 6).
 
-    Stiffness k, damping c and play (total, 2 b) are those at its own shaft, which is the output shaft of the
-    gear ``after`` (``None``: of the last gear, or of the motor where there are no gears).  The stiffness may
-    bend as data sheets of strain wave gears state it: K1 up to the torque T1, K2 up to T2, K3 beyond.
+    Its own shaft is the output shaft of the gear ``after`` (``None``: of the last gear, or of the motor where
+    there are no gears).
     """
 
     stiffness_Nm_rad: Annotated[float, positive("stiffness at the coupling's own shaft; of a strain wave "
@@ -208,6 +207,15 @@ def no_load_speed(design: "Design") -> float:
     """Speed at which the back-EMF equals the supply, U/kE; infinite for an ideal source."""
     kE = design.effective_motor.back_emf_constant_Vs_rad
     return inf if kE is None else design.limits.voltage_V / kE
+
+
+def torque_per_command(design: "Design") -> Any:
+    """Torque per ampere of the current loop, or per volt where there is none."""
+    motor = design.effective_motor
+    if motor.source_gain_Nm_V is not None:
+        return motor.source_gain_Nm_V
+    kM: Any = motor.torque_constant_Nm_A
+    return kM if design.controller.current is not None else kM / motor.resistance_ohm
 
 
 def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, str]:
@@ -310,9 +318,7 @@ class FrictionPoint:
 class Friction:
     """Friction at the motor shaft: dry ``Tc = C0 + CM |M_ext|`` plus viscous ``Cv w`` (paper, equation 9).
 
-    ``dry_torque_reverse_Nm`` and ``viscous_reverse_Nms_rad`` hold for w < 0 where they differ; ``None``
-    means symmetric.  ``offset_torque_Nm`` is a constant torque that opposes positive motion.  ``points`` is a
-    friction map that takes the place of C0 and Cv (model.md section 6); CM and the offset add.
+    ``points`` is a map in place of C0 and Cv (model.md section 6), to which CM and the offset add.
     """
 
     law: Annotated[FrictionLaw, choice("dry friction with stick, or smoothed by tanh")] = "coulomb"

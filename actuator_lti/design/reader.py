@@ -10,7 +10,6 @@ from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from datetime import date
-from math import isinf, pi, sqrt
 from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
@@ -18,14 +17,16 @@ from actuator_lti.design import model
 from actuator_lti.design.asked import FrozenMap, default_deflection
 from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
-from actuator_lti.design.field import Axis, Field, Structure
+from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.spellings import split_quantity
+from actuator_lti.design.stated import CONVENTION, Frame
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
 from actuator_lti.errors import InputError
@@ -36,37 +37,15 @@ MAX_GEARS = 20
 MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
-_FIELD_OF_LEAD = FIELDS["screw.lead"]
-_CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
-_DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
-_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
-_AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
-_PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
-_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
-PHASE = "V/A phase"
-_UPSIDE_DOWN = {
-    "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),
-    "motor.cogging_periods": (2.0 * pi, "{angle}"),
-    "control.period": (2.0 * pi, "rad/s"),
-}
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
-
-
-def _torque(design: model.Design) -> Any:
-    """Torque per ampere of the current loop, or per volt."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V
-    kM: Any = motor.torque_constant_Nm_A
-    return kM if design.controller.current is not None else kM / motor.resistance_ohm
 
 
 GAINS: dict[str, dict[str, Per]] = {
     "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H or UNREAD},
     "control.velocity.gain": {
-        "rad/s": lambda design: design.inertia_kgm2 / _torque(design),
-        "{torque}*s/{angle}": lambda design: 1.0 / _torque(design),
+        "rad/s": lambda design: design.inertia_kgm2 / torque_per_command(design),
+        "{torque}*s/{angle}": lambda design: 1.0 / torque_per_command(design),
     },
 }
 """Gains that controllers state by what they do, the loop's bandwidth or a torque: unit, gain per that."""
@@ -75,28 +54,28 @@ GAINS: dict[str, dict[str, Per]] = {
 def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     """The design of a tree, `UNREAD` where there are findings; relations between its keys are `checks`."""
     reader = Reader(tree, findings)
-    values, _ = reader.values("design", tree.get("design"), "design")
-    tables = ["design", *(item.key for item in children("")), *(item.key for item in RECORDS), "objects"]
-    meant = reader.known(tree, tables, "")
+    head, _ = reader.values("design", tree.get("design"), "design")
+    meant = reader.known(tree, [*(item.key for item in (_HEAD, *children(""), *RECORDS)), "objects"], "")
     parts = reader.tables("", tree, meant)
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
     # 10 deg (0.01 m) without a load where the file does not say what to validate
     fallback = model.Validation(full_deflection_rad=default_deflection(reader.structure.axis))
-    name = values.setdefault("name", UNREAD)
-    values["title"] = UNREAD if values.get("title") is UNREAD else values.get("title") or name
-    design = model.Design(
-        **{**values, "validation": fallback, **parts, **records}, objects=objects, origin=origin
+    name, title = head.setdefault("name", UNREAD), head.get("title")
+    head["title"] = title if title is UNREAD else title or name
+    design = reader.with_gains(
+        model.Design(**{**head, "validation": fallback, **parts, **records}, objects=objects, origin=origin)
     )
-    design = reader.with_gains(design)
     design = replace(design, parameters=FrozenMap(reader.parameters))
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
-    try:
+    with suppress(UnreadError):
         return replace(design, friction=UNREAD) if contradicted else sheet.read_into(design)
-    except UnreadError:
-        return replace(design, friction=UNREAD)
+    return replace(design, friction=UNREAD)
+
+
+_HEAD = Section("design", "", model.Design)
 
 
 class Reader:
@@ -110,11 +89,24 @@ class Reader:
         head, control, motor = (
             tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
         )
-        axis, self.constants = _meant(head, "design.axis"), _meant(motor, "motor.constants")
         stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
-        self.structure = Structure(axis, "velocity" in stages, "current" in stages)
-        self.travel_m_rad: float | None = None
-        self.travel_m_rad = self._travel(tree.get("screw"))
+        self.structure = Structure(_meant(head, "design.axis"), "velocity" in stages, "current" in stages)
+        self.frame = Frame(self.structure, _meant(motor, "motor.constants"))
+        self.frame = replace(self.frame, travel_m_rad=self._travel(tree.get("screw")))
+
+    def _travel(self, screw: Any) -> float | None:
+        """p of the screw, needed before anything else is read; None without one."""
+        if screw is None:
+            return None
+        if self.structure.axis != "linear":
+            self.refuse("screw", screw, 'allowed with design.axis = "linear"')
+        lead: Any = screw.get("lead") if isinstance(screw, dict) else None
+        lead = lead.get("value") if isinstance(lead, dict) else lead
+        field, lead_m = FIELDS["screw.lead"], 0.01
+        with suppress(InputError, TypeError):  # told where the lead itself is read
+            value = self.frame.quantity(lead, field)
+            lead_m = value if field.accepts(value) else lead_m
+        return model.Screw(lead_m=lead_m).travel_m_rad
 
     def refuse(self, path: str, value: object, reason: str) -> Any:
         """Note the mistake of one key, which is unread."""
@@ -184,17 +176,16 @@ class Reader:
             return self.limit(table.get("quantity"), raw, path)
         if field.is_number and field.path in FIELDS:
             return self.entry(field, raw, path, self.parameters)
-        if reads := {"quantities": self.numbers, "matrix": self.rows, "names": self.words}.get(field.kind):
+        lists = {"quantities": self.numbers, "matrix": self.rows, "names": self.words}
+        if reads := self.number if field.is_number else lists.get(field.kind):
             return reads(field, raw, path)
-        if field.is_number:
-            return self.number(field, raw, path)
         raw = raw.isoformat() if field.kind == "day" and isinstance(raw, date) else raw
         if _fits(field, raw):
             return raw
         hint = nearest(raw, field.choices).strip() if isinstance(raw, str) else ""
         return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {field.allowed('1')}")
 
-    def words(self, field: Field, raw: Any, path: str) -> tuple[str, ...]:
+    def words(self, field: Field, raw: Any, path: str) -> Any:
         """Some of the words that a key may have, each once."""
         known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
         texts = all(isinstance(word, str) for word in known)
@@ -219,7 +210,7 @@ class Reader:
             if template == "rad/s" and not _BANDWIDTH.search(table["value"]):
                 continue
             with suppress(InputError):
-                size = self.quantity(table["value"], replace(field, unit_template=template))
+                size = self.frame.quantity(table["value"], replace(field, unit_template=template))
                 self.gains[path] = field, table, size, per
                 return UNREAD
         return self.kept(field, table, self.number(field, table["value"], path), path, into)
@@ -247,10 +238,9 @@ class Reader:
                 if not field.accepts(value):
                     self.refuse(path, table["value"], f"allowed: {field.allowed(unit)}")
                     continue
-                text = si_text(value, ampere_unit(path, unit, self.constants))
+                text = si_text(value, ampere_unit(path, unit, self.frame.constants))
                 source = "; ".join(filter(None, (f"from {table['value']}", table.get("source"))))
-                table = {**table, "value": text, "source": source}
-                self.kept(field, table, value, path, self.parameters)
+                self.kept(field, {**table, "value": text, "source": source}, value, path, self.parameters)
                 part = replace(part_at(design, field.section), **{field.attribute: value})
                 design = with_part(design, field.section, part)
         return design
@@ -261,7 +251,7 @@ class Reader:
             return None
         unit = field.unit(self.structure)
         try:
-            return read_tolerance(raw, value, lambda text: self.quantity(text, field), field, unit)
+            return read_tolerance(raw, value, lambda text: self.frame.quantity(text, field), field, unit)
         except InputError as error:
             at = f"{path}.{error.where}" if error.where else path
             return self.refuse(at, raw if error.where is None else raw[error.where], error.message)
@@ -281,119 +271,39 @@ class Reader:
 
     def number(self, field: Field, raw: Any, path: str) -> Any:
         """A number in SI."""
-        unit = field.unit(self.structure)
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, f"allowed: a number with its unit, as text{_example(field)}")
         try:
-            value = self.quantity(raw, field)
+            value = self.frame.quantity(raw, field)
         except InputError as error:
-            return self.refuse(path, raw, f"{error.message}{self._other_axis(raw, field)}")
+            return self.refuse(path, raw, f"{error.message}{self.frame.other_axis(raw, field)}")
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
-            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}")
+            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}")
         return int(value) if field.kind == "integer" else value
-
-    def _other_axis(self, raw: Any, field: Field) -> str:
-        """That a unit would be one of the other kind of axis."""
-        axis: Axis = "linear" if self.structure.axis == "rotary" else "rotary"
-        unit = field.unit(replace(self.structure, axis=axis))
-        try:
-            parse_quantity(raw, unit)
-        except InputError:
-            return ""
-        return f'; {unit} with design.axis = "{axis}"' if unit != field.unit(self.structure) else ""
-
-    def quantity(self, text: Any, field: Field) -> float:
-        """The SI value of a text; behind a screw also from the units of a rotary axis.
-
-        A speed constant is read as the back-EMF constant that it is upside down (that of a motor stated per
-        phase is line-line, as makers have it), a sampling rate as its period, a magnet pitch as its order,
-        amperes rms or peak as those of the motor that the model has.
-        """
-        unit, power = field.unit(self.structure), field.travel_power()
-        if isinstance(text, str) and (field is _FIELD_OF_LEAD or field.key == "counts_per_rev"):
-            text = _PER_TURN.sub("", text)
-        if isinstance(text, str) and (convention := _CONVENTION.search(text)):
-            plain = _CONVENTION.sub(" dc", text)
-            return self.quantity(plain, field) * self._amperes(field, unit, convention[1].lower())
-        rotary = field.unit(replace(self.structure, axis="rotary"))
-        factors = {unit: 1.0}
-        if self.travel_m_rad is not None and power and rotary != unit:
-            factors = {rotary: self.travel_m_rad**power, unit: 1.0}
-        refused: list[InputError] = []
-        for one, factor in factors.items():
-            try:
-                value = parse_quantity(text, one) * factor
-            except InputError as error:
-                refused.append(error)
-            else:
-                return self._said(text, field, value)
-            if field.path in _UPSIDE_DOWN and (turned := _turned(field.path, text, one)) is not None:
-                line = field.section == "motor" and self.constants == "peak-phase"
-                return turned * factor / (sqrt(3.0) if line else 1.0)
-        raise refused[-1 if field.section in ("load", "command", "validation") else 0]
-
-    def _said(self, text: Any, field: Field, value: float) -> float:
-        """The value, unless an AC motor has several amperes that the text may mean."""
-        unit = field.unit(self.structure)
-        which = ampere_unit(field.path, unit, self.constants)
-        if which == unit or value == 0.0 or isinf(value) or not isinstance(text, str) or _DIRECT.search(text):
-            return value
-        own = which.replace("dc", "rms" if self.constants == "rms-line" else "peak")
-        volts, phase = "", ""
-        if unit.startswith("V/A"):
-            volts, phase = ", volts line-line", f"; of a dq controller, of a phase: {PHASE}"
-        raise InputError(
-            "which amperes of the AC motor is not said; "
-            f"allowed: {own} (its data sheet's{volts}) or {which} (the model's){phase}"
-        )
-
-    def _amperes(self, field: Field, unit: str, convention: str) -> float:
-        """From amperes rms or peak to those of the model: i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak.
-
-        Constants of the motor become those of its convention, rms or peak; kE against kM tells a wrong one.
-        """
-        if convention == "phase" and self.constants != "dc":
-            return _per_phase(unit)
-        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
-        if self.constants == "dc":
-            phase = ", where R and L are per phase" if given == "peak-phase" else ""
-            plain = "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
-            if not _AMPERE.search(unit):
-                plain = "beside the constants of a DC motor: V, the peak line-line, sqrt(2) times the rms"
-            raise InputError(f'allowed: with motor.constants = "{given}"{phase}; {plain}')
-        own = field.section == "motor"
-        above, _, below = unit.partition("/")
-        sized = _SIZED if own else _AMPERE
-        power = len(sized.findall(above)) - len(sized.findall(below))
-        if not (own or power):
-            raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
-        return float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
         """A limit in the unit in which its quantity is reported."""
         known = QUANTITIES.get(quantity) if isinstance(quantity, str) else None
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")
-        if known is None:
-            return UNREAD
         try:
-            return parse_limit(raw, known.unit_for(self.structure.axis))
+            return UNREAD if known is None else parse_limit(raw, known.unit_for(self.structure.axis))
         except (InputError, ValueError) as error:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 
     def part(self, section: Section, raw: Any, path: str) -> Any:
         """What one table becomes, with the tables inside it."""
-        inner = children(section.path)
+        named = section.many == "named"
         raw = _rows_flat(raw) if issubclass(section.kind, model.StateSpace) else raw
         raw = self.law(raw, path) if section.kind is model.Law else raw
-        names = [*(item.key for item in inner), *(["name"] if section.many == "named" else [])]
+        names = [*(item.key for item in children(section.path)), *["name"] * named]
         values, meant = self.values(section.template, raw, path, names)
         if not isinstance(raw, dict):
             return UNREAD
         values |= self.tables(section.path, raw, meant)
-        if section.many == "named":
+        if named:
             values["name"] = raw["name"] if path == f"{section.path}.{raw.get('name')}" else UNREAD
         if section.kind is model.Requirement:
             known = QUANTITIES.get(f"{raw.get('quantity')}")
@@ -455,9 +365,8 @@ class Reader:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
             plain = re.sub(r"[^A-Za-z0-9 _/:+()-]+", "-", f"{name}").strip(" _/:+()-")[:60].strip(" /:(")
-            plain = plain or "first"
-            allowed = f'allowed: 1 to 64 letters, digits, spaces and - _ / : + ( ), no dot, as "{plain}"'
-            self.refuse(f"{numbered}.name", name, allowed)
+            allowed = "allowed: 1 to 64 letters, digits, spaces and - _ / : + ( ), no dot, as"
+            self.refuse(f"{numbered}.name", name, f'{allowed} "{plain or "first"}"')
         elif path in before:
             self.refuse(f"{numbered}.name", name, "allowed: each name once")
         else:
@@ -471,19 +380,6 @@ class Reader:
         except InputError as error:
             self.unread("objects", error.message)
         return model.ControllerObjects()
-
-    def _travel(self, screw: Any) -> float | None:
-        """p of the screw, needed before anything else is read; None without one."""
-        if screw is None:
-            return None
-        if self.structure.axis != "linear":
-            self.refuse("screw", screw, 'allowed with design.axis = "linear"')
-        lead: Any = screw.get("lead") if isinstance(screw, dict) else None
-        lead = lead.get("value") if isinstance(lead, dict) else lead
-        with suppress(InputError, TypeError):  # told where the lead itself is read
-            if _FIELD_OF_LEAD.accepts(value := self.quantity(lead, _FIELD_OF_LEAD)):
-                return model.Screw(lead_m=value).travel_m_rad
-        return model.Screw(lead_m=0.01).travel_m_rad
 
 
 def _meant(table: Tree, path: str) -> Any:
@@ -519,11 +415,10 @@ def _time_said(word: str, table: Tree, key: str) -> str:
         return ""
     named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
     texts = [f"{table.get(one)}" for one in (named, key)]
-    if _CONVENTION.findall(texts[0]) != _CONVENTION.findall(texts[1]):  # amperes of two kinds
+    if CONVENTION.findall(texts[0]) != CONVENTION.findall(texts[1]):  # amperes of two kinds
         return ""
-    gain, own = (_CONVENTION.sub("", text) for text in texts)
-    quotients = [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]
-    for quotient in quotients:
+    gain, own = (CONVENTION.sub("", text) for text in texts)
+    for quotient in [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]:
         with suppress(ValueError, ZeroDivisionError):
             (a, of), (b, per) = map(split_quantity, quotient)
             time_s = parse_quantity(f"{a / b!r} ({of or 1})/({per})", "s/rad")
@@ -534,20 +429,3 @@ def _time_said(word: str, table: Tree, key: str) -> str:
 def _example(field: Field) -> str:
     example = f'example: {field.key} = "{field.example}" ({field.description})'
     return f"; {example if field.example else field.description}"
-
-
-def _turned(path: str, text: Any, unit: str) -> float | None:
-    """A value that data sheets state upside down: ``"83.4 rpm/V"``, ``"16 kHz"``."""
-    one, turned = _UPSIDE_DOWN[path]
-    try:
-        value = parse_quantity(text, turned.format(angle=unit.rpartition("/")[2]))
-    except InputError:
-        return None
-    return one / value if value > 0.0 else None
-
-
-def _per_phase(unit: str) -> float:
-    """Of volts over amperes of a phase, the model's: R and L line-line are twice those of a phase."""
-    if not unit.startswith("V/A"):
-        raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
-    return 2.0

@@ -125,7 +125,7 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "control.": {  # a loop of it
         "kp kv kvp kpp vp p p_gain kv_factor proportional proportional_gain": "gain",
-        "ki kvi i_gain integral_gain integrator_gain": _INTEGRAL,
+        "ki kvi i_gain integral integral_gain integrator_gain": _INTEGRAL,
         "kd d_gain derivative_gain": "derivative_time = derivative gain/gain",
         "tn ti reset_time integral_time_constant integral_action_time": "integral_time",
         "pff kff pfg velocity_feedforward": "feedforward",

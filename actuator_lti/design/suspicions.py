@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import inf, isfinite, pi
-from typing import Any
 
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import torque_per_command
 
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
@@ -30,17 +30,16 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     return tuple(line for check in checks for line in check(design))
 
 
-def _loops(design: Design) -> Iterator[tuple[str, Any, float]]:
-    """Name, settings and period in s of each loop."""
+def _periods(design: Design) -> dict[str, float]:
+    """Period in s of each loop, the inner ones first."""
     control = design.controller
-    for name in reversed(control.stages):
-        loop = getattr(control, name)
-        yield name, loop, getattr(loop, "every", 1) * control.period_s
+    stages = reversed(control.stages)
+    return {stage: getattr(getattr(control, stage), "every", 1) * control.period_s for stage in stages}
 
 
 def _sampling(design: Design) -> Iterator[str]:
-    for name, loop, period in _loops(design):
-        integral = loop.integral_time_s
+    for name, period in _periods(design).items():
+        integral = getattr(design.controller, name).integral_time_s
         if integral is not None and integral < period:
             yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
     ticks = design.controller.computing_delay_s / design.controller.period_s
@@ -55,10 +54,7 @@ def _estimated_crossovers(design: Design) -> dict[str, float]:
     if control.current is not None and motor.inductance_H is not None:
         result["current"] = control.current.gain_V_A / motor.inductance_H
     if control.velocity is not None:
-        torque = motor.source_gain_Nm_V
-        if torque is None and motor.torque_constant_Nm_A is not None and motor.resistance_ohm is not None:
-            torque = motor.torque_constant_Nm_A / (1.0 if control.current else motor.resistance_ohm)
-        result["velocity"] = control.velocity.gain * (torque or 0.0) / design.inertia_kgm2
+        result["velocity"] = control.velocity.gain * torque_per_command(design) / design.inertia_kgm2
         if control.position is not None:
             result["position"] = control.position.gain
     if control.own_law is not None:  # has no crossover that a gain tells
@@ -68,19 +64,15 @@ def _estimated_crossovers(design: Design) -> dict[str, float]:
 
 def _crossovers(design: Design) -> Iterator[str]:
     crossovers = _estimated_crossovers(design)
-    for name, _, period in _loops(design):
+    for name, period in _periods(design).items():
         nyquist = pi / period
         if crossovers.get(name, 0.0) > 0.4 * nyquist:
-            yield (
-                f"control.{name}.gain: crossover near {crossovers[name]:.3g} rad/s, too close to the loop's "
-                f"Nyquist frequency of {nyquist:.3g} rad/s"
-            )
+            near = f"crossover near {crossovers[name]:.3g} rad/s, too close to the loop's Nyquist frequency"
+            yield f"control.{name}.gain: {near} of {nyquist:.3g} rad/s"
     for inner, outer in (("current", "velocity"), ("velocity", "position")):
         if crossovers.get(outer, 0.0) > crossovers.get(inner, inf):
-            yield (
-                f"control.{outer}.gain: crossover near {crossovers[outer]:.3g} rad/s lies above that of the "
-                f"{inner} loop inside it, {crossovers[inner]:.3g} rad/s"
-            )
+            above = f"crossover near {crossovers[outer]:.3g} rad/s lies above that of the {inner} loop"
+            yield f"control.{outer}.gain: {above} inside it, {crossovers[inner]:.3g} rad/s"
 
 
 def _law(design: Design) -> Iterator[str]:

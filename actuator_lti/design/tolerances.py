@@ -67,9 +67,9 @@ def _from_table(table: Tree, nominal: float, parse: Parse) -> Tolerance:
 
 def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: Field) -> None:
     """Refuse a tolerance whose values may be impossible (a half width that reaches a negative inertia)."""
+    width = tolerance.half_width or 0.0
     if field.kind == "integer":
         raise InputError("allowed: none, a whole number has no tolerance")
-    width = tolerance.half_width or 0.0
     if not (field.accepts(nominal - width) and field.accepts(nominal + width)):
         raise InputError(f"reaches values that are not allowed; allowed: {field.allowed(unit)}")
     if not tolerance.lower <= nominal <= tolerance.upper:
@@ -82,9 +82,8 @@ def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
         return tolerance
     if nominal == 0.0:
         return None
-    width = _width(tolerance.text, nominal, lambda text: parse_quantity(text, "1"))
-    uniform = tolerance.kind == "uniform"
-    return replace(tolerance, half_width=width) if uniform else replace(tolerance, std=width)
+    width = abs(nominal) * parse_quantity(tolerance.text, "1")
+    return replace(tolerance, half_width=width) if tolerance.std is None else replace(tolerance, std=width)
 
 
 def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:

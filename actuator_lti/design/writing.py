@@ -64,7 +64,7 @@ def design_tree(design: Design) -> Tree:
             "values": {item.label: object_entry(item) for item in design.objects.values},
             **({"family": design.objects.family} if design.objects.family else {}),
         }
-    return {key: value for key, value in tree.items() if value not in ({}, [])}
+    return {key: value for key, value in tree.items() if value != []}  # an empty [supply] is one
 
 
 def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
@@ -119,17 +119,9 @@ def _tolerance(tolerance: Tolerance, unit: str) -> Any:
 def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     """A copy of a design with keys changed as a design file would write them.
 
-    Parameters
-    ----------
-    design : Design
-    overrides : mapping
-        Dotted path to text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
-        "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry.
-
-    Raises
-    ------
-    InputError
-        As :func:`load_design`, also for an unknown key.
+    By dotted path a text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
+    "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry. An
+    InputError as of :func:`load_design`, also for an unknown key.
     """
     tree = design_tree(design)
     as_stated(tree, overrides)
@@ -162,12 +154,12 @@ def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
     if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
         raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
-    result: Tree = {}
+    result = dict(values)
     for path, value in values.items():
-        field = field_of(path)
-        unit = unit_in_file(design, path, field if field is None or field.kind == "quantity" else None)
-        plain = isinstance(value, int | float) and not isinstance(value, bool)
-        result[path] = si_text(float(value), unit) if plain and unit != "1" else value
+        if (field := field_of(path)) is not None and field.kind == "quantity":
+            unit = unit_in_file(design, path, field)
+            if unit != "1" and isinstance(value, int | float) and not isinstance(value, bool):
+                result[path] = si_text(float(value), unit)
     return result
 
 

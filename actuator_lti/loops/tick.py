@@ -68,7 +68,7 @@ class TickProgram(Program):
 
     @cached_property
     def plant_steps(self) -> dict[str, tuple[list[Any], dict[int, Any], list[Any]]]:
-        """What a tick makes of each state of the plant: gains of torque and moment, of voltages, of states."""
+        """What makes each state of the plant after a tick: gains of torque and moment, voltages, states."""
         hold = self.drive.hold
         return {
             name: (
@@ -153,12 +153,12 @@ class TickWalk(Walk):
         angle = self.sensed_angle()
         x = [self.state(name) for name in plant.states]
         change: dict[str, Row] = {}
-        for r, (name, (driven, gains, own)) in enumerate(self.program.plant_steps.items()):
+        for r, (name, (driven, gains, kept)) in enumerate(self.program.plant_steps.items()):
             rest = total(gain * row for gain, row in zip(driven, outer, strict=True))
             rest += total(gain * held[j] for j, gain in gains.items())
-            self.next[name] = rest + total(gain * row for gain, row in zip(own, x, strict=True))
+            self.next[name] = rest + total(gain * row for gain, row in zip(kept, x, strict=True))
             if angle is not None and name in angle.terms:
-                moved = [*own[:r], _nonzero(own[r] - 1.0), *own[r + 1 :]]  # exactly 0 for the motor's angle
+                moved = [*kept[:r], _nonzero(kept[r] - 1.0), *kept[r + 1 :]]  # exactly 0: the motor's angle
                 change[name] = rest + total(gain * row for gain, row in zip(moved, x, strict=True))
         for j in range(1, hold.memory + 1):
             self.next[f"u{j}"] = held[j - 1]

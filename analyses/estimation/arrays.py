@@ -34,10 +34,3 @@ def lasting(marked: BoolArray, least: int) -> BoolArray:
     for start, stop in stretches(marked):
         out[start:stop] = stop - start >= least
     return out
-
-
-def picked(values: FloatArray, keep: BoolArray, rows: BoolArray) -> FloatArray:
-    """Of values at the rows ``keep`` those at ``rows``, which are among them (and may be fewer)."""
-    whole = np.zeros((len(keep), *values.shape[1:]))
-    whole[keep] = values
-    return whole[: len(rows)][rows]

@@ -57,9 +57,8 @@ class Fit:
 
     def get(self, name: str, default: float) -> float:
         """A value, or another where it is not among them."""
-        if name not in self:
-            return default
-        return self[name]
+        there = name in self
+        return self[name] if there else default
 
     @property
     def standard_errors(self) -> FloatArray:
@@ -112,9 +111,7 @@ class Fit:
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""
-        rows = [k for k, name in enumerate(self.names) if name in names]
-        new = tuple(names[self.names[k]] for k in rows)
-        return Fit(names=new, values=self.values[rows], covariance=self.covariance[np.ix_(rows, rows)])
+        return self.mapped({names[name]: {name: 1.0} for name in self.names if name in names})
 
     def beside(self, name: str, value: float, std: float) -> Fit:
         """The fit and one more value, found on its own."""

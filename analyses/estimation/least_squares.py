@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -116,18 +116,8 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
 
 def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[int] = ()) -> FloatArray:
     """As `covariance_of`, of rows of several records, one after the other."""
-    return covariance_of(zip(*(np.split(rows, ends[:-1]) for rows in (w, residual)), strict=True))
-
-
-def covariance_of(blocks: Iterable[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Covariance of least-squares values, of the rows of each record and (at least a part of) its noise.
-
-    ``(W'W)^-1 W' G W (W'W)^-1``, G the autocovariance of the noise's own autoregressive model: with ``A(q) e
-    = v`` white, ``W' G W = var(v) Z'Z``, Z the rows filtered backward by 1/A. No row of one record is
-    correlated with one of another. Grown by rows over rows less all that was found of them: the values, and
-    the coefficients of A.
-    """
-    return joint_covariance([information_of(*block) for block in blocks])
+    blocks = zip(np.split(w, ends[:-1]), np.split(residual, ends[:-1]), strict=True)
+    return covariance_of([information_of(*block) for block in blocks])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,17 +131,31 @@ class Information:
 
 
 def information_of(w: FloatArray, noise: FloatArray) -> Information:
-    """Of the rows of one record and (at least a part of) its noise."""
+    """Of the rows of one record and (at least a part of) its noise.
+
+    G is the autocovariance of the noise's own autoregressive model: with ``A(q) e = v`` white, ``W' G W =
+    var(v) Z'Z``, Z the rows filtered backward by 1/A.
+    """
     a, variance = autoregressive(noise)
     z = lfilter([1.0], a, w[::-1], axis=0)
     return Information(gram=w.T @ w, noise=variance * z.T @ z, rows=len(w), order=len(a) - 1)
 
 
-def joint_covariance(parts: Sequence[Information]) -> FloatArray:
-    """Of the values that all records together give."""
-    inverse = np.linalg.inv(sum(part.gram for part in parts))
-    rows, found = sum(part.rows for part in parts), len(inverse) + sum(part.order for part in parts)
-    return np.asarray(rows / max(rows - found, 1) * inverse @ sum(part.noise for part in parts) @ inverse)
+def covariance_of(records: Sequence[Information]) -> FloatArray:
+    """Covariance of the least-squares values that all records together give.
+
+    ``(W'W)^-1 W' G W (W'W)^-1``: no row of one record is correlated with one of another. Grown by rows over
+    rows less all that was found of them: the values, and the coefficients of A.
+    """
+    inverse = np.linalg.inv(sum(part.gram for part in records))
+    rows, found = sum(part.rows for part in records), len(inverse) + sum(part.order for part in records)
+    return np.asarray(rows / max(rows - found, 1) * inverse @ sum(part.noise for part in records) @ inverse)
+
+
+def scaled_lstsq(w: FloatArray, y: FloatArray) -> FloatArray:
+    """Least-squares values of ``y = w p``, each column divided by its size first."""
+    scale = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
+    return np.asarray(np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale)
 
 
 def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:

@@ -39,6 +39,9 @@ from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
+HELD_OUT_FACTOR = 1.5
+HELD_OUT_EXTRA = 0.02
+
 
 @dataclass(frozen=True, kw_only=True)
 class BenchResult(verdict.Identified):
@@ -86,14 +89,15 @@ def identify_bench(
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
     names = ", ".join(record.name for record in records)
     start, electrical = with_fixed(design, fixed_values(design, settings.fix)), None
+    cutoff, decimation = settings.cutoff_hz, settings.decimation
+    usual = cutoff is None and decimation is None
+    recipe = None if usual else recipe_for(used[0], cutoff, decimation)
     if settings.electrical:
-        electrical = fit_electrical(start, used)
+        electrical = fit_electrical(start, used, recipe)
         start = design_with_fit(start, electrical_values(start, electrical), f"voltage equation of {names}")
     judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
     findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
-    limit, cutoff, decimation = settings.residual_limit / 100.0, settings.cutoff_hz, settings.decimation
-    usual = cutoff is None and decimation is None
-    recipe = None if usual else recipe_for(used[0], cutoff, decimation)
+    limit = settings.residual_limit / 100.0
     held = _held(design, start, settings)
     right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     used, model = right.records, right.model
@@ -111,9 +115,8 @@ def identify_bench(
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         for record in used:
             for key in record.settings.keys() & set(values.names):
-                allowed = f"any other key, or --fix {key}=VALUE"
-                told = f"settings.{key}: is found from all records; allowed: {allowed}"
-                raise InputError(told, where=record.name)
+                told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
+                raise InputError(f"settings.{key}: {told}", where=record.name)
         made = design_with_fit(with_structure(start, model), values, source)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
@@ -122,12 +125,13 @@ def identify_bench(
     if settings.refine:
         refined = refine_records(made, used, values.names, progress=progress)
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
-    text = write_design(made)
-    written = read_design_text(text)
+    written = read_design_text(write_design(made))
     again = tuple(resimulate(written, record, model.form) for record in (*used, *unseen))
+    allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
     for record in unseen:
-        residual = held_out_residual(start, model, record)
-        items.append(verdict.held_out_item(record.name, residual, model.relative_residual, limit))
+        label = f"Relative residual of {record.name}, not seen by the fit"
+        residual, why = held_out_residual(start, model, record), "the fit does not carry over to it"
+        items.append(verdict.share_item(f"held-out-{record.name}", label, residual, allowed, why))
     items += [verdict.simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
     return BenchResult(
         records=used,
@@ -136,7 +140,6 @@ def identify_bench(
         model=model,
         refined=refined,
         design=made,
-        text=text,
         resimulated=again,
         items=tuple(items),
         settings=settings,

@@ -139,11 +139,7 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
 
 
 def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> Iterator[SuggestedRun]:
-    """The best run again and again, over the range of the runs so far and at no load.
-
-    A run's own variance is the median of those made. The best has the least weighed sum of the covariance or,
-    without a weight, its least determinant.
-    """
+    """The run of the least weighed sum (or determinant) of the covariance, again and again."""
     own = float(np.median(fit.residual_stds_Nm**2))
     points = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points])
     rows, (_, speed, load) = points / fit.residual_stds_Nm[:, None], points.T

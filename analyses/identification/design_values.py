@@ -92,7 +92,7 @@ def design_values(
     known = start.effective_motor
     if whole and known.resistance_ohm is not None and known.back_emf_constant_Vs_rad:
         with suppress(InputError):  # R and kE are not told apart
-            electrical = fit_electrical(start, whole)
+            electrical = fit_electrical(start, whole, model.asked)
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
     return tuple(one for one in found if one is not None)
 

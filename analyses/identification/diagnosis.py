@@ -9,8 +9,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import BoolArray, FloatArray, lasting, picked
-from analyses.estimation.least_squares import covariance_of, solve, told_apart
+from analyses.estimation.arrays import BoolArray, FloatArray, lasting
+from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
@@ -147,13 +147,11 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], FloatArra
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
     table = np.column_stack([w, time * (w @ model.values), time])
     names = (*model.names, "scale", "shift")
-    if len(told_apart(table, names)[0]) < len(names):
+    if len(table) <= len(names) or len(told_apart(table, names)[0]) < len(names):
         return [], moved
-    size = np.linalg.norm(table, axis=0)
-    found = np.linalg.lstsq(table / size, part.noise, rcond=None)[0] / size
-    errors = np.sqrt(np.diag(covariance_of([(table / size, part.noise - table @ found)]))) / size
-    (scale, shift), told = found[-2:], []
-    sure = np.abs(found[-2:]) > SURE * errors[-2:]
+    found, told = solve(table, part.noise), []
+    scale, shift = found.values[-2:]
+    sure = np.abs(found.values[-2:]) > SURE * np.sqrt(np.diag(found.correlated))[-2:]
     if sure[0]:
         told.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
         moved = np.outer(model.values, model.values) * scale**2 / 3.0
@@ -230,20 +228,20 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
         own, other = (rows_under(design, one, model) for one in (record, simulated))
         if len(other.keep) > len(own.keep):
             return None
-        both = own.keep[: len(other.keep)] & other.keep
-        z = picked(slopes(simulated), other.keep, both)
+        both = own.shared(other)
+        z = other.at(both, slopes(simulated))
         if len(z) <= z.shape[1] or len(told_apart(z, (*model.names, "lag"))[0]) < z.shape[1]:
             return None
         lag, error = 0.0, np.inf
         for _ in range(ROUNDS):
             late = shifted(design, record, lag)
-            y = rows_under(design, late, model).y - model.kept(own)
-            table = picked(slopes(late), own.keep, both)
-            step, error = _step(z, table, picked(y, own.keep, both))
+            y = own.at(both, rows_under(design, late, model).y - model.kept(own))
+            table = own.at(both, slopes(late))
+            step, error = _step(z, table, y)
             lag += float(np.clip(step, -LARGEST_STEP_S, LARGEST_STEP_S))
             if abs(step) < SETTLED * error:
                 break
-        turned = [picked(model.turned(rows), rows.keep, both) for rows in (own, other)]
+        turned = [rows.at(both, model.turned(rows)) for rows in (own, other)]
         feigned = _step(z, table, turned[0] - turned[1])[0]
     except (InputError, NumericalError, np.linalg.LinAlgError):
         return None
@@ -258,7 +256,7 @@ def _step(z: FloatArray, table: FloatArray, y: FloatArray) -> tuple[float, float
     found = np.linalg.solve(slopes, z.T @ y)
     # with rows z and the noise of the residual, the covariance of z'e, turned back by the slopes
     gram, back = z.T @ z, np.linalg.inv(slopes)
-    noise = gram @ covariance_of([(z, y - table @ found)]) @ gram
+    noise = gram @ covariance_of([information_of(z, y - table @ found)]) @ gram
     return float(found[-1] / size[-1]), float(np.sqrt((back @ noise @ back.T)[-1, -1]) / size[-1])
 
 

@@ -14,6 +14,7 @@ from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import parameter
+from analyses.identification.joint_model import Recipe
 from analyses.identification.rows import motion_of, recipe_for
 from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
@@ -30,59 +31,55 @@ class ElectricalFit(Fit):
     relative_residual: float
 
 
-def fit_electrical(
-    design: Design, records: Sequence[Record], *, only: tuple[str, ...] | None = None
-) -> ElectricalFit:
+def fit_electrical(design: Design, records: Sequence[Record], recipe: Recipe | None = None) -> ElectricalFit:
     """Fit the voltage equation to records of voltage, current and motion.
 
-    All signals pass the same filter without phase. The recorded voltage is the drive's own, which acts
-    later by the design's computing delay and half a tick; what this shift does to the values is an error of
-    theirs. The inductance is kept out where it is not five times its standard error: a record sampled too
-    slowly, or too calm, does not show it, and none is invented.
+    All signals pass the same filter without phase, by default that of each record's period. The recorded
+    voltage is the drive's own, which acts later by the design's computing delay and half a tick; what this
+    shift does to the values is an error of theirs. The inductance is kept out where it is not five times its
+    standard error: a record sampled too slowly, or too calm, does not show it, and none is invented.
     """
     control = design.controller
-    late = control.computing_delay_s + 0.5 * control.period_s
-    result = _fitted([_rows(design, record, late) for record in records], only=only or NAMES)
-    early = _fitted([_rows(design, record, 0.0) for record in records], only=result.names)
-    moved = result.values - early.values
-    whole = replace(result, covariance=result.covariance + np.outer(moved, moved) / 3.0)
-    if only is not None or "inductance" not in whole.names:
+    shifts = control.computing_delay_s + 0.5 * control.period_s, 0.0
+    late, early = ([_rows(design, record, recipe, shift) for record in records] for shift in shifts)
+    whole = _fitted(late, early, NAMES)
+    if "inductance" not in whole.names:
         return whole
     value, std = whole["inductance"], whole.std("inductance")
     if value > SHOWN * std:
         return whole
-    rest = tuple(name for name in whole.names if name != "inductance")
+    again = _fitted(late, early, tuple(name for name in whole.names if name != "inductance"))
     told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
-    again = fit_electrical(design, records, only=rest)
     kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
     return replace(again, fixed={**again.fixed, "inductance": kept})
 
 
-def _fitted(tables: Sequence[FloatArray], only: tuple[str, ...]) -> ElectricalFit:
-    """The fit of rows that are made already; ``only`` these parameters."""
-    ends = np.cumsum([len(part) for part in tables]).tolist()
-    table = np.concatenate(tables)
+def _fitted(late: Sequence[FloatArray], early: Sequence[FloatArray], only: tuple[str, ...]) -> ElectricalFit:
+    """The fit of some parameters, in error by what a voltage that acts at once would make of them."""
+    table = np.concatenate(late)
     w, u = table[:, [NAMES.index(name) for name in only]], table[:, -1]
     kept, left = told_apart(w, only)
     for one in left:
         if one.name in ("resistance", "back_emf"):
             raise InputError(f"{parameter(one.name).key}: {one}; vary speed and load, not together only")
-    result = solve(w[:, kept], u, ends)
+    result = solve(w[:, kept], u, np.cumsum([len(part) for part in late]).tolist())
+    names, table = tuple(only[k] for k in kept), np.concatenate(early)
+    moved = result.values - solve(table[:, [NAMES.index(name) for name in names]], table[:, -1]).values
     return ElectricalFit(
-        names=tuple(only[k] for k in kept),
+        names=names,
         values=result.values,
-        covariance=result.correlated,
+        covariance=result.correlated + np.outer(moved, moved) / 3.0,
         fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
     )
 
 
-def _rows(design: Design, record: Record, late_s: float) -> FloatArray:
+def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> FloatArray:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
         if name not in record.signals:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
-    recipe, period = recipe_for(record), period_of(record)
+    recipe, period = recipe or recipe_for(record), period_of(record)
     motion, _ = motion_of(record.drive(design), record, recipe)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))

@@ -108,14 +108,13 @@ def identify_frequency(
     fit = _fitted(lines, design.ratio_to_coupling, _held(design, dict(fixed or {})), reaction)
     play = None if play_record is None else play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name)
-    text = write_design(made)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
     items = [inputs_item(name, result) for name, result in findings.items()]
     why = "play, friction or another resonance: excite on one flank, in motion"
     told = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
     label = f"The two-mass model explains the lines ({told})"
     items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
-    items.append(_written_item(read_design_text(text), lines, record.name, fit.reaction))
+    items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,
         play_record=play_record,
@@ -124,7 +123,6 @@ def identify_frequency(
         fit=fit,
         play=play,
         design=made,
-        text=text,
         used=used,
         findings=findings,
         items=tuple(items),
@@ -155,8 +153,7 @@ def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
 def _reaction(design: Design, torque: FloatArray, angle: FloatArray) -> float:
     """Torque on the motor by that in the coupling: 1/N_c, and the friction that grows with it.
 
-    ``CM N_r`` with the sign of the power that goes to the load, by the mean speed and current of the record:
-    the flank on which it was taken.
+    ``CM N_r`` with the sign of the power to the load: by mean speed and current, the flank of the record.
     """
     turned = float(angle[-1] - angle[0])
     side = np.sign(float(np.mean(torque)) * turned) if abs(turned) > 1.0 else 0.0

@@ -12,8 +12,7 @@ from actuator_lti.design.model import Design
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
-from analyses.identification.joint_model import JointModel, LawChoice, Recipe, Rows, linear_basis
-from analyses.identification.rows import record_rows
+from analyses.identification.joint_model import JointModel, LawChoice, Recipe, RecordFit, linear_basis
 from analyses.records.record import Record
 
 MOST_BREAKS = 4
@@ -41,8 +40,8 @@ def fit_map(
         return fit_records(design, records, recipe=recipe, fixed=fixed, gravity=gravity, knots_rad_s=knots)
 
     plain = fitted(None)
-    rows = [record_rows(design, record, "symmetric", recipe, gravity=gravity) for record in records]
-    speed, rest = _plain_residual(rows, plain)
+    clear = [_away_from_reversals(part) for part in plain.records]
+    speed, rest = (np.concatenate(parts) for parts in zip(*clear, strict=True))
     top = float(np.max(np.abs(speed)))
     n = len(rest) / correlation_time(plain.residual)
     breaks: tuple[float, ...] = ()
@@ -53,10 +52,7 @@ def fit_map(
             break
         models.append(fitted((0.0, *breaks, top)))
         laws.append(_law(breaks, models[-1], _bic(models[-1], n) - _bic(plain, n)))
-    best = 0
-    for k, law in enumerate(laws):
-        if law.criterion < laws[best].criterion - (0.0 if best else CLEARLY_BETTER):
-            best = k
+    best = min(range(len(laws)), key=lambda k: laws[k].criterion + (CLEARLY_BETTER if k else 0.0))
     laws[best] = replace(laws[best], taken=True)
     return replace(models[best], laws=tuple(laws))
 
@@ -79,21 +75,13 @@ def _bic(model: JointModel, independent: float) -> float:
     return independent * float(np.log(square)) + (len(model.names) + breaks) * float(np.log(independent))
 
 
-def _plain_residual(rows: Sequence[Rows], plain: JointModel) -> tuple[FloatArray, FloatArray]:
-    """Speeds of all rows, and what is left of the drive once all but the friction is taken off.
-
-    Rows beside a reversal are left out: the decimation's filter mixes both directions there.
-    """
-    speeds, rests = [], []
-    for block in rows:
-        other = [name for name in block.names if name not in ("viscous", "dry")]
-        speed = block.columns(["viscous"])[:, 0]
-        turns = np.concatenate([[False], np.sign(speed[1:]) != np.sign(speed[:-1]), [False]])
-        clear = ~(turns[1:] | turns[:-1])
-        clear[1:-1] &= clear[2:] & clear[:-2]
-        speeds.append(speed[clear])
-        rests.append((block.y - block.explained(plain, other))[clear])
-    return np.concatenate(speeds), np.concatenate(rests)
+def _away_from_reversals(part: RecordFit) -> tuple[FloatArray, FloatArray]:
+    """Speed and friction of rows with no reversal beside: the decimation's filter mixes both sides."""
+    side = np.sign(part.speed)
+    turns = np.concatenate([[False], side[1:] != side[:-1], [False]])
+    clear = ~(turns[1:] | turns[:-1])
+    clear[1:-1] &= clear[2:] & clear[:-2]
+    return part.speed[clear], part.friction[clear]
 
 
 def _one_more(
@@ -115,10 +103,8 @@ def _one_more(
     free = [v for v in grid.tolist() if apart(v, result)]
     if not free:
         return result
-    chosen, step = (
-        [*result, min(free, key=lambda v: misfit([*result, v]))],
-        np.log(0.95 / LEAST_SHARE) / (GRID - 1),
-    )
+    chosen = [*result, min(free, key=lambda v: misfit([*result, v]))]
+    step = np.log(0.95 / LEAST_SHARE) / (GRID - 1)
     for k, here in enumerate(chosen):  # between the grid's neighbours
         others = chosen[:k] + chosen[k + 1 :]
         ends = np.log(here) - step, min(np.log(here) + step, np.log(0.97 * top))

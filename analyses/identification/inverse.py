@@ -12,7 +12,14 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import Solution, by_record, covariance_of, solve, told_apart
+from analyses.estimation.least_squares import (
+    Solution,
+    by_record,
+    covariance_of,
+    information_of,
+    solve,
+    told_apart,
+)
 from analyses.estimation.parameters import own_std, parameter
 from analyses.identification.joint_model import (
     FrictionForm,
@@ -183,13 +190,13 @@ def _model(design: Design, problem: _Problem, solution: Solution, weights: Float
         left: dict[str, Any] = {"residual": rest, "own_residual": own, "noise": own}
         every = np.ones(len(own), dtype=bool)
         parts.append(RecordFit(**rows, **left, friction=block.y - other, compared=every))
-    scaled = [(g * part.w, g * part.own_residual) for g, part in zip(weights, parts, strict=True)]
+    told = [information_of(g * one.w, g * one.own_residual) for g, one in zip(weights, parts, strict=True)]
     drive = np.concatenate([block.y for block in blocks])
     model = JointModel(
         names=free,
         values=solution.values,
         white_errors=np.sqrt(np.diag(solution.white)),
-        covariance=covariance_of(scaled),
+        covariance=covariance_of(told),
         between={},
         fixed=dict(problem.fixed),
         relative_residual=float(np.linalg.norm(np.concatenate(rests)) / np.linalg.norm(drive)),

@@ -113,6 +113,14 @@ class Rows:
         """Rows that were left out."""
         return int(np.count_nonzero(~self.keep))
 
+    def shared(self, other: Rows) -> BoolArray:
+        """Which rows both use, as far as the shorter of them goes."""
+        return np.asarray(self.keep[: len(other.keep)] & other.keep[: len(self.keep)])
+
+    def at(self, rows: BoolArray, values: FloatArray) -> FloatArray:
+        """Of values at the rows used those at some of them."""
+        return values[np.flatnonzero(rows[self.keep[: len(rows)]])]
+
     def columns(self, names: Sequence[str]) -> FloatArray:
         """The regressors of some names."""
         return self.w[:, [self.names.index(name) for name in names]]

@@ -105,14 +105,15 @@ def identify_response(
         return np.concatenate([(values / size).real, (values / size).imag])
 
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
+    if start.load.inertia_kgm2 == 0.0:
+        held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
     fit, rest = _determined(
         start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
     )
     fit = replace(fit, fixed={**held, **fit.fixed})
     made = design_with_fit(start, fit, f"frequency response {measured.name}")
-    text = write_design(made)
-    modelled = model(read_design_text(text))
+    modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
     if fit.misfit is not None:
@@ -124,7 +125,6 @@ def identify_response(
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
     return ResponseResult(
         design=made,
-        text=text,
         items=tuple(items),
         measured=measured,
         modelled=modelled,
@@ -173,10 +173,7 @@ def _determined(
     known: bool,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[ResponseFit, FloatArray]:
-    """The fit of what is determined, and its residual; of the others the one told worst goes first.
-
-    Its errors are those by residuals of unit deviation, or by their own scatter.
-    """
+    """The fit of what is determined, and its residual; of the others the one told worst goes first."""
     left: dict[str, str] = {}
     while names:
         found = fit_output(start, names, parts, measured, progress)

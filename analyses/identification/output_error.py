@@ -189,7 +189,7 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
     A record without a command is held against the torque that the design's own inertia and friction need for
-    its motion.
+    its motion, by the record's own recipe, whatever cut-off the fit had.
     """
     why = ""
     if command_of(design, record) is not None:

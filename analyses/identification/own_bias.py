@@ -13,9 +13,9 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
-from analyses.estimation.arrays import FloatArray, picked
+from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
-from analyses.estimation.least_squares import covariance_of
+from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit, default_value
 from analyses.identification.output_error import simulated_part
@@ -84,13 +84,13 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         covariance = model.covariance + np.outer(bias, bias)
         return replace(model, bias_told=f"{told}; the intervals hold it", covariance=covariance)
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
-    blocks = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
+    weighed = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
     moved = _by_direction(model, again)
-    singles = zip(model.alone, again.alone, blocks, strict=False)
+    singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
         model,
         values=model.values - bias,
-        covariance=covariance_of(blocks) + np.outer(moved, moved),
+        covariance=covariance_of([information_of(*each) for each in weighed]) + np.outer(moved, moved),
         records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
@@ -101,36 +101,32 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
 
 def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
     """The record's part, its noise what is left where the simulated residual is taken off: rows of both."""
-    count = min(len(measured.keep), len(simulated.keep))
-    both = measured.keep[:count] & simulated.keep[:count]
-    if len(measured.keep) < len(simulated.keep) or np.count_nonzero(both) < 2 * measured.w.shape[1]:
+    both, more = measured.shared(simulated), len(measured.keep) - len(simulated.keep)
+    if more < 0 or np.count_nonzero(both) < 2 * measured.w.shape[1]:
         return measured
-    own, model = (picked(part.own_residual, part.keep, both) for part in (measured, simulated))
-    compared = np.concatenate([both, np.zeros(len(measured.keep) - count, dtype=bool)])[measured.keep]
-    return replace(measured, noise=own - model, compared=compared)
+    own, model = (part.at(both, part.own_residual) for part in (measured, simulated))
+    return replace(measured, noise=own - model, compared=np.pad(both, (0, more))[measured.keep])
 
 
 def _by_direction(model: JointModel, again: JointModel) -> FloatArray:
     """What the values move by where the simulated records turn back at other instants than the measured."""
     tables, turned = [], []
     for weight, own, other in zip(model.weights, model.records, again.records, strict=True):
-        both = own.keep[: len(other.keep)] & other.keep[: len(own.keep)]
-        tables.append(weight * picked(own.w, own.keep, both))
-        here, there = (picked(model.turned(part), part.keep, both) for part in (own, other))
+        both = own.shared(other)
+        here, there = (part.at(both, model.turned(part)) for part in (own, other))
+        tables.append(weight * own.at(both, own.w))
         turned.append(weight * (here - there))
-    table = np.concatenate(tables)
-    size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
-    return np.asarray(np.linalg.lstsq(table / size, np.concatenate(turned), rcond=None)[0] / size)
+    return scaled_lstsq(np.concatenate(tables), np.concatenate(turned))
 
 
 def _alone(
-    own: Fit, simulated: Fit, block: tuple[FloatArray, FloatArray], made: Design, model: JointModel
+    own: Fit, simulated: Fit, weighed: tuple[FloatArray, FloatArray], made: Design, model: JointModel
 ) -> Fit:
     """One record fitted alone, less its bias, with the errors of its noise."""
     both = tuple(name for name in own.names if name in simulated.names)
-    w = block[0][:, [model.names.index(name) for name in both]]
     values = np.array([own[name] - simulated[name] + default_value(made, name) for name in both])
-    return Fit(names=both, values=values, covariance=covariance_of([(w, block[1])]))
+    told = information_of(weighed[0][:, [model.names.index(name) for name in both]], weighed[1])
+    return Fit(names=both, values=values, covariance=covariance_of([told]))
 
 
 def _cannot(design: Design, records: Sequence[Record]) -> str:
@@ -152,7 +148,7 @@ def _driven(design: Design, record: Record) -> Record:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"
 
-    def place(record: Record) -> FloatArray:
+    def place(record: Record) -> FloatArray:  # as recorded, whatever cut-off the fit has
         return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)

@@ -13,7 +13,7 @@ from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import model_signals
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import COVERAGE, Fit
-from analyses.estimation.least_squares import Information, information_of, joint_covariance, told_apart
+from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
 from analyses.identification.joint_model import JointModel, Rows, default_value
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record, RowCounts
@@ -124,7 +124,7 @@ def plan_motions(
         there.append(information_of(wide, part.noise))
     chosen = _chosen(segments, there, size)
     command = np.concatenate([one.command for one in chosen] or [np.zeros(0)])
-    covariance = joint_covariance([*there, *(one.information for one in chosen)])
+    covariance = covariance_of([*there, *(one.information for one in chosen)])
     return Plan(
         design=design,
         within=within,
@@ -144,10 +144,10 @@ def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: Flo
     parts = list(there)
 
     def spread(one: Segment) -> float:
-        return float(np.sum(np.diag(joint_covariance([*parts, one.information])) / size**2))
+        return float(np.sum(np.diag(covariance_of([*parts, one.information])) / size**2))
 
     while len(chosen) < MOST_SEGMENTS:
-        if parts and np.all(np.diag(joint_covariance(parts)) <= size**2):
+        if parts and np.all(np.diag(covariance_of(parts)) <= size**2):
             break
         chosen.append(min(segments, key=spread))
         parts.append(chosen[-1].information)

@@ -120,10 +120,7 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
 
 
 def _coarse(steps: tuple[float, float], touching: BoolArray, smooth_samples: float) -> float:
-    """Error from resolutions: uniform, averaged over the independent rows of one cycle (two contacts).
-
-    ``smooth_samples`` rows are worth one independent one after filtering.
-    """
+    """Error from resolutions: uniform, averaged over the independent rows of one cycle (two contacts)."""
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
     return float(np.hypot(*steps) / np.sqrt(12.0 * max(independent, 1.0)))

@@ -93,11 +93,7 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
 def _predicted(
     rows: FloatArray, shared: FloatArray, torque: FloatArray, seen: BoolArray
 ) -> tuple[FloatArray, float]:
-    """Weighted errors at the unseen runs of a law fitted to the seen ones, and what is left at those.
-
-    The shared errors are estimated along, within their bounds: a law must not be credited with what an
-    instrument may have done.
-    """
+    """Weighted errors of a law (shared errors along) at unseen runs, and what is left at those it saw."""
     rows = rows / np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
     a = with_shared(rows[seen], shared[seen])
     b = np.concatenate([torque[seen], np.zeros(shared.shape[1])])

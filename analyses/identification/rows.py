@@ -209,10 +209,7 @@ def _check(record: Record, locked: bool) -> None:
 
 
 def _torque(design: Design, record: Record, motion: Motion) -> tuple[FloatArray, str, str]:
-    """The drive torque as it acts between the samples, its signal and words.
-
-    A recorded voltage acts later by the computing delay, and half of what it is held for.
-    """
+    """The drive torque as it acts: a voltage later by the computing delay and half of what it is held for."""
     motor = design.effective_motor
     constant = motor.torque_constant_Nm_A or 0.0
     drive, driven_by, told, back_emf = drive_of(design, record)

@@ -86,14 +86,13 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     fit, count = result.fit, asked.suggest
     source = f"identified from {len(fit.points)} runs, {listed.name}"
     made = design_with_fit(with_fixed(design, fixed), fit.by_key(), source)
-    text = write_design(made)
-    simulated = steady_current_error(read_design_text(text), fit.points, progress=progress)
+    written = read_design_text(write_design(made))
+    simulated = steady_current_error(written, fit.points, progress=progress)
     load, speed = design.load.moment_max_Nm, design.limits.speed_rad_s
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
     return CampaignAnswer(
         design=made,
-        text=text,
         items=campaign_items(design, result, simulated, asked.residual_limit / 100.0),
         result=result,
         shares=contributions(fit.values, fit.covariance, load_Nm=load, speed_rad_s=speed),

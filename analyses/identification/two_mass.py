@@ -201,8 +201,7 @@ def fit_two_mass(
         both = _whitened(lines, g[:outputs])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
 
-    begin = np.array([max(abs(start.get(name, 0.0)), scale[k]) for k, name in enumerate(names)]) / scale
-    fit = least_squares(residual, begin, x_scale="jac", max_nfev=400, method="lm")
+    fit = least_squares(residual, np.ones(len(names)), x_scale="jac", max_nfev=400, method="lm")
     if not fit.success:
         raise NumericalError(f"the two-mass fit does not converge: {fit.message}")
     size = np.linalg.norm(fit.jac, axis=0)
@@ -250,10 +249,7 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
 
 
 def _whitened(lines: Lines, responses: Sequence[ComplexArray]) -> ComplexArray:
-    """Residuals ``output - G torque`` of every line, whitened by their covariance.
-
-    The residuals of two outputs share the noise of the torque, so they are whitened together.
-    """
+    """Residuals ``output - G torque`` of every line, whitened together: they share the torque's noise."""
     count = len(responses)
     mix = np.zeros((len(lines.omega_rad_s), count, count + 1), dtype=complex)
     mix[:, range(count), range(1, count + 1)] = 1.0

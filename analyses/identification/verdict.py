@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.stats import chi2
 
+from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
@@ -25,8 +27,6 @@ MOST_DRY_UNLOADED = 2.0
 LARGEST_OF_ANY = 10.0
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
-HELD_OUT_FACTOR = 1.5
-HELD_OUT_EXTRA = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,9 +51,13 @@ class Identified:
     """The design that an identification comes to, its file, and whether it may be written."""
 
     design: Design
-    text: str = field(repr=False)
     items: tuple[Item, ...]
     accepted: bool = False
+
+    @cached_property
+    def text(self) -> str:
+        """The design's file."""
+        return write_design(self.design)
 
     @property
     def passed(self) -> bool:
@@ -94,13 +98,6 @@ def sampling_items(record: Record) -> Iterator[Item]:
     )
     label = f"{record.name}: current sampled fast enough"
     yield Item.of(f"sampling-{record.name}", label, reason if off > LARGEST_LINE_ERROR else "")
-
-
-def held_out_item(record: str, residual: float, fit: float, limit: float) -> Item:
-    """The relative residual of a record that the fit has not seen, against that of the fit."""
-    allowed = min(HELD_OUT_FACTOR * fit + HELD_OUT_EXTRA, limit)
-    label, why = f"Relative residual of {record}, not seen by the fit", "the fit does not carry over to it"
-    return share_item(f"held-out-{record}", label, residual, allowed, why)
 
 
 def simulated_item(record: str, error: float, limit: float, how: str) -> Item:
@@ -156,8 +153,11 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
 
 def following_item(record: str, followed: Followed) -> Item:
     """Whether the recorded following error is that of the design's loops at this motion."""
-    label = f"{record}: following error is that of the design's loops"
-    clock, off = followed.clock, followed.off
+    label, clock, off = (
+        f"{record}: following error is that of the design's loops",
+        followed.clock,
+        followed.off,
+    )
     reason = (
         f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with: "
         "counts a revolution, the reduction, or a unit"

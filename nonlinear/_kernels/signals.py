@@ -3,15 +3,39 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kernel import kernel, wide
 from nonlinear._kernels import layout
 
 TWO_PI = 2.0 * math.pi
+PI = Fraction("3.14159265358979323846264338327950288419716939937510582097")
+PI_1 = int(PI * 2**31) / 2**31  # pi in three parts: n times each of the first two is exact
+PI_2 = int((PI - Fraction(PI_1)) * 2**65) / 2**65
+PI_3 = float(PI - Fraction(PI_1) - Fraction(PI_2))
+PER_PI = 1.0 / math.pi
+ROUNDER = 1.5 * 2.0**52  # a number added to it, and it taken away again, is rounded to a whole one
+LARGEST = 2.0**20 * PI_1
+SERIES = tuple((-1.0) ** k / math.factorial(2 * k + 1) for k in range(11))
+S1, S2, S3, S4, S5, S6, S7, S8, S9, S10 = SERIES[1:]
 TABLES = np.array(layout.TABLES)
 TO = np.array([layout.BLOCK_LOAD, layout.BLOCK_TORQUE, layout.BLOCK_SUPPLY])  # where each goes
+
+
+@kernel
+def sine(x):
+    """sin x for \\|x\\| < `LARGEST`: the series of sin about the nearest multiple of pi, to 1e-18.
+
+    A library's differs in the last digit between machines, and is asked for one number at a time.
+    """
+    n = (x * PER_PI + ROUNDER) - ROUNDER
+    odd = n - 2.0 * ((0.5 * n + ROUNDER) - ROUNDER)  # -1, 0 or 1
+    r = ((x - n * PI_1) - n * PI_2) - n * PI_3
+    y = r * r
+    high = y * (S5 + y * (S6 + y * (S7 + y * (S8 + y * (S9 + y * S10)))))
+    return (1.0 - 2.0 * odd * odd) * (r + r * (y * (S1 + y * (S2 + y * (S3 + y * (S4 + high))))))
 
 
 @kernel
@@ -52,7 +76,8 @@ def signal(row, at, tables, k, period):
     if s < -1e-9 * period:
         return 0.0
     if kind == layout.SINE:
-        return amplitude * math.sin(TWO_PI * row[at + 3] * s + row[at + 4])
+        turned = TWO_PI * row[at + 3] * s + row[at + 4]
+        return amplitude * (sine(turned) if abs(turned) < LARGEST else math.sin(turned))
     if kind == layout.STEP:
         return amplitude
     if kind == layout.RAMP:
@@ -62,15 +87,19 @@ def signal(row, at, tables, k, period):
     return amplitude * math.sin(TWO_PI * chirp_cycles(kind, row[at + 3], row[at + 4], row[at + 5], s))
 
 
+@wide
 @kernel
 def fill(row, at, tables, first, count, stride, period, out, to):
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)
-    if int(row[at]) == layout.SINE:
-        amplitude, turn, phase = row[at + 1], TWO_PI * row[at + 3], row[at + 4]
+    amplitude, turn, phase, begin = row[at + 1], TWO_PI * row[at + 3], row[at + 4], row[at + 2]
+    farthest = abs(turn) * (abs(begin) + (first + count) * period) + abs(phase)
+    if int(row[at]) == layout.SINE and farthest < LARGEST:
         for n in range(times):
-            t = (first + n * stride) * period - row[at + 2]
-            out[to + n * stride] = 0.0 if t < -1e-9 * period else amplitude * math.sin(turn * t + phase)
+            out[to + n * stride] = amplitude * sine(turn * ((first + n * stride) * period - begin) + phase)
+        for n in range(times):
+            if (first + n * stride) * period - begin < -1e-9 * period:
+                out[to + n * stride] = 0.0
         return
     for n in range(times):
         out[to + n * stride] = signal(row, at, tables, first + n * stride, period)

@@ -64,13 +64,11 @@ class Cache:
         path = self.path(key)
         if path.is_symlink():
             raise CorruptEntry("is a symbolic link")
-        try:
-            if path.stat().st_size > MAX_ENTRY_BYTES:
-                raise CorruptEntry(f"larger than {MAX_ENTRY_BYTES} bytes")
-            data = path.read_bytes()
-        except FileNotFoundError:
+        if not path.exists():
             return None
-        entry = _opened(key, data)
+        if path.stat().st_size > MAX_ENTRY_BYTES:
+            raise CorruptEntry(f"larger than {MAX_ENTRY_BYTES} bytes")
+        entry = _opened(key, path.read_bytes())
         os.utime(path)
         return entry
 

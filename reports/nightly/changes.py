@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.files.tree import Tree
+from analyses.finite import finite
 from reports.nightly.figures import Figure
 from reports.nightly.history import History
 from reports.nightly.moves import WINDOW, Tolerances, flaps
@@ -31,7 +32,7 @@ Differences = tuple[tuple[str, str, str], ...]  # name, before, after
 _CODE = Path(__file__).resolve().parents[2]
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Change:
     """One figure that moved beyond its tolerance; ``worse`` is ``None`` where no direction is known."""
 
@@ -60,7 +61,7 @@ class Cause:
     code: bool = False
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Comparison:
     """A design tonight against one earlier night; without ``run`` there was nothing to compare with."""
 
@@ -96,11 +97,9 @@ class Columns:
         """List every figure that moved beyond its tolerance, appeared or vanished; the worst first."""
         allowed, changes = self.allowed(before, after), []
         for k in np.flatnonzero(self.moved(before, after)):
-            of = self.figures[k]
-            old, new = (float(value) if np.isfinite(value) else None for value in (before[k], after[k]))
-            about: dict[str, Any] = {"figure": of.name, "unit": of.unit, "kind": of.kind}
-            about |= {"before": old, "after": new, "tolerance": float(allowed[k])}
-            changes.append(Change(**about, worse=_worse(of, old, new)))
+            of, old, new = self.figures[k], finite(before[k]), finite(after[k])
+            worse = _worse(of, old, new)
+            changes.append(Change(of.name, of.unit, of.kind, old, new, float(allowed[k]), worse))
         return tuple(sorted(changes, key=_order))
 
 
@@ -139,7 +138,7 @@ class Between:
             return Comparison(note=first)
         skipped = sum(good[-1].run < night < result.run for night in self._runs)
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
-        found = self._compare(good[-1], result, note if skipped else "")
+        found = self._compare(good[-1], result, note * bool(skipped))
         shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
         courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T
         marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]
@@ -148,23 +147,19 @@ class Between:
     def baseline(self, result: Result, approval: Baseline | None) -> Comparison:
         """What changed since the approved night, else since the first that has a result."""
         nights = self.history.runs if approval is None else [self._runs[approval.run]]
-        first = self.history.first(result.name, nights)
+        first, note = self.history.first(result.name, nights), ""
         if first is None:
             return Comparison(note="no baseline: no night has a result")
-        if approval is not None:
-            return self._compare(first, result, "")
-        if first.run == result.run:
-            note = "this is the first night: nothing to compare with"
-            return Comparison(run=self.history.runs[-1], note=note)
-        note = "nobody has approved a baseline yet: compared with the first night"
+        if approval is None and first.run == result.run:
+            return Comparison(self._runs[first.run], note="this is the first night: nothing to compare with")
+        if approval is None:
+            note = "nobody has approved a baseline yet: compared with the first night"
         return self._compare(first, result, note)
 
     def _compare(self, old: Result, new: Result, note: str) -> Comparison:
         before, after = self._runs[old.run], self._runs[new.run]
-        if new.home is None:
-            return Comparison(run=before, note=note or "no result tonight")
-        if new.home == old.home:
-            return Comparison(run=before, note=note)
+        if new.home is None or new.home == old.home:
+            return Comparison(before, note=note or "no result tonight" * (new.home is None))
         columns = self._columns_of(old, new)
         changes = columns.compare(*self.history.matrix((old, new), columns.names))
         was, now = (self.history.inputs(result) for result in (old, new))
@@ -175,7 +170,7 @@ class Between:
             commits=self._commits(before, after),
             code=before.code != after.code,
         )
-        return Comparison(run=before, changes=changes, cause=cause, note=note)
+        return Comparison(before, changes, cause, note)
 
     def _columns_of(self, old: Result, new: Result) -> Columns:
         """The figures of two results, each as the new one declares it where both have it."""
@@ -189,18 +184,15 @@ class Between:
     def _commits(self, old: Run, new: Run) -> tuple[tuple[str, str], ...]:
         """First lines of the commits between two nights, each with where: those of the code, of the study."""
         code, own = (old.code_commit, new.code_commit), (old.study_commit, new.study_commit)
-        lines = [("code", line) for line in commits_between(_CODE, *code)]
+        places = {"code": (_CODE, *code)}
         if self.origin is not None and own != code:
-            lines += [("study", line) for line in commits_between(self.origin, *own)]
-        return tuple(lines)
+            places["study"] = (self.origin, *own)
+        return tuple((where, line) for where, place in places.items() for line in commits_between(*place))
 
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Differences:
-    def text(value: object) -> str:
-        return "(none)" if value is None else str(value)
-
-    names = dict.fromkeys([*new, *old])
-    return tuple((n, text(old.get(n)), text(new.get(n))) for n in names if old.get(n) != new.get(n))
+    pairs = {name: (old.get(name, "(none)"), new.get(name, "(none)")) for name in {**new, **old}}
+    return tuple((name, str(was), str(now)) for name, (was, now) in pairs.items() if was != now)
 
 
 # ---- in words --------------------------------------------------------------------------------------------
@@ -211,7 +203,7 @@ NO_FIGURE = "no figure with a value changed"
 CODE_CHANGED = "sources of actuator-lti changed without a commit"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Headline:
     """One cause and its gravest effect; ``designs`` are all that it changed, the gravest first."""
 
@@ -233,7 +225,7 @@ def headlines(designs: Sequence[DesignView]) -> tuple[Headline, ...]:
         shown = main_changes(first.last_night)
         effect = change_words(shown[0], first.last_night, first.verdicts) if shown else NO_FIGURE
         worse = bool(shown[0].worse if shown else first.last_night.regressions)
-        made.append(Headline(cause=cause, effect=effect, worse=worse, designs=(first, *more)))
+        made.append(Headline(cause, effect, worse, (first, *more)))
     return tuple(sorted(made, key=lambda one: not one.worse))
 
 

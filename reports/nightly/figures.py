@@ -23,7 +23,7 @@ _INPUT_SECTIONS = ("parameters", "provenance")
 _AS_THEY_ARE = ("value", "unit", "distance", "verdict", "waiver", "source", "reason")
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Figure:
     """One number of a report; ``better`` says which way is (see `reports.document.column`)."""
 

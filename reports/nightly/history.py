@@ -98,12 +98,11 @@ class History:
     def claim(self, study: str) -> None:
         """Note whose history this is; that of another study is refused."""
         known = self.index.study
-        if known and known != study:
-            raise InputError(
-                f"holds the nights of study {known[:80]!r}, not of {study[:80]!r}: use another --site"
-            )
         if not known:
             self._put(replace(self.index, study=study))
+        elif known != study:
+            told = f"holds the nights of study {known[:80]!r}, not of {study[:80]!r}: use another --site"
+            raise InputError(told)
 
     def _put(self, index: Index) -> None:
         checksum = sha256(_INDEX.dump_json(index))
@@ -192,10 +191,8 @@ def open_history(state: Path) -> History:
     except ValidationError as error:
         raise InputError("is no history of a nightly build", where=str(path)) from error
     if head.version > VERSION:
-        raise InputError(
-            f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one",
-            where=str(path),
-        )
+        told = f"has version {head.version}, this actuator-lti knows up to {VERSION}: use a newer one"
+        raise InputError(told, where=str(path))
     sealed = _valid(_SEALED, data, path)
     if sha256(_INDEX.dump_json(sealed.index)) != sealed.sha256:
         raise _damaged(path, "is not what was written")

@@ -21,7 +21,7 @@ from reports.nightly.records import Result, Run
 from reports.nightly.source import CodeVersion, Job, Study, check_jobs, code_version, commit_of, read_study
 from reports.nightly.state import CACHE, INDEX, HistoryLost, Memory, check_memory, hold, state_of
 from reports.nightly.text import now, one_line
-from reports.nightly.view import Overview, overview
+from reports.nightly.view import Overview
 from reports.visible import visible
 
 DESIGNS_A_LIMIT = 50  # of a comparison, within one time limit
@@ -76,12 +76,8 @@ def run_night(
     the cache and not built again. The site is made where it is missing, refused where it holds something
     else. ``say`` gets one line for whatever somebody should know (a corrupt cache entry).
 
-    Raises
-    ------
-    InputError
-        Where the lock is held, the site or its state cannot be written, or the history is of a newer version.
-    HistoryLost
-        Where the history knows less than the site.
+    Raises `InputError` where the lock is held, site or state cannot be written, or the history is newer;
+    `HistoryLost` where the history knows less than the site.
     """
     use = settings or Settings()
     jobs = check_jobs(study.jobs, study.name)
@@ -99,7 +95,7 @@ def run_night(
         )
         outcomes = _outcomes(run, jobs, cache, use, progress, say)
         history.finish_run(run, clock(), outcomes)
-        return _published(study, site, history, cache, use, built=True)
+        return site_files.publish(site, study, history, cache, keep_reports=use.keep, built=True)
 
 
 def approve(
@@ -125,20 +121,11 @@ def approve(
         last = history.runs[-1]
         for name in names:
             if history.first(name, [last]) is None:
-                shown = repr(one_line(name, 80))
-                raise InputError(f"{shown} has no result in the last night: nothing to approve", study.name)
+                told = f"{one_line(name, 80)!r} has no result in the last night: nothing to approve"
+                raise InputError(told, study.name)
         about = {"by": one_line(by, 200), "reason": one_line(reason, 2000)}
         history.approve(last.id, list(names) or None, at=clock(), **about)
-        return _published(study, site, history, cache, use)
-
-
-def _published(
-    study: Study, site: Path, history: History, cache: Cache, use: Settings, *, built: bool = False
-) -> Overview:
-    """The last finished night, its site made anew from history and cache; ``built``: just now."""
-    view = overview(history, cache, study, site, built=built)
-    site_files.publish(site, view, history, cache, keep_reports=use.keep)
-    return view
+        return site_files.publish(site, study, history, cache, keep_reports=use.keep)
 
 
 @contextmanager
@@ -146,15 +133,14 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
     """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
     state = state_of(site, use.state)
     site_files.check_place(site)
-    there = (state / INDEX).exists()
-    if not there and not use.accept_lost_history:
-        check_memory(site, Memory(), state)  # before one is begun
+    there, check = (state / INDEX).exists(), _nobody if use.accept_lost_history else check_memory
+    if not there:
+        check(site, Memory(), state)  # before one is begun
     if begun and not there:
         raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s):
         history = open_history(state)
-        if not use.accept_lost_history:
-            check_memory(site, history.memory(), state)
+        check(site, history.memory(), state)
         history.claim(study.name)
         yield history, Cache(state / CACHE)
 

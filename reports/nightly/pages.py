@@ -14,15 +14,8 @@ from reports.charts import style
 from reports.charts.chart import Chart
 from reports.charts.svg import page_svg
 from reports.html import render
-from reports.nightly.changes import (
-    SHOWN_CHANGES,
-    Columns,
-    cause_lines,
-    cause_words,
-    change_words,
-    headlines,
-    main_changes,
-)
+from reports.nightly import changes
+from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure
 from reports.nightly.history import History
 from reports.nightly.moves import LOOK_BACK, ChangePoint, change_points, flaps
@@ -58,7 +51,7 @@ def index(night: Overview, folder: str) -> str:
         night=night,
         folder=folder,
         STATE_ORDER=tuple(STATES),
-        headlines=headlines(night.designs)[:MAX_HEADLINES],
+        headlines=changes.headlines(night.designs)[:MAX_HEADLINES],
     )
 
 
@@ -84,7 +77,7 @@ def design_page(night: Overview, design: DesignView, history: History, available
         steady=course.steady,
         nights=_nights(night, design, past, course, available),
         more_nights=max(0, len(past) - MAX_NIGHTS),
-        max_changes=SHOWN_CHANGES,
+        max_changes=changes.SHOWN_CHANGES,
     )
 
 
@@ -95,10 +88,7 @@ def _render(template: str, code: str, **context: Any) -> str:
         code=code,
         states=STATES,
         night_signs=NIGHT_SIGNS,
-        cause_lines=cause_lines,
-        cause_words=cause_words,
-        change_words=change_words,
-        main_changes=main_changes,
+        told=changes,
         visible=visible,
         one_line=one_line,
         **context,

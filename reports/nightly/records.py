@@ -92,10 +92,10 @@ class Night:
 
     @cached_property
     def figures(self) -> list[tuple[Figure, ...]]:
-        def figure(name: str, unit: str, better: int, kind: str) -> Figure:
-            return Figure(name=name, value=None, unit=unit, better=better, kind=kind)
-
-        return [tuple(figure(*named) for named in one) for one in self.layouts]
+        return [
+            tuple(Figure(name, None, unit, better, kind) for name, unit, better, kind in one)
+            for one in self.layouts
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,8 +20,9 @@ from actuator_lti.files.atomic import write_text, write_together
 from reports.nightly import machines, pages
 from reports.nightly.cache import Cache
 from reports.nightly.history import History
+from reports.nightly.source import Study
 from reports.nightly.text import sha256
-from reports.nightly.view import DesignView, Overview, report_folder, vanished
+from reports.nightly.view import DesignView, Overview, overview, report_folder, vanished
 
 MARKER = ".nightly-site"
 KEPT_NIGHTS = 3
@@ -60,8 +61,14 @@ def remove_leftovers(*folders: Path) -> None:
             leftover.unlink(missing_ok=True)
 
 
-def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep_reports: int) -> None:
-    """Lay out a night and switch to it; where the site cannot be written it stays as it was."""
+def publish(
+    site: Path, study: Study, history: History, cache: Cache, *, keep_reports: int, built: bool = False
+) -> Overview:
+    """Lay out the last finished night (``built`` just now) and switch to it.
+
+    Where the site cannot be written it stays as it was.
+    """
+    night = overview(history, cache, study, site, built=built)
     folder = f"nights/{night.run.id:06d}-{secrets.token_hex(4)}"
     wanted = {run.id for run in night.runs[-max(1, keep_reports) :]}  # the last nights, and the approved ones
     wanted |= {d.approval.run for d in night.designs if d.approval is not None}
@@ -83,6 +90,7 @@ def publish(site: Path, night: Overview, history: History, cache: Cache, *, keep
     for path in (*old, *(p for p in reports if p.relative_to(site).as_posix() not in kept)):
         shutil.rmtree(path, ignore_errors=True)
     cache.collect_garbage({d.result.key for d in night.designs}, KEPT_CACHE_DAYS)
+    return night
 
 
 def _lacking(site: Path, design: DesignView, cache: Cache) -> Iterator[tuple[Path, bytes]]:

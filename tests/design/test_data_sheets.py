@@ -461,6 +461,11 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
             ),
         ),
         ("[load]", '[load]\ncoulomb_friction = "6 mNm"', ("dry_torque of [load.friction]",)),
+        (
+            "[control]",
+            f'{CURRENT}integral = "25 Hz"\n[control]',
+            ("here 0.006366 s",),
+        ),
         ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
     ],
 )

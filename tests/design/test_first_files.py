@@ -211,11 +211,11 @@ def test_counts_are_no_angle_of_a_gain() -> None:
     assert "counts_per_rev" not in told(f'{DRIVE}[limits]\nvoltage = "3 counts"\n')
 
 
-@pytest.mark.parametrize("word", ["ppr", "CPT", "pulses"])
+@pytest.mark.parametrize("word", ["ppr", "CPT", "pulses", "CPR"])
 def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
     # of one maker 1024 ppr are 4096 counts after quadrature, of another 1024
     text = told(f'{DRIVE}[encoder]\ncounts_per_rev = "1024 {word}"\n')
-    assert 'write "lines" (4 counts each) or "counts"' in text
+    assert 'write "1024 lines" (4096 counts) or "1024 counts"' in text
 
 
 @pytest.mark.parametrize("limit", ['acceleration = "1500 1/s²"', 'speed = "100 1/s"'])

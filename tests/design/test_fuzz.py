@@ -88,6 +88,13 @@ def test_a_shipped_design_survives_being_written(name: str) -> None:
     survives(load_design(name))
 
 
+def test_a_table_without_keys_survives() -> None:
+    empty: dict[str, object] = {name: {} for name in ("supply", "temperature", "failure", "duty")}
+    drive = load_design("ilr33-amber").with_values(empty)
+    assert None not in [getattr(drive, name) for name in empty]
+    survives(drive)
+
+
 @RELAXED
 @given(design_trees())
 def test_any_design_survives_being_written(tree: dict[str, Any]) -> None:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from ctypes import CFUNCTYPE, c_char_p, c_int, c_void_p, cast
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from actuator_lti.compiled.compiler import system_compiler
@@ -29,7 +28,6 @@ fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
 
 
 def written(folder: Path, design: Design, version: Version = 2, platform: str = "linux64") -> Path:
-    """The unit of a design in a folder."""
     path = folder / f"drive{version}.fmu"
     path.write_bytes(fmu_bytes(design, version, (platform,)))
     return path
@@ -43,29 +41,22 @@ class Host:
     references: dict[str, int]
     said: list[str] = field(default_factory=list)
 
-    def get(self, *names: str) -> list[float]:
-        """Values of real variables."""
-        return list(self._call("get", "Real", "Float64", names))
-
-    def integers(self, *names: str) -> list[int]:
-        """Values of integer variables."""
-        return list(self._call("get", "Integer", "Int32", names))
+    def get(self, *names: str, kind: str = "Real") -> list[float]:
+        return list(self._call("get", kind, names))
 
     def set(self, **values: float) -> None:
-        """Set real variables, all in one call."""
         self.put(values)
 
     def put(self, values: Mapping[str, float], kind: str = "Real") -> None:
         """Set variables of one type by their dotted names, all in one call."""
-        new = {"Real": "Float64", "Integer": "Int32"}[kind]
-        self._call("set", kind, new, list(values), list(values.values()))
+        self._call("set", kind, list(values), list(values.values()))
 
-    def _call(self, verb: str, old: str, new: str, names: Sequence[str], *more: Any) -> Any:
-        known = getattr(self.unit, verb + (old if isinstance(self.unit, fmi2.FMU2Slave) else new))
-        return known([self.references[name] for name in names], *more)
+    def _call(self, verb: str, kind: str, names: Sequence[str], *more: Any) -> Any:
+        if not isinstance(self.unit, fmi2.FMU2Slave):
+            kind = {"Real": "Float64", "Integer": "Int32"}[kind]
+        return getattr(self.unit, verb + kind)([self.references[name] for name in names], *more)
 
     def start(self, **values: float) -> Host:
-        """Go through the initialization."""
         if isinstance(self.unit, fmi2.FMU2Slave):
             self.unit.setupExperiment()
         self.unit.enterInitializationMode()
@@ -74,20 +65,7 @@ class Host:
         return self
 
     def step(self, now: float, step: float) -> None:
-        """One communication step."""
         self.unit.doStep(now, step)
-
-    def run(
-        self, step: float, stop: float, names: Sequence[str], inputs: Callable[[float], dict[str, float]]
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """Communication points and what is read there, inputs set at the beginning of each step."""
-        times = np.arange(1, int(stop / step) + 1) * step
-        rows = []
-        for n in range(times.size):
-            self.put(inputs(n * step))
-            self.step(n * step, step)
-            rows.append(self.get(*names))
-        return times, np.array(rows)
 
 
 @contextmanager

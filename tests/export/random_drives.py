@@ -14,12 +14,10 @@ Rng = np.random.Generator
 
 
 def scaled(rng: Rng, value: float) -> float:
-    """A value within a factor of three."""
     return float(value * 3.0 ** rng.uniform(-1.0, 1.0))
 
 
 def maybe(rng: Rng, value: Any, other: Any, share: float = 0.5) -> Any:
-    """One of two values."""
     return value if rng.random() < share else other
 
 

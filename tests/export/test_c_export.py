@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import needs_compiler, ran
 from random_drives import random_drive, random_elastic_drive, random_inputs
 
 from actuator_lti import load_design
-from actuator_lti.compiled.compiler import compile_files, system_compiler
+from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.design import design_hash
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
@@ -24,11 +25,9 @@ from nonlinear.native import LIBRARY, parameters, tick
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
-needs_compiler = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
 
 
 def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
-    """The exported files as a library."""
     sources = {name: text for name, text in texts.items() if name[-2:] in (".c", ".h") and name != "main.c"}
     path = folder / "drive.so"
     path.write_bytes(compile_files(sources, "drive.so", "linux64", (*STRICT, "-shared", "-fPIC")))
@@ -40,7 +39,7 @@ def said_by(folder: Path, texts: dict[str, str], *arguments: str, compiler: list
     program = folder / "program"
     program.write_bytes(compile_files(texts, "program", "linux64", STRICT, command=compiler))
     program.chmod(0o755)
-    return subprocess.run([str(program), *arguments], capture_output=True, text=True, check=True).stdout
+    return ran(folder, str(program), *arguments)
 
 
 @pytest.fixture(scope="module")

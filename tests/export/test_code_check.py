@@ -1,26 +1,19 @@
 """Margins of the compiled code: the exported code meets the loops, and a wrong one would be seen."""
 
 import re
-import sys
 import zipfile
 
 import pytest
-from typer.testing import CliRunner
+from programs import needs_compiler
 
 import actuator_lti.compiled.compiler as build_module
 import analyses.linear.code_check as code_check
 from actuator_lti import load_design
-from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.compiled.library import Library
 from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import c_export
 from nonlinear.native import LIBRARY
-from reports.cli.app import build
 from reports.export_documents import check_text, summary
-
-needs_compiler = pytest.mark.skipif(
-    system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler on this machine"
-)
 
 
 def functions_of(text: str) -> dict[str, str]:
@@ -81,21 +74,16 @@ def test_without_a_compiler_it_says_so(monkeypatch) -> None:
 
 
 @needs_compiler
-def test_exports_say_what_was_measured(tmp_path, monkeypatch) -> None:
-    runner, app = CliRunner(), build()
-    done = runner.invoke(app, ["export", "c", "ctms-motor-position", "--out", str(tmp_path / "c")])
-    assert done.exit_code == 0
-    assert "predictions of the linear loops are met by the compiled code" in done.output
+def test_exports_say_what_was_measured(tmp_path, monkeypatch, cli) -> None:
+    name, unit = "ctms-motor-position", tmp_path / "u.fmu"
+    said = cli.text("export", "c", name, "--out", tmp_path / "c")
+    assert "predictions of the linear loops are met by the compiled code" in said
     words = (tmp_path / "c/README.md").read_text()
     assert "## Margins of the compiled code" in words
     assert "| Position loop | phase margin | deg |" in words
-    arguments = ["export", "c", "ctms-motor-position", "--no-check", "--out", str(tmp_path / "d")]
-    assert runner.invoke(app, arguments).exit_code == 0
+    cli.text("export", "c", name, "--no-check", "--out", tmp_path / "d")
     assert "Not measured at this export" in (tmp_path / "d/README.md").read_text()
-    failed = CodeCheck(reason="said here")
-    monkeypatch.setattr(code_check, "check_code", lambda _: failed)
-    unit = tmp_path / "u.fmu"
-    arguments = ["export", "fmu", "ctms-motor-position", "--platform", "linux64", "--out", str(unit)]
-    assert runner.invoke(app, arguments).exit_code == 0
+    monkeypatch.setattr(code_check, "check_code", lambda _: CodeCheck(reason="said here"))
+    cli.text("export", "fmu", name, "--platform", "linux64", "--out", unit)
     with zipfile.ZipFile(unit) as archive:
         assert b"Not measured: said here" in archive.read("documentation/compiled_code.md")

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import ran
 from random_drives import law_at, random_drive, random_elastic_drive
 
 from actuator_lti import load_design
@@ -24,12 +25,6 @@ STRICT = (
 )  # fmt: skip
 MATHEMATICS = {"sqrt", "floor", "sqrtf", "floorf"}  # of a profile with limited acceleration
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc on this machine")
-
-
-def ran(folder: Path, *call: str) -> str:
-    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr[:2000]
-    return done.stdout
 
 
 def written(folder: Path, design: Design, *, single: bool, prefix: str = "drive_") -> Path:

@@ -19,7 +19,6 @@ STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconvers
 
 
 def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] = ()) -> ctypes.CDLL:
-    """The entries compiled with every warning an error."""
     source, binary = folder / "t.c", folder / "t.so"
     source.write_text(emit_c(entries, "t_", forms).source)
     assert COMPILER is not None

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import needs_compiler
 
 from actuator_lti import load_design
-from actuator_lti.compiled.compiler import system_compiler
 from examples import firmware_controller as firmware
 
-pytestmark = pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
+pytestmark = needs_compiler
 
 
 def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> None:

@@ -104,7 +104,7 @@ def test_counts_and_rates_are_integers(unit: Path) -> None:
         host.start(command=0.05).step(0.0, 200 * PERIOD)
         ours = simulate(with_values(load_design("ilr33-amber"), change), commands.step(0.05), 202 * PERIOD)
         assert host.get("output.angle")[0] == pytest.approx(ours.output_angle_rad[200], abs=1e-15)
-        assert host.integers("control.position.every") == [6]
+        assert host.get("control.position.every", kind="Integer") == [6]
 
 
 def test_keys_that_contradict_each_other_are_refused_as_in_a_design_file(unit: Path) -> None:

@@ -2,11 +2,11 @@
 
 import re
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from programs import needs_compiler, needs_node, ran
 
 from actuator_lti import load_design
 from nonlinear import commands, loads, simulate
@@ -16,33 +16,24 @@ from nonlinear.drive import Drive
 PAGE = (Path(__file__).parents[2] / "docs" / "hosts.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"(?ms)^## ([^\n]+)\n(.*?)(?=^## |\Z)", PAGE))
 CC = shutil.which("gcc") or shutil.which("clang")
-needs_compiler = pytest.mark.skipif(CC is None, reason="no C compiler on this machine")
 
 
 def block(title: str, language: str, number: int = 0) -> str:
-    """A block of code of the page."""
     return re.findall(rf"(?ms)^```{language}\n(.*?)^```", PARTS[title])[number]
 
 
-def said(folder: Path, *call: str) -> str:
-    done = subprocess.run(call, cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr[-2000:]
-    return done.stdout
-
-
 def exported(folder: Path, title: str) -> None:
-    """Runs the commands of a section."""
     for line in block(title, "sh").splitlines():
         words = line.split()
         assert words[0] == "actuator-lti"
-        said(folder, sys.executable, "-m", "reports.cli", *words[1:])
+        ran(folder, sys.executable, "-m", "reports.cli", *words[1:])
 
 
 def compiled(folder: Path, title: str, *files: str) -> str:
     (folder / "host.c").write_text(block(title, "c"))
     call = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "host.c", *files)
-    said(folder, str(CC), *call, "-lm", "-o", "host")
-    return said(folder, str(folder / "host"))
+    ran(folder, str(CC), *call, "-lm", "-o", "host")
+    return ran(folder, str(folder / "host"))
 
 
 @pytest.fixture(scope="module")
@@ -74,21 +65,21 @@ def test_two_designs_in_one_program_each_have_the_bits_of_the_simulator(tmp_path
 def test_the_host_of_the_unit(truth: float, tmp_path: Path) -> None:
     pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
     exported(tmp_path, "The unit")
-    host = said(tmp_path, sys.executable, "-c", block("The unit", "python"))
+    host = ran(tmp_path, sys.executable, "-c", block("The unit", "python"))
     assert float(host) == pytest.approx(truth, rel=1e-9)
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
+@needs_node
 def test_the_host_in_javascript(truth: float, tmp_path: Path) -> None:
-    said(tmp_path, sys.executable, "-c", block("WebAssembly", "python"))
+    ran(tmp_path, sys.executable, "-c", block("WebAssembly", "python"))
     (tmp_path / "host.mjs").write_text(block("WebAssembly", "javascript"))
-    assert float(said(tmp_path, "node", "host.mjs")) == pytest.approx(truth, rel=1e-9)
+    assert float(ran(tmp_path, "node", "host.mjs")) == pytest.approx(truth, rel=1e-9)
     assert at.IO_OUTPUT == 14  # the page says so
 
 
 def test_the_host_of_the_module_in_python(truth: float, tmp_path: Path) -> None:
     pytest.importorskip("wasmtime", reason="wasmtime is not installed")
-    _, host = (said(tmp_path, sys.executable, "-c", block("WebAssembly", "python", n)) for n in (0, 1))
+    _, host = (ran(tmp_path, sys.executable, "-c", block("WebAssembly", "python", n)) for n in (0, 1))
     assert float(host) == pytest.approx(truth, rel=1e-9)
 
 

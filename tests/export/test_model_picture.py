@@ -7,10 +7,10 @@ from importlib.util import find_spec
 
 import matplotlib.image
 import pytest
+from programs import needs_compiler
 
 import reports.model_picture as model_picture
 from actuator_lti import load_design
-from actuator_lti.compiled.compiler import system_compiler
 from actuator_lti.design.loader import shipped_designs
 from nonlinear.export.fmu import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
@@ -51,7 +51,7 @@ def test_names_cannot_break_the_picture() -> None:
 
 
 @needs_typesetter
-@pytest.mark.skipif(system_compiler() is None, reason="no C compiler on this machine")
+@needs_compiler
 def test_units_carry_it() -> None:
     design = load_design("ctms-motor-position")
     for version, name in ((2, "model.png"), (3, "documentation/diagram.png")):

@@ -5,19 +5,16 @@ import threading
 from collections.abc import Callable
 from dataclasses import replace
 
-import control
 import numpy as np
 import pytest
+from programs import needs_compiler
 from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import load_design
-from actuator_lti.axis.library import LIBRARY as AXIS
-from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
 from actuator_lti.compiled import compiler
 from actuator_lti.compiled.library import Library
 from actuator_lti.errors import InputError
-from actuator_lti.margins import stability_margins
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
@@ -101,28 +98,6 @@ def test_batches_have_the_bits_of_the_kernels_as_written() -> None:
     assert ours.status.tolist() == theirs.status.tolist()
 
 
-def test_figures_are_those_of_the_kernels_as_written() -> None:
-    """To rounding: Python's hypot is not the C library's."""
-    design = load_design("ctms-motor-position")
-    gain = design.parameters["control.position.gain"].value
-    population = Population(design, {"control.position.gain": gain * np.array([1.0, 1.1])}, 2)
-    ours = linear_figures(population, time_figures=False)
-    with FIGURES.written():
-        theirs = linear_figures(population, time_figures=False)
-    np.testing.assert_allclose(ours.raw, theirs.raw, rtol=1e-9)
-
-
-def test_margins_are_those_of_the_kernels_as_written() -> None:
-    """Over a resonance, an integrator and a delay: the search of the axis, passages and distances."""
-    loop = control.tf([0.2, 0.3, 9.0], [1.0, 0.3, 9.0, 0.0])
-    ours = stability_margins(loop, delay_s=0.1)
-    with AXIS.written():
-        theirs = stability_margins(loop, delay_s=0.1)
-    assert len(ours.gain_margins) == len(theirs.gain_margins) > 1
-    for name in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
-        assert getattr(ours, name) == pytest.approx(getattr(theirs, name), rel=1e-9)
-
-
 def test_a_run_leaves_the_interpreter_to_other_threads() -> None:
     """Somebody counts while a run is under way: the call has released the GIL."""
     design, counted, done = load_design("ilr33-amber"), 0, threading.Event()
@@ -154,7 +129,7 @@ def test_a_library_is_named_by_its_sources(library: Library, tmp_path) -> None:
     assert other.path("win32-AMD64").suffix == ".dll"
 
 
-@pytest.mark.skipif(compiler.system_compiler() is None, reason="no C compiler on this machine")
+@needs_compiler
 def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Library) -> None:
     old = library.path().with_name(f"figures-0123456789abcdef-{compiler.HERE}.so")
     old.parent.mkdir()

@@ -4,18 +4,20 @@ import io
 import sys
 import threading
 
+import pytest
+
 from nonlinear.runs import watch as waiting
 
 
-class Terminal(io.StringIO):
-    """Standard error that is a terminal, and says when something was written."""
+class Stream(io.StringIO):
+    """Standard error of a terminal or of a log; says when something was written."""
 
-    def __init__(self) -> None:
+    def __init__(self, terminal: bool) -> None:
         super().__init__()
-        self.written = threading.Event()
+        self.terminal, self.written = terminal, threading.Event()
 
     def isatty(self) -> bool:
-        return True
+        return self.terminal
 
     def flush(self) -> None:
         super().flush()
@@ -23,32 +25,15 @@ class Terminal(io.StringIO):
             self.written.set()
 
 
-def terminal_of(monkeypatch) -> Terminal:
-    """Not a fixture: pytest puts its own stream in place between a fixture and its test."""
-    made = Terminal()
-    monkeypatch.setattr(sys, "stderr", made)
+@pytest.mark.parametrize(
+    ("terminal", "after_s", "said"), [(True, 0.0, "the kettle boils\n"), (True, 1e3, ""), (False, 0.0, "")]
+)
+def test_a_wait_is_told_once_on_a_terminal(terminal: bool, after_s: float, said: str, monkeypatch) -> None:
+    stream = Stream(terminal)
+    monkeypatch.setattr(sys, "stderr", stream)
     monkeypatch.setattr(waiting, "_told", set())
-    return made
-
-
-def test_a_wait_is_told_once(monkeypatch) -> None:
-    terminal = terminal_of(monkeypatch)
-    for _ in range(2):
-        with waiting.told_if_slow("the kettle boils", 0.0):
-            assert terminal.written.wait(10.0)
-    assert terminal.getvalue() == "the kettle boils\n"
-
-
-def test_no_wait_no_line(monkeypatch) -> None:
-    terminal = terminal_of(monkeypatch)
-    with waiting.told_if_slow("the kettle boils", 1e3):
-        pass
-    assert terminal.getvalue() == ""
-
-
-def test_nothing_is_said_to_a_log(monkeypatch) -> None:
-    log = io.StringIO()
-    monkeypatch.setattr(sys, "stderr", log)
-    with waiting.told_if_slow("the kettle boils", 0.0):
-        pass
-    assert log.getvalue() == ""
+    for wait_s in (10.0 if said else 0.0, 0.2):
+        stream.written.clear()
+        with waiting.told_if_slow("the kettle boils", after_s):
+            assert stream.written.wait(wait_s) is (wait_s > 1.0)
+    assert stream.getvalue() == said

@@ -1,16 +1,13 @@
 """The kept WebAssembly: made of today's sources, without imports, small, equal to the simulator in node."""
 
 import hashlib
-import json
-import shutil
-import subprocess
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from programs import in_json, in_node, needs_node
 from random_drives import random_drive, random_inputs
 
 from actuator_lti import load_design
@@ -20,8 +17,6 @@ from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
 from nonlinear.native import parameters, tick
-
-MODULE = Path(__file__).parents[2] / "nonlinear/export/wasm/drive.wasm"
 
 
 def test_kept_module_is_made_of_these_sources() -> None:
@@ -44,18 +39,10 @@ def test_building_again_gives_the_same_bytes() -> None:
     assert build_wasm() == kept_wasm()
 
 
-def in_node(units: list[dict[str, Any]], folder: Path, **more: int) -> Any:
-    given = {
-        "units": units, **more,
-        "at": {"command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
-               "current": at.IO_CURRENT},
-    }  # fmt: skip
-    (folder / "given.json").write_text(json.dumps(given))
-    host = Path(__file__).with_name("wasm_host.mjs")
-    call = ["node", str(host), str(MODULE), str(folder / "given.json")]
-    done = json.loads(subprocess.run(call, capture_output=True, text=True, check=True).stdout)
-    assert done["imports"] == []
-    return done
+AT = {
+    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
+    "current": at.IO_CURRENT,
+}  # fmt: skip
 
 
 def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
@@ -71,27 +58,17 @@ def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
         io[at.IN_COMMAND], io[at.IN_LOAD] = command[k], moment[k]
         assert tick(p, s, io) == at.OK
         ours[k] = io[at.IO_OUTPUT], io[at.IO_SPEED], io[at.IO_CURRENT]
-    numbers = [float(x) if np.isfinite(x) else str(x).replace("inf", "Infinity") for x in row]
-    return {"row": numbers, "command": command.tolist(), "moment": moment.tolist()}, ours
+    return {"row": in_json(row), "command": command.tolist(), "moment": moment.tolist()}, ours
 
 
-def assert_equal(theirs: Any, ours: np.ndarray) -> None:
-    """Another C library's exp, sin, log: 1e-9 of the largest value."""
-    assert (np.abs(np.array(theirs) - ours).max(axis=0) <= 1e-9 * np.abs(ours).max(axis=0)).all()
+@needs_node
+def test_instances_interleave_have_the_simulators_motion_and_go_back(tmp_path) -> None:
+    """One module, five designs in turns; the last is saved, runs ahead, and goes back twice to the same bits.
 
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-@pytest.mark.parametrize("seed", [-1, 0, 1, 2, 3])
-def test_equal_to_the_simulator_in_node(seed: int, tmp_path) -> None:
-    unit, ours = drive(seed)
-    assert_equal(in_node([unit], tmp_path)["rows"][0], ours)
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_two_instances_interleave_and_each_goes_back(tmp_path) -> None:
-    """One module, two designs in turns; one is saved, runs ahead, and goes back twice to the same bits."""
-    (one, ours), (other, theirs) = drive(-1), drive(1)
-    done = in_node([one, other], tmp_path, keep=150)
-    for rows, expected in zip(done["rows"], (ours, theirs), strict=True):
-        assert_equal(rows, expected)
-    assert done["backs"] == [done["rows"][1][150:]] * 2
+    Another C library's exp, sin, log: 1e-9 of the largest value.
+    """
+    units, motions = zip(*map(drive, (-1, 0, 2, 3, 1)), strict=True)
+    done = in_node("wasm_host.mjs", tmp_path, units=units, at=AT, keep=150)
+    for theirs, ours in zip(done["rows"], motions, strict=True):
+        assert (np.abs(np.array(theirs) - ours).max(axis=0) <= 1e-9 * np.abs(ours).max(axis=0)).all()
+    assert done["backs"] == [done["rows"][-1][150:]] * 2

@@ -29,13 +29,11 @@ from targets import Target, targets  # noqa: E402 - needs the path
 
 from actuator_lti.errors import InputError, NumericalError  # noqa: E402
 
-LIMIT_S = 120
+LIMIT_S, SLICE_S = 120, 0.5
 
 
 @dataclass(frozen=True)
 class Find:
-    """An input that ended badly."""
-
     target: str
     number: int
     what: str
@@ -44,11 +42,10 @@ class Find:
 
 
 class TooSlow(BaseException):
-    """Not finished within the limit."""
+    pass
 
 
 def attack(target: Target, seed: int, number: int) -> Find | None:
-    """Try input ``number`` of a target."""
     draw = random.Random(f"{seed}/{target.name}/{number}")
     data = target.fault(draw.choice(target.seeds), draw)
     path = written(data, target.suffix)
@@ -92,8 +89,6 @@ def written(data: bytes, suffix: str) -> Path:
 
 @contextmanager
 def limited() -> Iterator[None]:
-    """End what takes too long."""
-
     def end(_number: int, _frame: object) -> None:
         raise TooSlow
 
@@ -107,25 +102,26 @@ def limited() -> Iterator[None]:
 
 
 def place(error: BaseException | None) -> str:
-    """The innermost line of ours."""
     frames = traceback.extract_tb(error.__traceback__) if error else []
     ours = [f for f in frames if "site-packages" not in f.filename and "/lib/python" not in f.filename]
     last = (ours or frames)[-1] if frames else None
     return f"{Path(last.filename).name}:{last.lineno} {last.name}" if last else ""
 
 
-def rounds(seed: int, chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
-    """Inputs without end, each target by its share."""
+def rounds(chosen: tuple[Target, ...]) -> Iterator[tuple[Target, int]]:
+    """Inputs without end, of each target for some time."""
     number = Counter[str]()
     while True:
         for target in chosen:
-            for _ in range(target.share):
+            end = time.monotonic() + SLICE_S
+            while True:
                 yield target, number[target.name]
                 number[target.name] += 1
+                if time.monotonic() > end:
+                    break
 
 
 def main() -> int:
-    """Attack for a while and report."""
     words = argparse.ArgumentParser(description=__doc__)
     words.add_argument("--seconds", type=float, default=600.0)
     words.add_argument("--inputs", type=int, default=10**12)
@@ -138,7 +134,7 @@ def main() -> int:
     finds: dict[tuple[str, str], Find] = {}
     done, begin = Counter[str](), time.monotonic()
     say, end = begin + asked.say, begin + asked.seconds
-    for count, (target, number) in enumerate(rounds(asked.seed, chosen)):
+    for count, (target, number) in enumerate(rounds(chosen)):
         now = time.monotonic()
         if count >= asked.inputs or now > end:
             break

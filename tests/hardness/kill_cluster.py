@@ -6,7 +6,6 @@ against one that nobody disturbed: its result, and every file that it keeps. Pri
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import random
@@ -17,6 +16,7 @@ import time
 import traceback
 from collections import Counter
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 
 import distributed  # noqa: F401 - here, not in every child
@@ -56,7 +56,6 @@ def reduced(folder: Path, seed: int, engine: Engine) -> object:
 
 
 def compared(folder: Path, seed: int, engine: Engine) -> object:
-    """A comparison of variants."""
     plan = folder.with_suffix(".toml")
     plan.write_text(SWEEP % (15 + seed))
     found = compare(load_study(plan), engine=engine, folder=folder)
@@ -67,15 +66,12 @@ STUDIES: tuple[Callable[[Path, int, Engine], object], ...] = (kept, reduced, com
 
 
 class Cluster:
-    """A scheduler and workers, each a process that can be killed and started again."""
-
     def __init__(self, folder: Path) -> None:
         self.file, self.log = folder / "scheduler.json", folder / "cluster.log"
         self.scheduler: subprocess.Popen[bytes] | None = None
         self.workers: list[subprocess.Popen[bytes]] = []
 
     def start(self, workers: int = 2) -> None:
-        """Start what is not there."""
         if self.scheduler is None:
             self.end()
             self.file.unlink(missing_ok=True)
@@ -104,7 +100,6 @@ class Cluster:
             return subprocess.Popen(command, stdout=log, stderr=log, env={**os.environ, **environment})
 
     def kill(self, victim: str, draw: random.Random) -> None:
-        """Kill the scheduler, or one of the workers."""
         if victim == "scheduler":
             process, self.scheduler = self.scheduler, None
         else:
@@ -113,7 +108,6 @@ class Cluster:
         process.wait()
 
     def end(self) -> None:
-        """Kill all that are there."""
         for process in (self.scheduler, *self.workers):
             if process is not None:
                 process.kill()
@@ -140,13 +134,13 @@ def child(number: int, folder: Path, engine: Engine) -> int:
     return process
 
 
-def contents(folder: Path) -> dict[str, str]:
-    """Every file of a study by the hash of what it holds, and what was found."""
+def contents(folder: Path) -> dict[str, bytes]:
+    """Every file of a study, and what was found."""
     files = {path.relative_to(folder).as_posix(): path for path in folder.rglob("*") if path.is_file()}
     files["found"] = folder.with_suffix(".found")
     # a note of a reduced study says in which order its parts ended; ".part": killed while it was written
     return {
-        name: hashlib.sha256(path.read_bytes()).hexdigest()
+        name: path.read_bytes()
         for name, path in files.items()
         if not name.startswith("reduced-") and path.suffix != ".part"
     }
@@ -166,20 +160,22 @@ def ended(process: int, most_s: float = 240.0) -> int:
         time.sleep(0.01)
 
 
-def undisturbed(number: int, top: Path, cluster: Cluster) -> tuple[Path, float]:
-    """The study as it is when nobody is killed, made once; and how long it took."""
-    plain, timed = top / f"plain-{number % SEEDS}", top / f"plain-{number % SEEDS}.s"
-    if not timed.exists():
-        begin = time.monotonic()
-        assert ended(child(number % SEEDS, plain, Engine(scheduler=cluster.address))) == 0
-        timed.write_text(str(time.monotonic() - begin))
-    return plain, float(timed.read_text())
+@cache
+def undisturbed(number: int, top: Path, cluster: Cluster) -> tuple[dict[str, bytes], float]:
+    """What a study leaves when nobody is killed, and how long it took."""
+    begin, folder = time.monotonic(), top / f"plain-{number}"
+    assert ended(child(number, folder, Engine(scheduler=cluster.address))) == 0
+    return contents(folder), time.monotonic() - begin
 
 
 def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> Iterator[str]:
     """Disturb one study until it has ended; whom each kill met while the study ran."""
     cluster.start()
-    (plain, usual_s), folder, status = undisturbed(number, top, cluster), top / f"study-{number}", None
+    (plain, usual_s), folder, status = (
+        undisturbed(number % SEEDS, top, cluster),
+        top / f"study-{number}",
+        None,
+    )
     while status != 0:
         cluster.start()
         process = child(number % SEEDS, folder, Engine(scheduler=cluster.address))
@@ -194,7 +190,7 @@ def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> 
         yield victim
         status = ended(process)
         assert status in ENDS[victim], (victim, status)
-    assert contents(folder) == contents(plain), number
+    assert contents(folder) == plain, number
 
 
 def main(top: Path, kills: int, seed: int) -> dict[str, object]:

@@ -46,16 +46,12 @@ Fault = Callable[[bytes, random.Random], bytes]
 
 @dataclass(frozen=True)
 class Target:
-    """Something that takes a file."""
-
     name: str
     seeds: tuple[bytes, ...]  # valid inputs
     # Gets the path of a damaged file in a folder of its own; InputError is a good end
     attack: Callable[[Path], object]
     suffix: str = ".toml"
     fault: Fault = damaged
-    # Inputs of this target in a round, by what they cost: some 100 us of a loader, a second of a command
-    share: int = 500
 
 
 SETTINGS = b'[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
@@ -109,6 +105,8 @@ CONTROLLERS = (
     b"motor.PID_velocity.P = 0.5f;\nmotor.PID_velocity.I = 1;\n",
 )
 RESPONSE = b"f_hz,gain_db,phase_deg,coherence\n1,20,-90,0.99\n2,14,-95,0.98\n4,7.5,-102,0.9\n"
+SAMPLED = ("motor.resistance", "motor.inductance")
+SAMPLES = b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n"
 SUMMARY = b'{"history": {"id": "x", "nights": 3, "approvals": 1}}'
 JSON_ROWS = b'{"t": [0.0, 1.0, 2.0], "i": [0.5, null, 1.5], "note": "text", "n": [1, 2, 3]}'
 SPEC = RecordSpec(
@@ -123,7 +121,6 @@ SPEC = RecordSpec(
 
 @cache
 def base() -> Design:
-    """What overrides and settings are for."""
     return load_design("ilr33-amber")
 
 
@@ -200,14 +197,12 @@ def command(*words: str) -> Callable[[Path], None]:
 
 
 def command_line(path: Path) -> None:
-    """Run the command whose words the file holds, in the file's folder."""
     words = json.loads(path.read_bytes())
     with contextlib.chdir(path.parent):
         called([word.replace("OUT", str(path.parent)).replace("FILE", str(path)) for word in words])
 
 
 def called(given: list[str]) -> None:
-    """Run a command; its status and its words are looked at."""
     from reports.cli.main import main
 
     out, err = io.StringIO(), io.StringIO()
@@ -276,7 +271,6 @@ def toml_fault(data: bytes, draw: random.Random) -> bytes:
 
 
 def without_none(value: Any) -> Any:
-    """Plain data as TOML has it."""
     if isinstance(value, dict):
         return {str(k): without_none(v) for k, v in value.items() if v is not None}
     return [without_none(v) for v in value if v is not None] if isinstance(value, list) else value
@@ -332,42 +326,39 @@ def xml_seed() -> bytes:
 
 @cache
 def targets() -> tuple[Target, ...]:
-    """All targets."""
     designs = tuple(design_text(name).encode() for name in shipped_designs())
-    linear = ("margins", "FILE", "--json")
+    to_pdf = command("pdf", "FILE", "--out", "FOLDER/x.pdf")
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
     return (
         Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),
-               lambda p: parse_quantity(p.read_bytes().decode("utf-8", "replace"), "N*m"), share=1500),
-        Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override, share=200),
-        Target("design", designs, design_round, share=200),
-        Target("extreme design", designs, design_round, fault=extreme, share=200),
-        Target("settings", (SETTINGS,), settings, share=1000),
-        Target("settings xml", (xml_seed(),), settings, ".xml", share=1000),
-        Target("controller file", CONTROLLERS, controller_file, ".xml", share=400),
-        Target("response", (RESPONSE,), read_response, ".csv", share=800),
-        Target("response in mat", mat_files(), read_response, ".mat", share=1500),
-        Target("study", (STUDY,), lambda p: read_study(str(p)), share=200),
-        Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault, share=200),
-        Target("campaign", (CAMPAIGN,), load_campaign, share=1000),
-        Target("record file", (RECORD,), record, share=800),
-        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv", share=600),
-        Target("record by itself", (KNOWN_ROWS,), open_record, ".csv", share=600),
-        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat", share=1500),
-        Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault, share=600),
-        Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet", share=800),
-        Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv", share=800),
-        Target("samples", (b"motor.resistance,motor.inductance\n0.05,1e-5\n0.06,2e-5\n",),
-               lambda p: read_table(p, ("motor.resistance", "motor.inductance")), ".csv", share=600),
-        Target("outer loop", AROUND, read_outer_loop, ".json", tree_fault, share=1000),
-        Target("report", (small_report(),), report, ".json", tree_fault, share=600),
-        Target("site", (SUMMARY,), summary, ".json", tree_fault, share=1000),
-        Target("history", (history_files()[INDEX],), history, ".json", tree_fault, share=100),
-        Target("cache entry", (entry_file(),), entry, ".entry", share=1000),
-        Target("command line", seeds(), command_line, ".json", hostile, share=6),
-        Target("command margins", designs, command(*linear), fault=extreme, share=1),
-        Target("command simulate", designs, command(*move), fault=extreme, share=4),
-        Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme, share=4),
-        Target("command pdf", (small_report(),), command("pdf", "FILE", "--out", "FOLDER/x.pdf"), ".json",
-               tree_fault, share=3),
+               lambda p: parse_quantity(p.read_bytes().decode("utf-8", "replace"), "N*m")),
+        Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override),
+        Target("design", designs, design_round),
+        Target("extreme design", designs, design_round, fault=extreme),
+        Target("settings", (SETTINGS,), settings),
+        Target("settings xml", (xml_seed(),), settings, ".xml"),
+        Target("controller file", CONTROLLERS, controller_file, ".xml"),
+        Target("response", (RESPONSE,), read_response, ".csv"),
+        Target("response in mat", mat_files(), read_response, ".mat"),
+        Target("study", (STUDY,), lambda p: read_study(str(p))),
+        Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault),
+        Target("campaign", (CAMPAIGN,), load_campaign),
+        Target("record file", (RECORD,), record),
+        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
+        Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
+        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
+        Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault),
+        Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet"),
+        Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),
+        Target("samples", (SAMPLES,), lambda p: read_table(p, SAMPLED), ".csv"),
+        Target("outer loop", AROUND, read_outer_loop, ".json", tree_fault),
+        Target("report", (small_report(),), report, ".json", tree_fault),
+        Target("site", (SUMMARY,), summary, ".json", tree_fault),
+        Target("history", (history_files()[INDEX],), history, ".json", tree_fault),
+        Target("cache entry", (entry_file(),), entry, ".entry"),
+        Target("command line", seeds(), command_line, ".json", hostile),
+        Target("command margins", designs, command("margins", "FILE", "--json"), fault=extreme),
+        Target("command simulate", designs, command(*move), fault=extreme),
+        Target("command objects", designs, command("objects", "export", "FILE"), fault=extreme),
+        Target("command pdf", (small_report(),), to_pdf, ".json", tree_fault),
     )  # fmt: skip

@@ -72,35 +72,25 @@ def answers(address: str) -> bool:
         return False
 
 
-def test_the_local_cluster_opens_no_door() -> None:
+def test_local_clusters_open_no_door_and_do_not_ask_for_the_same_port() -> None:
     import distributed
 
-    before = set(listening())
-    with clusters.local_cluster(1) as cluster:
-        doors = set(listening()) - before
-        assert doors
-        assert {ip for ip, _ in doors} == {"127.0.0.1"}
-        assert [page for _, port in doors for page in pages(port)] == []
-        address = cluster.scheduler_address
-        assert address.startswith("tls://")
-        plain = address.replace("tls://", "tcp://")
-        with pytest.raises((OSError, TimeoutError)):
-            distributed.Client(plain, timeout=2)
-        assert not answers(address)
-
-
-def test_two_local_clusters_do_not_ask_for_the_same_port() -> None:
-    with socket.socket() as taken:
+    with contextlib.ExitStack() as stack:
+        taken = stack.enter_context(socket.socket())
         with contextlib.suppress(OSError):  # somebody else has it: as good
             taken.bind(("127.0.0.1", 8787))
             taken.listen()
+        before = set(listening())
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            before = set(listening())
-            with clusters.local_cluster(1), clusters.local_cluster(1):
-                doors = set(listening()) - before
-                assert {ip for ip, _ in doors} == {"127.0.0.1"}
-                assert [page for _, port in doors for page in pages(port)] == []
+            address, _ = (stack.enter_context(clusters.local_cluster(1)).scheduler_address for _ in range(2))
+        doors = set(listening()) - before
+        assert {ip for ip, _ in doors} == {"127.0.0.1"}
+        assert [page for _, port in doors for page in pages(port)] == []
+        assert address.startswith("tls://")
+        with pytest.raises((OSError, TimeoutError)):
+            distributed.Client(address.replace("tls://", "tcp://"), timeout=2)
+        assert not answers(address)
 
 
 def test_items_come_back_whole_and_an_error_goes_its_way() -> None:

@@ -1,13 +1,11 @@
 """A minute of the attack, the same inputs every time; inputs by which it once found something."""
 
 import json
-import random
 import re
 
 import numpy as np
 import pytest
 from fuzz import attack, written
-from mutate import damaged, damaged_tree, extreme
 from targets import Target, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
@@ -47,29 +45,15 @@ def test_the_attack_sees_what_it_looks_for() -> None:
     assert any(attack(Target("careless", (b"5",), careless), SEED, k) for k in range(30))
 
 
-def test_damage_is_damage_and_comes_again() -> None:
-    data = b'[motor]\nresistance = "55 mohm"\nratio = 66\n' * 5
-    for fault in (damaged, extreme):
-        made = [fault(data, random.Random(k)) for k in range(60)]
-        assert made == [fault(data, random.Random(k)) for k in range(60)]
-        assert len(set(made)) > 20
-    tree = {"a": [1, {"b": "c"}], "d": None}
-    trees = [damaged_tree(tree, random.Random(k)) for k in range(60)]
-    assert tree == {"a": [1, {"b": "c"}], "d": None}
-    assert sum(one != tree for one in trees) > 50
-
-
 BY_NAME = {target.name: target for target in targets()}
 
 
 def refused(name: str, data: bytes) -> str:
-    """What is said of an input."""
     target = BY_NAME[name]
     return refusals.refused(target.attack, written(data, target.suffix))
 
 
 def first(kind: str, made: dict) -> dict:
-    """The first block of a kind."""
     return next(block for block in made["sections"][0]["blocks"] if block["kind"] == kind)
 
 
@@ -141,12 +125,3 @@ def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
 def test_rows_too_close_for_the_filter(period_s: float) -> None:
     with pytest.raises(InputError, match="too low for rows"):
         filtered_motion(np.linspace(0.0, 1.0, 100), period_s, cutoff_hz=50.0, order=4)
-
-
-def test_files_of_the_attack_lie_alone_in_their_folder() -> None:
-    first = written(b"1", ".toml")
-    (first.parent / "more").mkdir()
-    (first.parent / "link").symlink_to("more")
-    second = written(b"2", ".csv")
-    assert [path.name for path in second.parent.iterdir()] == ["input.csv"]
-    assert attack(Target("fine", (b"x",), lambda path: path.read_bytes(), fault=damaged), 1, 1) is None

@@ -184,7 +184,6 @@ def night(site: Path, margin: float = 10.0, settings: Settings = INLINE, **more:
 
 
 def contents(path: Path) -> dict[str, bytes]:
-    """What lies at and below a path."""
     below = [path, *path.rglob("*")] if path.is_dir() else [path]
     return {str(one): one.read_bytes() if one.is_file() else b"" for one in below if os.path.lexists(one)}
 

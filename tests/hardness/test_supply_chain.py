@@ -20,7 +20,6 @@ def entries(lock: str) -> list[str]:
 
 
 def versions(lock: str) -> dict[str, str]:
-    """By name."""
     return dict(re.match(r"([A-Za-z0-9._-]+)==(\S+)", entry).groups() for entry in entries(lock))
 
 

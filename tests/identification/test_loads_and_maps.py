@@ -14,6 +14,7 @@ from analyses.identification.bench import identify_bench
 from analyses.identification.electrical import electrical_values, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records
+from analyses.identification.rows import recipe_for
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure
 from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
@@ -181,6 +182,14 @@ def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
     for fit in (calm, fast):
         assert fit["resistance"] == pytest.approx(0.5, abs=4.0 * fit.std("resistance") + 0.02)
         assert fit["back_emf"] == pytest.approx(0.02, rel=0.02)
+
+
+def test_a_cutoff_keeps_out_of_the_voltage_equation_what_is_above_it() -> None:
+    record = _voltage_record(0.0, fast=False)
+    tone = np.sin(2.0 * np.pi * 90.0 * TIME)
+    record = replace(record, signals={**record.signals, "voltage": record["voltage"] + tone})
+    far, near = (fit_electrical(_joint(), [record], recipe_for(record, hertz)) for hertz in (20.0, None))
+    assert far.relative_residual < 0.05 * near.relative_residual
 
 
 def test_the_motors_one_constant_goes_into_the_design_as_one() -> None:

@@ -139,6 +139,17 @@ def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
     assert all("not determined, the design's value kept" in one.reason for one in fit.fixed.values())
 
 
+def test_a_load_without_inertia_is_kept_without(tmp_path) -> None:
+    """A rigid drive whose rotor has it all: its inertia is the whole one at the motor."""
+    rigid = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
+    design = tmp_path / "rigid.toml"
+    design.write_text(rigid.format(J=5e-5, Jl=0.0, C=4e-4, d=6e-4))
+    hertz = HERTZ[HERTZ < 4.0]
+    fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
+    assert fit["motor.rotor_inertia"] == pytest.approx(2e-5 + 0.04 / N**2, rel=0.02)
+    assert fit.fixed["load.inertia"].value == 0.0
+
+
 def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
     """A stiffness that is held at half: no other values make up for it, and the page says so."""
     file, design = _measured(tmp_path, "L", 0.01, 3), _design(tmp_path, OFF)

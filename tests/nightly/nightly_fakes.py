@@ -32,19 +32,12 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
     """A small report: one requirement on ``margin`` (not proven where ``unknown``) and a table of margins."""
     name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
     unknown = bool(payload.get("unknown"))
-    item = verdict(
-        id=str(payload.get("requirement", "GM")),
-        label=str(payload.get("label", "gain margin")),
-        value=None if unknown else margin,
-        limit=limit,
-        comparison="≥",
-        unit="dB",
-        distance=None if unknown else margin - limit,
-        passed=None if unknown else margin >= limit,
-        source="test",
-        reason="not determined" if unknown else "",
-        waiver=str(payload.get("waiver", "")),
-    )
+    found = {"value": margin, "distance": margin - limit, "passed": margin >= limit}
+    if unknown:
+        found = dict.fromkeys(found) | {"reason": "not determined"}
+    named = str(payload.get("requirement", "GM")), str(payload.get("label", "gain margin"))
+    about = {"limit": limit, "comparison": "≥", "unit": "dB", "source": "test"}
+    item = verdict(*named, **about, **found, waiver=str(payload.get("waiver", "")))
     rows = [
         {"loop": loop, "phase_margin": 40.0 + margin + k, "crossover": 100.0 * (k + 1)}
         for k, loop in enumerate(["current", "velocity", str(payload.get("loop", "position"))])
@@ -55,16 +48,14 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
         column("crossover", "crossover", "rad/s", format="sig:4"),
     ]
     margins = table("Margins", columns, rows)
-    return document(
-        title=str(payload.get("title", name)),
-        subtitle="",
-        design={"name": name, "revision": str(payload.get("revision", "A"))},
-        provenance={"version": "0", "commit": None, "time": None},
-        sections=[
-            section("verdicts", "Requirements", [verdicts([item])], status=role(item)),
-            section("margins", "Margins", [margins], status=payload.get("part", "info")),
-        ],
-    )
+    sections = [
+        section("verdicts", "Requirements", [verdicts([item])], status=role(item)),
+        section("margins", "Margins", [margins], status=payload.get("part", "info")),
+    ]
+    design = {"name": name, "revision": str(payload.get("revision", "A"))}
+    origin = {"version": "0", "commit": None, "time": None}
+    title = str(payload.get("title", name))
+    return document(title=title, subtitle="", design=design, provenance=origin, sections=sections)
 
 
 def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]:
@@ -92,13 +83,9 @@ def build(payload: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, bytes]]
 
 def job(name: str, margin: float = 10.0, **more: Any) -> Job:
     """A job for `build`."""
-    payload = {"name": name, "margin": margin, **more}
-    return Job(
-        name=name,
-        payload=payload,
-        design_hash=f"{margin}",
-        parameters={"control.position.gain": f"{margin:g} 1/s"},
-    )
+    payload, gain = {"name": name, "margin": margin, **more}, f"{margin:g} 1/s"
+    parameters = {"control.position.gain": gain}
+    return Job(name=name, payload=payload, design_hash=f"{margin}", parameters=parameters)
 
 
 def study(*jobs: Job, name: str = "fake study", **more: Any) -> Study:

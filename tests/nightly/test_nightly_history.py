@@ -89,20 +89,18 @@ def test_a_night_enters_whole_or_not_at_all(tmp_path, monkeypatch) -> None:
     assert [run.id for run in history.runs] == [1, 3]
 
 
-def test_a_newer_history_is_refused(tmp_path) -> None:
-    history = open_history(tmp_path)
-    add(history, {"x": 1.0})
-    index = json.loads((tmp_path / files.INDEX).read_text())
-    (tmp_path / files.INDEX).write_text(json.dumps({**index, "version": files.VERSION + 1, "index": 3}))
-    with pytest.raises(InputError, match=r"has version 2.*use a newer"):
-        open_history(tmp_path)
+NEWER = json.dumps({"schema": files.SCHEMA, "version": files.VERSION + 1, "index": 3})
+NONE = ("no JSON", "[" * 100_000, "{}", '{"schema": "other", "version": 1}')
 
 
-@pytest.mark.parametrize("text", ["no JSON", "[" * 100_000, "{}", '{"schema": "other", "version": 1}'])
-def test_what_is_no_history_is_refused(tmp_path, text) -> None:
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [(NEWER, r"has version 2.*use a newer"), *((text, "no history of a nightly") for text in NONE)],
+)
+def test_what_is_no_history_or_a_newer_one_is_refused(tmp_path, text, words) -> None:
     path: Path = tmp_path / files.INDEX
     path.write_text(text)
-    with pytest.raises(InputError, match="no history of a nightly"):
+    with pytest.raises(InputError, match=words):
         open_history(tmp_path)
     assert path.read_text() == text
 

@@ -112,8 +112,7 @@ def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple
 
 
 def test_figures_keep_their_names_when_values_change() -> None:
-    first = [f.name for f in figures_of(fake_document({"name": "a", "margin": 5.0}))]
-    second = [f.name for f in figures_of(fake_document({"name": "a", "margin": 9.0}))]
+    first, second = ([f.name for f in figures_of(fake_document({"name": "a", "margin": m}))] for m in (5, 9))
     assert first == second
     assert len(set(first)) == len(first)
 
@@ -134,13 +133,12 @@ def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(
 
 
 def test_the_code_version_follows_the_sources(tmp_path) -> None:
-    package = tmp_path / "actuator_lti"
-    package.mkdir()
-    (package / "a.py").write_text("x = 1\n")
-    before = code_version(tmp_path).hash
-    assert code_version(tmp_path).hash == before
-    (package / "a.py").write_text("x = 2\n")
-    assert code_version(tmp_path).hash != before
+    source, hashes = tmp_path / "actuator_lti" / "a.py", []
+    source.parent.mkdir()
+    for words in ("x = 1", "x = 1", "x = 2"):
+        source.write_text(words)
+        hashes.append(code_version(tmp_path).hash)
+    assert hashes[0] == hashes[1] != hashes[2]
 
 
 def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
@@ -149,21 +147,20 @@ def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
         command = ["git", "-C", str(tmp_path), *identity, *words]
         return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
+    def commit(words: str) -> str:
+        (tmp_path / "f").write_text(words)
+        git("add", "f")
+        git("commit", "-q", "-m", words)
+        return git("rev-parse", "HEAD")
+
     git("init", "-q")
-    (tmp_path / "f").write_text("1")
-    git("add", "f")
-    git("commit", "-q", "-m", "first")
-    old = git("rev-parse", "HEAD")
-    (tmp_path / "f").write_text("2")
-    git("commit", "-q", "-a", "-m", "second <b>\u202e")
-    new = git("rev-parse", "HEAD")
+    old, new = commit("first"), commit("second <b>\u202e")
     trap = tmp_path / "trap"
     for key in ("core.fsmonitor", "core.pager", "core.hooksPath", "gpg.program", "diff.external"):
         git("config", key, f"touch {trap}")
     git("config", "log.showSignature", "true")
-    lines = commits_between(tmp_path, old, new)
-    assert len(lines) == 1
-    assert lines[0].endswith("second <b>⟨U+202E⟩")
+    (line,) = commits_between(tmp_path, old, new)
+    assert line.endswith("second <b>⟨U+202E⟩")
     assert not trap.exists()
     assert commits_between(tmp_path, "0" * 40, new) == ()
 
@@ -181,10 +178,8 @@ def test_every_heading_is_a_column_of_the_report_with_its_tolerance(quantity) ->
 
 def test_quantities_of_loops_have_a_column_and_one_tolerance_a_unit() -> None:
     assert all(q.heading for q in LOOP_QUANTITIES.values())
-    by_unit: dict[str, set[float]] = {}
-    for quantity in LOOP_QUANTITIES.values():
-        by_unit.setdefault(quantity.unit, set()).add(quantity.tolerance)
-    assert all(len(result) == 1 for result in by_unit.values()), by_unit
+    pairs = {(quantity.unit, quantity.tolerance) for quantity in LOOP_QUANTITIES.values()}
+    assert len(pairs) == len({unit for unit, _ in pairs}), pairs
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,6 @@ def two_mass(
 
 
 def stribeck(*points: tuple[float, float], direction: Any = "both") -> tuple[model.FrictionPoint, ...]:
-    """Points of a friction map."""
     return tuple(model.FrictionPoint(speed_rad_s=v, torque_Nm=T, direction=direction) for v, T in points)
 
 
@@ -122,7 +121,6 @@ def run_plant(
 
 
 def power_of_ten(rng: np.random.Generator, low: float, high: float) -> float:
-    """A number spread evenly over decades."""
     return float(10.0 ** rng.uniform(low, high))
 
 

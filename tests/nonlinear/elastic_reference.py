@@ -89,7 +89,6 @@ class Reference:
         return self.CM * abs(self.M if self.rigid else Ts)
 
     def level(self, x: np.ndarray, mode: Mode, side: int) -> float:
-        """Breakaway level."""
         return self.ratio * (self.curve(side, 0.0) + self.extra_dry(self.torque(x, mode)))
 
     def load_drive(self, x: np.ndarray, mode: Mode) -> float:
@@ -179,7 +178,6 @@ def settle(ref: Reference, x: np.ndarray, mode: Mode) -> None:
 
 
 def happen(ref: Reference, x: np.ndarray, mode: Mode, name: str) -> None:
-    """Change the mode at an event."""
     if name.startswith("meet"):
         mode.contact = int(name[4:])
     elif name == "part":

@@ -1,13 +1,5 @@
-"""Random drives by the hundred: whoever asks for rest gets one answer.  Run by hand::
+"""Whoever asks for rest gets one answer: `cycles`, `validate`, `simulate`, `failures`, the report."""
 
-    python -m tests.nonlinear.rest_agreement FIRST COUNT
-
-For each stable position drive: every step that `cycles` waits for, as `validate` knows it and as `simulate`
-judges it after runs of two lengths; the steps before the cases of `failures` in the same way; and the
-sentences about rest of both sections of the report.
-"""
-
-import sys
 from collections.abc import Iterable, Iterator
 
 from actuator_lti.design.model import Design
@@ -21,7 +13,6 @@ from nonlinear import commands, simulate
 from nonlinear.settling.rest import judge
 from reports.sections import cycles
 from reports.sections.names import fine_unit
-from tests.validation.random_drives import stable_drives
 
 LENGTHS, WATCHED = (1_000, 20_000), 1_000  # ticks of the runs, and after a failure
 
@@ -60,21 +51,3 @@ def contradictions(design: Design) -> Iterator[str]:
     for text, part in zip(said, wanted, strict=True):
         if part not in text or (not part and "not come to rest" in text):
             yield f"said: {text!r}, not {part!r}"
-
-
-def main(first: int, count: int) -> int:
-    """Print what differs; of how many drives something does."""
-    differ, asked = 0, 0
-    for design in stable_drives(first, count):
-        if design.controller.outermost != "position":
-            continue
-        found = list(contradictions(design))
-        asked, differ = asked + 1, differ + bool(found)
-        sys.stdout.writelines(f"{design.name}: {one}\n" for one in found)
-        sys.stdout.flush()
-    sys.stdout.write(f"{differ} of {asked} position drives of {count} differ\n")
-    return differ
-
-
-if __name__ == "__main__":
-    sys.exit(main(int(sys.argv[1]), int(sys.argv[2])) > 0)

@@ -38,7 +38,6 @@ def amber(*filters: Filter) -> Design:
 
 
 def response(b: tuple[float, ...], a: tuple[float, ...], z: complex) -> complex:
-    """H(z) by its definition."""
     return sum(c * z**-k for k, c in enumerate(b)) / (1 + sum(c * z**-k for k, c in enumerate(a, 1)))
 
 

@@ -16,7 +16,6 @@ TS = 1e-4
 
 
 def table(path: Path, head: str, *columns: Any) -> Path:
-    """A file of columns."""
     rows = "".join(",".join(map(str, row)) + "\n" for row in zip(*columns, strict=True))
     path.write_text(f"{head}\n{rows}")
     return path
@@ -67,7 +66,6 @@ def test_refusals(arguments: str, words: str, run) -> None:
 
 
 def refused(run, words: str) -> str:
-    """The one line of a run that is refused."""
     made = run(words)
     assert (made.status, made.said.count("\n")) == (2, 1)
     return made.said

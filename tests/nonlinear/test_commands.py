@@ -2,13 +2,14 @@
 
 from collections.abc import Callable
 
+import mpmath
 import numpy as np
 import pytest
 from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import Drive, State, commands, loads, simulate
+from nonlinear import State, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
@@ -34,6 +35,14 @@ T = np.arange(2000) * TS
 )
 def test_values(command: Command, expected: np.ndarray) -> None:
     np.testing.assert_allclose(command.values(TS, T.size), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("frequency_hz", [1e-3, 0.7, 31.0, 499.0, 7e5])
+def test_a_sine_is_right_to_its_last_digits(frequency_hz: float) -> None:
+    values = commands.sine(1.0, frequency_hz, 0.3).values(TS, T.size)
+    turned = 2 * np.pi * frequency_hz * T + 0.3  # as rounded: what is asked is its sine
+    truth = np.array([float(mpmath.sin(mpmath.mpf(float(x)))) for x in turned])
+    assert np.max(np.abs(values - truth) / np.spacing(np.abs(truth))) <= 2.0
 
 
 def test_stepped_sine_joins_whole_periods() -> None:
@@ -133,18 +142,6 @@ def test_progress_and_interruption() -> None:
 
     with pytest.raises(KeyboardInterrupt):
         simulate(AMBER, commands.hold(), 100.0, record_every=1000, progress=stop)
-
-
-def test_speed_from_counts_is_floored_differenced_and_filtered() -> None:
-    encoder = {"speed": "difference", "difference_samples": 2, "filter_time_s": 3e-4}
-    drive, period = Drive(changed(AMBER, encoder=encoder)), 1e-4
-    count, expected = 2.0 * np.pi / 1024, 0.0
-    th = np.linspace(-3.5, 6.2, 9) * count
-    floors = np.concatenate(([0.0, 0.0], np.floor(th / count) * count))
-    for k, angle in enumerate(th):
-        drive.control(0.0, 0.0, 0.0, angle)
-        expected += 0.25 * ((floors[k + 2] - floors[k]) / (2 * period) - expected)
-        assert drive.value("measured_speed") == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_record_holds_the_whole_load() -> None:

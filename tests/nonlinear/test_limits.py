@@ -105,16 +105,6 @@ def test_sawtooth_of_the_paper() -> None:
     assert rate == pytest.approx(22.7, abs=0.05)
 
 
-def test_multirate_limit_holds_between_updates() -> None:
-    design = load_design("ilr33-amber-multirate")
-    run = simulate(design, commands.step(0.1), 0.1)
-    n = design.controller.position.every
-    change = np.diff(run.speed_command_rad_s)
-    allowed = design.limits.acceleration_rad_s2 * n * design.controller.period_s
-    assert np.abs(change).max() <= allowed * (1 + 1e-12)
-    assert not change[np.arange(change.size) % n != n - 1].any()
-
-
 @pytest.mark.parametrize(
     ("e", "integral", "output", "kept", "acts"),
     [

@@ -232,12 +232,11 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
 def test_all_who_ask_get_one_answer(seed: int) -> None:
-    """`cycles`, `validate`, `failures`, `simulate` after two lengths; three hundred: rest_agreement.py."""
+    """`cycles`, `validate`, `failures`, `simulate` after two lengths."""
     assert not list(contradictions(stable_position_drive(seed)))
 
 
 def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
-    """A run that starts where another one is at rest is at rest."""
     start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
     rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
     assert rest.comes_to_rest

@@ -10,7 +10,8 @@ from elastic_drive import two_mass
 
 from actuator_lti import load_design
 from actuator_lti.design import model, shipped_designs
-from nonlinear import Drive
+from actuator_lti.errors import InputError
+from nonlinear import Drive, Rows
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.state_kinds import CONTINUOUS, KINDS, NOTE, WORK, state_kinds
 from tests.changed import changed
@@ -148,6 +149,7 @@ def test_random_controllers(part: int) -> None:
 
 
 STATE_TICKS = 60
+NOISE = {"current_noise_A": 0.01, "angle_noise_rad": 1e-4, "output_angle_noise_rad": 1e-6, "jitter_s": 1e-6}
 NAMED = [
     (part, name)
     for part, begin in ((layout, "S_"), (elastic_layout, "ES_"))
@@ -161,15 +163,16 @@ def kinds_of(drive: Drive) -> np.ndarray:
 
 
 def drives() -> list[model.Design]:
-    """Every shipped drive, random cascades, two masses with play, stick on both sides, and a supply."""
+    """Every shipped drive, random cascades, two masses with play, stick on both sides, a supply, noise."""
     rubbing = {"dry_torque_Nm": 0.02, "load_coefficient": 0.01}
     play = two_mass(friction=rubbing, load_friction={"dry_torque_Nm": 0.1})
     play = changed(play, load={"moment_damping_Nms_rad": 0.01})
     supply = model.Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3)
     feeding = {"position": {"acceleration_feedforward": 0.5}}
     weak = changed(load_design("ilr33-amber"), supply=supply, controller=feeding)
+    noisy = changed(weak, instruments=NOISE, controller={"computing_delay_s": 1.3e-4})
     random = [some_drive(np.random.default_rng(case)) for case in range(60)]
-    return [*map(load_design, shipped_designs()), *random, play, weak]
+    return [*map(load_design, shipped_designs()), *random, play, weak, noisy]
 
 
 def command(tick: int) -> float:
@@ -188,18 +191,28 @@ def test_every_number_has_a_kind() -> None:
 
 
 def test_nothing_goes_on_from_notes_and_work_space() -> None:
-    """NaN in all of them before every tick: not one bit of what goes on is different."""
+    """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
     for design in drives():
         plain, spoilt = Drive(design), Drive(design)
         kinds = kinds_of(plain)
         held = np.isin(kinds, (NOTE, WORK))
+        held &= design.instruments == model.Instruments()  # noise goes on from what counts as a note
         for k in range(STATE_TICKS):
             state = spoilt.get()
             state[held] = np.nan
+            spoilt = Drive(design) if k == STATE_TICKS // 2 else spoilt
             spoilt.set(state)
             for drive in (plain, spoilt):
                 drive.step(command(k))
             assert np.array_equal(plain.get()[~held], spoilt.get()[~held])
+        with pytest.raises(InputError, match="this drive has"):
+            spoilt.set(np.zeros(3))
+        rows = Rows.of(design)
+        rows["ticks"] = STATE_TICKS
+        rows.series("command", np.array([command(k) for k in range(STATE_TICKS)]))
+        assert rows.trajectory().final.motor_angle_rad == plain.value(
+            "angle"
+        )  # blocks of ticks, one at a time
 
 
 def test_something_goes_on_from_every_continuous_number() -> None:

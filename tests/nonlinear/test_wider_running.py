@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from actuator_lti import load_design
 from actuator_lti.design import model
 from actuator_lti.errors import InputError
-from nonlinear import Drive, Probe, Rows, State, commands, loads, simulate
+from nonlinear import Drive, Probe, State, commands, loads, simulate
 from tests.changed import changed
 
 AMBER = load_design("ilr33-amber")
@@ -22,7 +22,6 @@ TORQUE = changed(AMBER, controller={"position": None, "velocity": None})
 
 
 def torque_drive(gain: float, integral_time_s: float | None, **limits: float) -> model.Design:
-    """A current loop alone."""
     current = model.CurrentLoop(gain_V_A=gain, integral_time_s=integral_time_s)
     return changed(TORQUE, controller={"current": current}, limits=model.Limits(**limits))
 
@@ -185,48 +184,6 @@ def test_jitter_and_angle_noise() -> None:
         assert abs(seen.mean()) < 5.0 * rms / sqrt(ticks)
 
 
-def everything() -> model.Design:
-    """A drive with every rare feature on."""
-    notch = model.Filter(kind="notch", frequency_rad_s=4000.0, width_rad_s=1000.0)
-    smooth = model.Filter(kind="lowpass", on="speed", frequency_rad_s=6000.0)
-    fed = {"acceleration_feedforward": 0.7, "friction_feedforward": 0.05}
-    pid = {"integral_time_s": 0.05, "derivative_time_s": 1e-3, "every": 4, "sensor": "output"}
-    velocity = {"every": 2, "filters": (notch, smooth)}
-    return changed(
-        AMBER,
-        controller={"velocity": velocity, "position": pid | fed, "computing_delay_s": 1.3e-4},
-        encoder={"speed": "tracking", "bandwidth_rad_s": 1500.0, "counts_per_rev": 4096},
-        command=model.Command(
-            filter_time_s=2e-3, filter_order=2, rate_rad_s=0.3, acceleration_rad_s2=20.0, jerk_rad_s3=5000.0
-        ),
-        supply=model.Supply(resistance_ohm=0.2, regenerative=False, capacitance_F=1e-3, brake_voltage_V=27.0),
-        instruments=model.Instruments(
-            current_noise_A=0.01, angle_noise_rad=1e-4, output_angle_noise_rad=1e-6, jitter_s=1e-6, seed=5
-        ),
-        load={"moment_slope_Nm_rad": -20.0, "gravity": model.Gravity(mass_kg=1.0, arm_m=0.1)},
-        limits={"peak_time_s": 0.02},
-    )
-
-
-def test_a_state_set_elsewhere_goes_on_with_the_same_bits() -> None:
-    design = everything()
-    first, second = Drive(design), Drive(design)
-    for k in range(700):
-        first.step(0.05 * np.sin(0.01 * k))
-    second.set(first.get())
-    for k in range(700, 1400):
-        first.step(0.05 * np.sin(0.01 * k))
-        second.step(0.05 * np.sin(0.01 * k))
-    assert np.array_equal(first.get(), second.get())
-    rows = Rows.of(design)
-    rows["ticks"] = 1400
-    rows.series("command", 0.05 * np.sin(0.01 * np.arange(1400)))
-    run = rows.trajectory()  # blocks of ticks, and one at a time
-    assert run.final.motor_angle_rad == first.value("angle")
-    with pytest.raises(InputError, match="this drive has"):
-        second.set(np.zeros(3))
-
-
 def test_profile_keeps_its_limits_and_arrives() -> None:
     limits = model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0, jerk_rad_s3=200.0)
     T = AMBER.controller.period_s
@@ -263,22 +220,8 @@ def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
     assert simulate(shaped, commands.step(0.1), 0.3).limits["profile"].active
 
 
-def test_any_stage_may_be_the_outermost() -> None:
-    m, friction = AMBER.motor, replace(FREE, dry_torque_Nm=1e-3)
-    design = changed(
-        AMBER, friction=friction, limits=model.Limits(voltage_V=48.0), controller={"position": None}
-    )
-    torque_drive = changed(design, controller={"velocity": None})
-    voltage = simulate(changed(torque_drive, controller={"current": None}), commands.step(10.0), 2.0)
-    lost = (friction.dry_torque_Nm + 1e-6 * voltage.motor_speed_rad_s[-1]) / m.torque_constant_Nm_A
-    expected = (10.0 - m.resistance_ohm * lost) / m.back_emf_constant_Vs_rad
-    assert voltage.motor_speed_rad_s[-1] == pytest.approx(expected, rel=1e-9)
-    assert voltage.voltage_V[-1] == 10.0
-    torque = simulate(changed(torque_drive, friction={"dry_torque_Nm": 1.0}), commands.step(1.5), 0.1)
-    assert torque.current_A[-1] == pytest.approx(1.5, rel=1e-9)
-    speed = simulate(design, commands.step(0.2), 1.0)
-    assert speed.motor_speed_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-6)
-    assert speed.speed_command_rad_s[-1] == pytest.approx(0.2 * AMBER.total_ratio, rel=1e-12)
+def test_the_command_of_a_speed_drive_keeps_its_acceleration() -> None:
+    design = changed(AMBER, friction=FREE, controller={"position": None})
     slow = replace(design, command=model.Command(acceleration_rad_s2=2.0))
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio
     assert np.diff(ramped).max() == pytest.approx(2.0 * AMBER.controller.period_s, rel=1e-9)

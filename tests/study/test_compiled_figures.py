@@ -66,7 +66,6 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
 
 
 def of_response(system) -> dict[str, float | None]:
-    """What one response's own bandwidth and step say."""
     width, step = closed_loop_bandwidth(system), step_figures(system)
     return {
         "bandwidth": width.minus3db_hz,

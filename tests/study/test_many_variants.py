@@ -29,7 +29,6 @@ def one() -> Comparison:
 
 
 def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
-    """A verdict whose value lies at another distance from its limit."""
     of = verdict.requirement
     value = of.maximum - distance if of.minimum is None else of.minimum + distance
     return replace(verdict, value=value, distance=distance)

@@ -102,8 +102,6 @@ def in_parts(monkeypatch, **sizes):
 
 
 def interrupted(design, folder, settings, after):
-    """A study that is stopped once so many samples are done."""
-
     def interrupt(done, _):
         if done >= after:
             raise KeyboardInterrupt

@@ -76,7 +76,6 @@ def test_what_cannot_be_met_is_refused_with_its_distance():
 
 
 def pi_behind(gain, time, plant, s):
-    """A PI controller in front of a plant."""
     return gain * (1 + 1 / (time * s)) * plant(s)
 
 

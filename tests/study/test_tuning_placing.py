@@ -39,7 +39,6 @@ WIDE = (need("gain_margin", 6.0, unit="dB"), need("phase_margin", 30.0), need("b
 
 
 def direct():
-    """A position loop on the torque itself."""
     control = replace(servo().controller, velocity=None, position=PositionLoop(gain=1.0))
     return replace(servo(), controller=control)
 

@@ -5,23 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-from flint import acb, arb, fmpz, fmpz_poly
+from flint import acb, arb, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.roots import (
-    Split,
-    all_roots,
-    at_enough_bits,
-    free_of,
-    positive_roots,
-    split,
-)
+from actuator_lti.margins.exact.real_roots import positive_roots
+from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96
+_TURN_BITS = 48
 _ACCURATE = 56  # bits of a figure
 _NEAR = 1e-3  # relative: a pair this close may be a touch
 _ZERO = 1e-18  # of a distance
@@ -71,18 +66,25 @@ def _crossings(
     off: Callable[[arb], arb],
     touched_ends: Sequence[bool] = (False, False),
 ) -> list[Crossing]:
-    """The positive roots of p, touches merged; ``off`` is the distance to the line."""
+    """The positive roots of p, touches merged; ``off`` is the distance to the line.
+
+    A line just missed is a pair of complex roots, with a turn of p between; few loops have one.
+    """
+    with ctx.workprec(_TURN_BITS):
+        turns = positive_roots(p.derivative())
+    with ctx.workprec(_FIRST_BITS + p.degree()):
+        missed = any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
 
     def accurate() -> list[Crossing] | None:
-        roots = all_roots(p)
-        met = [(v, times % 2 == 0) for v, times in positive_roots(roots)]
+        roots = all_roots(p) if missed or any(touched_ends) else []
+        met = [(v, times % 2 == 0) for v, times in positive_roots(p)]
         met = _merged(met, roots, off, touched_ends)
         values = [(v, N.at(v) / D.at(v), touch) for v, touch in met]
         if not all(L.rel_accuracy_bits() >= _ACCURATE for _, L, _ in values):
             return None
         return [Crossing(float(v.sqrt().mid()), complex(L), touch) for v, L, touch in values]
 
-    return at_enough_bits(accurate, _FIRST_BITS, "a crossing of the loop")
+    return at_enough_bits(accurate, _FIRST_BITS + p.degree(), "a crossing of the loop")
 
 
 def _merged(
@@ -125,7 +127,7 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
     slope = above.derivative() * below - above * below.derivative()
 
     def stationary() -> list[tuple[float, float]] | None:
-        values = [(above(v) / below(v), v) for v, _ in positive_roots(all_roots(slope))]
+        values = [(above(v) / below(v), v) for v, _ in positive_roots(slope)]
         if not all(_settled(value) for value, _ in values):
             return None
         return [
@@ -134,7 +136,12 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
             if value.is_finite()
         ]
 
-    value, w = min([*candidates, *at_enough_bits(stationary, _FIRST_BITS, "the smallest distance to -1")])
+    value, w = min(
+        [
+            *candidates,
+            *at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1"),
+        ]
+    )
     return (value, w) if value > _ZERO else (0.0, w)
 
 

@@ -1,0 +1,122 @@
+"""A number as a file states it, in SI: by the axis, its screw, and the amperes of the motor's data sheet."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+from math import isinf, pi, sqrt
+from typing import Any
+
+from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.plant import MotorConstants
+from actuator_lti.design.units import ampere_unit, parse_quantity
+from actuator_lti.errors import InputError
+
+CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
+_DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
+_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
+_AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
+_PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
+_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
+PHASE = "V/A phase"
+_UPSIDE_DOWN = {
+    "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),  # "83.4 rpm/V"
+    "motor.cogging_periods": (2.0 * pi, "{angle}"),
+    "control.period": (2.0 * pi, "rad/s"),  # "16 kHz"
+}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a number of a file is read by; ``travel_m_rad`` is that of a screw, None without one."""
+
+    structure: Structure
+    constants: MotorConstants
+    travel_m_rad: float | None = None
+
+    def quantity(self, text: Any, field: Field) -> float:
+        """The SI value of a text; behind a screw also from the units of a rotary axis.
+
+        A speed constant is read as the back-EMF constant that it is upside down (that of a motor stated per
+        phase is line-line, as makers have it), a sampling rate as its period, a magnet pitch as its order,
+        amperes rms or peak as those of the motor that the model has.
+        """
+        unit, power = field.unit(self.structure), field.travel_power()
+        if isinstance(text, str):
+            text = _PER_TURN.sub("", text) if field.key in ("lead", "counts_per_rev") else text
+            if convention := CONVENTION.search(text):
+                plain = self.quantity(CONVENTION.sub(" dc", text), field)
+                return plain * self._amperes(field, unit, convention[1].lower())
+        rotary = field.unit(replace(self.structure, axis="rotary"))
+        factors = {unit: 1.0}
+        if self.travel_m_rad is not None and power and rotary != unit:
+            factors = {rotary: self.travel_m_rad**power, unit: 1.0}
+        refused: list[InputError] = []
+        for one, factor in factors.items():
+            try:
+                value = parse_quantity(text, one) * factor
+            except InputError as error:
+                refused.append(error)
+            else:
+                return self._said(text, field, unit, value)
+            if (turned := _turned(field.path, text, one)) is not None:
+                line = field.section == "motor" and self.constants == "peak-phase"
+                return turned * factor / (sqrt(3.0) if line else 1.0)
+        raise refused[-1 if field.section in ("load", "command", "validation") else 0]
+
+    def _said(self, text: Any, field: Field, unit: str, value: float) -> float:
+        """The value, unless an AC motor has several amperes that the text may mean."""
+        which = ampere_unit(field.path, unit, self.constants)
+        if which == unit or value == 0.0 or isinf(value) or not isinstance(text, str) or _DIRECT.search(text):
+            return value
+        own = which.replace("dc", "rms" if self.constants == "rms-line" else "peak")
+        gain = unit.startswith("V/A")
+        raise InputError(
+            f"which amperes of the AC motor is not said; allowed: {own} (its data sheet's"
+            f"{', volts line-line' * gain}) or {which} (the model's)"
+            f"{f'; of a dq controller, of a phase: {PHASE}' * gain}"
+        )
+
+    def _amperes(self, field: Field, unit: str, convention: str) -> float:
+        """From amperes rms or peak to those of the model; constants of the motor to those of its convention.
+
+        i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak; kE against kM tells a wrong convention.
+        """
+        if convention == "phase" and self.constants != "dc":
+            if not unit.startswith("V/A"):
+                raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
+            return 2.0  # R and L line-line are twice those of a phase
+        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
+        if self.constants == "dc":
+            phase = ", where R and L are per phase" * (given == "peak-phase")
+            plain = "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
+            if not _AMPERE.search(unit):
+                plain = "beside the constants of a DC motor: V, the peak line-line, sqrt(2) times the rms"
+            raise InputError(f'allowed: with motor.constants = "{given}"{phase}; {plain}')
+        own = field.section == "motor"
+        above, _, below = unit.partition("/")
+        sized = _SIZED if own else _AMPERE
+        power = len(sized.findall(above)) - len(sized.findall(below))
+        if not (own or power):
+            raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
+        return float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
+
+    def other_axis(self, raw: Any, field: Field) -> str:
+        """That the unit of a refused value would be one of the other kind of axis."""
+        other = replace(self.structure, axis="linear" if self.structure.axis == "rotary" else "rotary")
+        unit = field.unit(other)
+        try:
+            parse_quantity(raw, unit)
+        except InputError:
+            return ""
+        return f'; {unit} with design.axis = "{other.axis}"' if unit != field.unit(self.structure) else ""
+
+
+def _turned(path: str, text: Any, unit: str) -> float | None:
+    """A value that data sheets state upside down; None where it is not stated so."""
+    one, turned = _UPSIDE_DOWN.get(path, (1.0, ""))
+    try:
+        value = parse_quantity(text, turned.format(angle=unit.rpartition("/")[2])) if turned else 0.0
+    except InputError:
+        return None
+    return one / value if value > 0.0 else None
