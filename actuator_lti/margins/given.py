@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ ULP = 8  # by how much the entries may be wrong: what this changes the data do n
 _NOTHING: Real = np.empty(0)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Given:
     """Coefficients (highest power first, leading zeros trimmed), or a state space where ``A`` is not None.
 
@@ -35,6 +35,18 @@ class Given:
     c: Real = field(default_factory=lambda: _NOTHING)
     d: float = 0.0
     samples: int = 0
+
+    @cached_property
+    def _bits(self) -> tuple[object, ...]:
+        arrays = (self.numerator, self.denominator, self.A, self.b, self.c)
+        parts = [None if x is None else (x.shape, x.tobytes()) for x in arrays]
+        return (self.period_s, self.d, self.samples, *parts)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Given) and self._bits == other._bits
+
+    def __hash__(self) -> int:
+        return hash(self._bits)
 
     @property
     def entries(self) -> tuple[str, ...]:

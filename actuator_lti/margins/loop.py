@@ -240,7 +240,8 @@ def warped_coefficients(p: Real, degree: int) -> Real:
     """
     from flint import fmpz_poly  # only where a sampled loop is asked for
 
-    from actuator_lti.margins.exact.loop import integers, warped
+    from actuator_lti.margins.exact.loop import integers
+    from actuator_lti.margins.exact.roots import warped
 
     (whole,), shift = integers(p)
     about = [int(c) for c in warped(fmpz_poly(whole[::-1]), degree).coeffs()]

@@ -8,8 +8,8 @@ from typing import Any
 import flint
 import numpy as np
 
-from actuator_lti.margins.exact.loop import exact_polynomials, rational, warped
-from actuator_lti.margins.exact.roots import all_roots
+from actuator_lti.margins.exact.loop import exact_polynomials, rational
+from actuator_lti.margins.exact.roots import all_roots, warped
 from actuator_lti.margins.given import ULP, given_of
 from actuator_lti.margins.loop import RationalLoop
 

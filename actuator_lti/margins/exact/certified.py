@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.exact.crossings import crossings, smallest
 from actuator_lti.margins.exact.decided import ACROSS, Shared, hidden_notes, shared
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
+from actuator_lti.margins.exact.roots import within
 from actuator_lti.margins.given import ULP, Given
 from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.results import StabilityMargins
@@ -26,8 +28,10 @@ _GIVEN = "exact arithmetic on the given doubles"
 _COUNTED = f"{ULP} ulp of the entries change how many closed-loop poles are unstable, not that some are"
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
 _TOLD = 1e-6
+_MANY = 2.0
 
 
+@lru_cache(maxsize=64)
 def certified_margins(given: Given, band_rad_s: tuple[float, float] | None = None) -> StabilityMargins:
     """All margins of a rational loop from the exact values of its doubles, see `stability_margins`.
 
@@ -77,11 +81,21 @@ class _Poles:
 
 def _poles(given: Given, base: ExactLoop, others: list[ExactLoop]) -> _Poles:
     counts = {(f.unstable, f.on_border, f.hidden_modes.at_zero) for f in (base, *others)}
-    closed = _values(base, closed=True)
-    size = np.sort(np.abs(closed[closed != 0.0]))
-    if len(counts) == 1 and not (size.size and size[0] < _TOLD * size[size.size // 2]):
+    if len(counts) == 1 and not _slow(base):
         return _Poles(*counts.pop())
+    closed = _values(base, closed=True)
     return _by_movement(base, others, closed, scattered=given.A is None and base.sampled)
+
+
+def _slow(loop: ExactLoop) -> bool:
+    """Whether a closed-loop pole, hidden ones among them, is far slower than half of them."""
+    p = (loop.N + loop.D) * loop.hidden
+    near, most = within(p, _TOLD * _MANY), within(p, _MANY)
+    if near == 0 and most is not None and most > p.degree() // 2:
+        return False  # most of a sampled loop's are near one; so no pole need be found
+    closed = _values(loop, closed=True)
+    size = np.sort(np.abs(closed[closed != 0.0]))
+    return bool(size.size and size[0] < _TOLD * size[size.size // 2])
 
 
 def _values(loop: ExactLoop, closed: bool) -> Complex:

@@ -11,11 +11,12 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.real_roots import positive_roots
+from actuator_lti.margins.exact.real_roots import FEW, positive_roots
 from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96
+_TURN_BITS = 48
 _ACCURATE = 56  # bits of a figure
 _NEAR = 1e-3  # relative: a pair this close may be a touch
 _ZERO = 1e-18  # of a distance
@@ -69,8 +70,10 @@ def _crossings(
 
     A line just missed is a pair of complex roots, with a turn of p between; few loops have one.
     """
-    with ctx.workprec(_FIRST_BITS):
-        missed = any(abs(off(v).mid()) <= 10.0 * TOUCH for v, _ in positive_roots(p.derivative()))
+    with ctx.workprec(_TURN_BITS):
+        turns = [] if p.degree() <= FEW else positive_roots(p.derivative())
+    with ctx.workprec(_FIRST_BITS + p.degree()):
+        missed = p.degree() <= FEW or any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
 
     def accurate() -> list[Crossing] | None:
         roots = all_roots(p) if missed or any(touched_ends) else []
@@ -81,7 +84,7 @@ def _crossings(
             return None
         return [Crossing(float(v.sqrt().mid()), complex(L), touch) for v, L, touch in values]
 
-    return at_enough_bits(accurate, _FIRST_BITS, "a crossing of the loop")
+    return at_enough_bits(accurate, _FIRST_BITS + p.degree(), "a crossing of the loop")
 
 
 def _merged(
@@ -133,7 +136,12 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
             if value.is_finite()
         ]
 
-    value, w = min([*candidates, *at_enough_bits(stationary, _FIRST_BITS, "the smallest distance to -1")])
+    value, w = min(
+        [
+            *candidates,
+            *at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1"),
+        ]
+    )
     return (value, w) if value > _ZERO else (0.0, w)
 
 

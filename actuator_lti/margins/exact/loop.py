@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 from flint import fmpq, fmpz, fmpz_mat, fmpz_poly
 
-from actuator_lti.margins.exact.roots import HalfPlanes, Polynomial, half_planes
+from actuator_lti.margins.exact.roots import HalfPlanes, half_planes, warped
 from actuator_lti.margins.given import ULP, Given
 
 _S = fmpz_poly([0, 1])
@@ -111,6 +111,7 @@ def exact_loop(given: Given) -> ExactLoop:
     )
 
 
+@lru_cache(maxsize=64)
 def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator in s or z, hidden modes among them, times one power of two."""
     if given.A is not None:
@@ -140,12 +141,22 @@ def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
     if not n:
         return fmpz_poly(d), fmpz_poly([1 << shift])
     whole = [A[k * n : k * n + n] for k in range(n)]
-    below = fmpz_mat(whole).charpoly()
+    below = fmpz_poly([1])
+    for block in _blocks(given.A):
+        below *= fmpz_mat([[whole[j][k] for k in block] for j in block]).charpoly()
     above = _numerator(whole, b, c, below)
     # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
     D, N = (fmpz_poly([x * (1 << (shift * k)) for k, x in enumerate(p.coeffs())]) for p in (below, above))
     power = shift_b + shift_c
     return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
+
+
+def _blocks(A: Any) -> list[list[int]]:
+    """States that act upon each other, directly or not: those of a chain of delays act one way alone."""
+    acts = (A != 0.0) | np.eye(len(A), dtype=bool)
+    for _ in range(len(A).bit_length()):
+        acts = acts.astype(float) @ acts > 0.0
+    return [np.flatnonzero(one).tolist() for one in np.unique(acts & acts.T, axis=0)]
 
 
 def _numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
@@ -161,11 +172,3 @@ def _numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_po
         state = M * state
     product = below * fmpz_poly(answer[::-1])
     return product.right_shift(n) if product.degree() >= n else fmpz_poly()
-
-
-def warped(p: Polynomial, degree: int) -> Polynomial:
-    """(1 - s)^degree p((1 + s)/(1 - s)), by way of z = -1 + 2/(1 - s)."""
-    kind = type(p)
-    about: list[Any] = list(p(kind([-1, 2])).coeffs())
-    about += [0] * (degree + 1 - len(about))
-    return kind(about[::-1])(kind([1, -1]))

@@ -17,17 +17,28 @@ from typing import Any
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.exact.roots import all_roots
 
+FEW = 16  # degree up to which all roots at once take less time
 _MOST_BITS = 1 << 15
 _PLACE = 40503  # over 2^16: intervals end at no number that a root is likely to be
 _SHIFT = fmpz_poly([1, 1])
 _STEPS = 20  # of Newton's method
-Places = tuple[tuple[fmpz_poly, int, arb, arb], ...]  # a factor, its multiplicity, an interval with one root
+_TOO_CLOSE = "a root could not be separated from what lies beside it"
+Places = tuple[tuple[fmpz_poly, int, tuple[tuple[arb, arb], ...]], ...]
+"""A factor, its multiplicity, intervals with one root each; no two factors have a root in common."""
 
 
 def positive_roots(p: fmpz_poly) -> list[tuple[arb, int]]:
     """The positive real roots in order, to the working precision, with their multiplicity."""
-    roots = [(_refined(q, low, high), times) for q, times, low, high in _places(tuple(p.coeffs()))]
+    if p.degree() <= FEW:
+        real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
+        return sorted(real, key=lambda root: float(root[0].mid()))
+    roots, least = [], arb((1, -ctx.prec))
+    for factor, times, places in _places(tuple(p.coeffs())):
+        with ctx.workprec(ctx.prec + factor.degree() + 32):
+            q = _Evaluated(factor)
+            roots += [(q.root_in(low, high, least), times) for low, high in places]
     return sorted(roots, key=lambda root: float(root[0].mid().log()))
 
 
@@ -37,14 +48,13 @@ def _places(coefficients: tuple[Any, ...]) -> Places:
     p = fmpz_poly(list(coefficients))
     with ctx.workprec(_MOST_BITS):
         try:
-            return tuple(_separated(p, 1, 16 * (p.degree() + 64)))
+            return ((p, 1, tuple(_separated(p, 16 * (p.degree() + 64)))),)
         except NumericalError:
-            return tuple(
-                place for q, times in p.factor_squarefree()[1] for place in _separated(q, times, _MOST_BITS)
-            )
+            factors = p.factor_squarefree()[1]
+            return tuple((q, times, tuple(_separated(q, _MOST_BITS))) for q, times in factors)
 
 
-def _separated(p: fmpz_poly, times: int, most_bits: int) -> Iterator[tuple[fmpz_poly, int, arb, arb]]:
+def _separated(p: fmpz_poly, most_bits: int) -> Iterator[tuple[arb, arb]]:
     """Intervals with one root each, octave by octave."""
     while p.degree() > 0 and p[0] == 0:
         p = p.right_shift(1)
@@ -56,10 +66,10 @@ def _separated(p: fmpz_poly, times: int, most_bits: int) -> Iterator[tuple[fmpz_
     for octave in range(*_octaves(scaled, sizes)):
         while (found := _in_octave(_rounded(scaled, sizes, octave, bits), n)) is None:
             if (bits := 2 * bits) > most_bits:
-                raise NumericalError("a root could not be separated from what lies beside it")
+                raise NumericalError(_TOO_CLOSE)
         for level, k in found:
             low, high = (arb((_PLACE * ((1 << level) + end), octave - 16 - level)) for end in (k, k + 1))
-            yield p, times, low, high
+            yield low, high
 
 
 def _octaves(scaled: Sequence[int], sizes: Sequence[int]) -> tuple[int, int]:
@@ -103,40 +113,40 @@ def _sign_changes(over: fmpz_poly, n: int, level: int) -> int | None:
     return None if None in signs else sum(one is not other for one, other in pairwise(signs))
 
 
-def _refined(p: fmpz_poly, low: arb, high: arb) -> arb:
-    """The one root in an interval to the working precision: Newton, and halving where that leaves it."""
-    least = arb((1, -ctx.prec))
-    with ctx.workprec(ctx.prec + p.degree() + 32):
-        side = _sign(p, low)
+class _Evaluated:
+    """A polynomial at the working precision."""
+
+    def __init__(self, p: fmpz_poly) -> None:
+        self.p, self.value, self.slope = p, arb_poly(p), arb_poly(p.derivative())
+
+    def root_in(self, low: arb, high: arb, least: arb) -> arb:
+        """The one root in an interval, to a relative error: Newton, and halving where that leaves it."""
+        side = self.sign(low)
         while high - low > least * low:
             middle = ((low + high) / 2).mid()
-            if (found := _by_newton(p, low, high, middle, least)) is not None:
+            if (found := self._by_newton(low, high, middle, least)) is not None:
                 return found
-            low, high = (middle, high) if _sign(p, middle) == side else (low, middle)
+            low, high = (middle, high) if self.sign(middle) == side else (low, middle)
         return low.union(high)
 
+    def _by_newton(self, low: arb, high: arb, x: arb, least: arb) -> arb | None:
+        """The root with signs that differ on its two sides; ``None`` where Newton does not come to it."""
+        for _ in range(_STEPS):
+            step = (self.value(x) / self.slope(x)).mid()
+            x = (x - step).mid()
+            if not low <= x <= high:
+                return None
+            if step * step <= least * x * x / 256:  # the next step is far smaller than asked
+                ends = max(low, (x * (1 - least)).mid()), min(high, (x * (1 + least)).mid())
+                return ends[0].union(ends[1]) if self.sign(ends[0]) != self.sign(ends[1]) else None
+        return None
 
-def _by_newton(p: fmpz_poly, low: arb, high: arb, x: arb, least: arb) -> arb | None:
-    """The root with signs of p that differ on its two sides; ``None`` where Newton does not come to it."""
-    f, slope = arb_poly(p), arb_poly(p.derivative())
-    for _ in range(_STEPS):
-        step = (f(x) / slope(x)).mid()
-        x = (x - step).mid()
-        if not low <= x <= high:
-            return None
-        if abs(step) <= least * x:
-            ends = max(low, (x * (1 - least)).mid()), min(high, (x * (1 + least)).mid())
-            return ends[0].union(ends[1]) if _sign(p, ends[0]) != _sign(p, ends[1]) else None
-    return None
-
-
-def _sign(p: fmpz_poly, v: arb) -> int:
-    """Sign of p at an exact v."""
-    bits = ctx.prec
-    while bits <= 2 * _MOST_BITS:
-        with ctx.workprec(bits):
-            value = arb_poly(p)(v)
-            if value > 0 or value < 0:
-                return 1 if value > 0 else -1
-        bits *= 2
-    raise NumericalError("a root could not be separated from what lies beside it")
+    def sign(self, v: arb) -> int:
+        """Its sign at an exact place."""
+        value, bits = self.value(v), ctx.prec
+        while not (value > 0 or value < 0):
+            if (bits := 2 * bits) > 2 * _MOST_BITS:
+                raise NumericalError(_TOO_CLOSE)
+            with ctx.workprec(bits):
+                value = arb_poly(self.p)(v)
+        return 1 if value > 0 else -1
