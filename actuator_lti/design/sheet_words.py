@@ -125,13 +125,13 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "control.": {  # a loop of it
         "kp kv kvp kpp vp p p_gain kv_factor proportional proportional_gain": "gain",
-        "ki kvi i_gain integral_gain integrator_gain": _INTEGRAL,
+        "ki kvi i_gain integral integral_gain integrator_gain": _INTEGRAL,
         "kd d_gain derivative_gain": "derivative_time = derivative gain/gain",
         "tn ti reset_time integral_time_constant integral_action_time": "integral_time",
         "pff kff pfg velocity_feedforward": "feedforward",
         "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
         "frequency cycle_time sample_time": _MULTIPLE,
-        "bandwidth": 'gain, which takes "40 Hz" too; of the position 2 pi f',
+        "bandwidth": 'gain, which takes "40 Hz" too',
     },
     ".filter": {
         "bandwidth": "width",

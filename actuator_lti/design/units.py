@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
-from math import isfinite, pi
+from math import isfinite, nan, pi
 from operator import ne
 
 from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
@@ -31,7 +31,8 @@ _BASE = {
     "m meter metre": "[length]", "s second sec": "[time]", "kg kilogram": "[mass]",
     "A ampere amp": "[current]", "rad radian": "[angle]",
     "K kelvin": "[temperature]", "degC celsius C": "[celsius]",
-    "count counts cnt cts cpr CPR inc increment": "[count]",  # no angle: its revolution is another key
+    "count counts cnt cts inc increment": "[count]",  # no angle: its revolution is another key
+    "cpr CPR cpt CPT ppr PPR ppt PPT p pulse": "[pulse]",  # of one maker a line, of another a count
 }  # fmt: skip
 # What each is, in units that stand above it.
 _DERIVED = {
@@ -40,7 +41,7 @@ _DERIVED = {
     "g gram": ("0.001", "kg"),
     "in inch": ("0.0254", "m"),
     "ft foot": ("0.3048", "m"),
-    "lb pound": ("0.45359237", "kg"),
+    "lb lbm pound": ("0.45359237", "kg"),
     "oz ounce": ("0.028349523125", "kg"),
     "min minute": ("60", "s"),
     "h hour": ("3600", "s"),
@@ -77,12 +78,16 @@ _DERIVED = {
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "line": ("4", "count"),  # of an encoder: two edges of two tracks
 }
+_FLUX = (
+    'is of a flux linkage psi: with motor.constants = "peak-phase" and p pole pairs back_emf_constant is '
+    "p psi in V*s/rad, torque_constant 1.5 p psi in N*m/A"
+)
 # What makers write into a unit that is none, and what is to be written instead.
-_PULSES = 'is not the same of all makers; write "lines" (4 counts each) or "counts"'
 _ASIDE = {
-    **dict.fromkeys(("ppr", "PPR", "cpt", "ppt", "p", "pulse", "pulses"), _PULSES),
     "erpm": 'is electrical; over the pole pairs it is "rpm"',
     "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
+    "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
+    **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
 }
@@ -99,7 +104,7 @@ _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
     (_WEIGHTS, r"\1\2f"),
-    (re.compile(r"/ *(rad|deg|rev|turn) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
+    (re.compile(r"/ *(rad|deg|rev|turn|mm|m|in|inch|ft) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
     (re.compile(r"\b(?:degC|C|celsius)\b"), "K"),
 )
 
@@ -183,10 +188,7 @@ def _named(name: str, units: Units) -> Exact:
 def parse_unit(unit: str) -> UnitValue:
     """Read a unit such as ``"N*m/A"``; the empty text and ``"1"`` are dimensionless.
 
-    Raises
-    ------
-    ValueError
-        If it is no unit, with the nearest known one where there is one.
+    A ValueError if it is no unit, with the nearest known one where there is one.
     """
     if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
@@ -237,7 +239,7 @@ _KINDS = {
     "kg": "mass", "kg*m^2": "moment of inertia", "N*m": "torque", "N": "force", "m/s": "speed",
     "N*m/A": "torque constant", "V*s/rad": "back-EMF constant", "rad/s^2": "angular acceleration",
     "m/s^2": "acceleration", "N*m*s/rad": "viscous friction", "N*m/rad": "stiffness",
-    "degC": "temperature", "K": "temperature difference",
+    "degC": "temperature", "K": "temperature difference", "pulse": "count or line, by maker",
 }  # fmt: skip
 
 
@@ -260,10 +262,14 @@ _GAIN_OF_TORQUE = (
 )
 _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
-    (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
-    (_FREQUENCY, "s"): "a period of {period:.6g} s",
+    (
+        _FREQUENCY,
+        "s",
+    ): "a corner (PI, filter) of it is {corner:.4g} s, 1/(2 pi f), a period {period:.6g} s",
     **dict.fromkeys(product((_FREQUENCY, "gain or rate"), ("A*s/rad", "V*s/rad", "V/A")), _IN_HZ),
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
+    ("count or line, by maker", "1"): 'write "{n:g} lines" ({lines:g} counts) or "{n:g} counts"',
+    ("mass", "m/s^2"): "g of a fall is 9.80665 m/s^2, here {fall:.6g} m/s^2",
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
     ("mass", "kg*m^2"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
@@ -272,18 +278,17 @@ _ADVICE = {
 """Where engineers mix two up: what is written, the unit wanted, and how to get there."""
 
 
-@lru_cache(maxsize=1)
-def _advices() -> dict[tuple[str, Dimension], str]:
-    return {(kind, parse_unit(unit).dimension): said for (kind, unit), said in _ADVICE.items()}
-
-
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted."""
-    said = _advices().get((_kinds().get(value.dimension, ""), wanted.dimension))
-    if said is not None:
+    kind = _kinds().get(value.dimension)
+    advices = (said for (one, unit), said in _ADVICE.items()
+               if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip
+    if (said := next(advices, None)) is not None:
         size = number * value.factor
-        period = 2.0 * pi / size if size > 0.0 else 0.0
-        return f"; {said.format(size=size, period=period)}" if period or "{period" not in said else ""
+        corner = 1.0 / size if size > 0.0 else nan
+        here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
+        told = said.format(size=size, fall=size * 9806.65, **here)
+        return "" if "nan" in told else f"; {told}"
     if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
     if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
@@ -332,10 +337,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     float
         In ``unit`` (which is to be an SI unit without prefix).
 
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, has an unknown unit or the wrong dimension.
+    An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Step response of a system with inner delays, stepped along its delays."""
+"""Step response of a system with inner delays: walked along the first of them, then by its poles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Any
 import flint
 import numpy as np
 from scipy.interpolate import BarycentricInterpolator
-from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
@@ -17,53 +16,51 @@ from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
-from actuator_lti.systems.delay_stepper import step_of
+from actuator_lti.systems.delay_stepper import NODES, DelayStepper
 from actuator_lti.systems.plain_system import response
 
-_FIRST = 10.0  # longest delays to step at first
-_MEET = 1e-5
+_FIRST = 10.0  # longest delays to walk at first
+_MEET = 1e-7
 _POINTS = 32
-_PARTS = np.linspace(0.0, 1.0, 5)  # of a step, at which the response is kept
-_SERIES = np.linalg.inv(np.vander(_PARTS))  # from its values there to the quartic through them
+_SERIES = np.linalg.inv(np.vander(0.5 * (NODES + 1.0)))  # of the part of a piece, from its values
 _ZERO = 1e-12  # of the largest response about the poles
-_MOST = 400_000
 _FORGOTTEN = 25.0  # time constants
 _CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points on it
 
 
 class Stepped:
-    """The first part of the response, over each step a polynomial of the part of it.
+    """The first part of the response, over each piece a polynomial of the part of it.
 
-    From the values at the start, at each quarter and at the end of each step, shape (steps, 5).
+    From its values at `NODES` of each piece, shape (pieces, 8).
     """
 
     sampled, tie = False, 0.0
 
-    def __init__(self, values: Real, h: float) -> None:
-        self.shortest, self.end = h, h * len(values)
-        self._series = values @ _SERIES.T
+    def __init__(self, begins: Real, lengths: Real, values: Real) -> None:
+        self._begins, self._lengths, self._series = begins, lengths, values @ _SERIES.T
 
     def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """See `actuator_lti.step.motion.Motion.spans`."""
-        a, series = self.shortest * np.arange(len(self._series)), self._series
+        a, h, series = self._begins, self._lengths, self._series
         left, right = of(series[:, -1]), of(series.sum(axis=1))
         most = left + np.abs(series[:, :-1]).sum(axis=1)
-        keep = undecided(a, a + self.shortest, left, right, most)
-        return list(zip(a[keep], series[keep], strict=True))
+        keep = undecided(a, a + h, left, right, most)
+        return list(zip(a[keep], h[keep], series[keep], strict=True))
 
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times up to ``end``, and e there."""
         time = np.linspace(0.0, end, count)
-        step = np.minimum((time / self.shortest).astype(int), len(self._series) - 1)
-        return time, (np.vander(time / self.shortest - step, _PARTS.size) * self._series[step]).sum(axis=1)
+        k = np.searchsorted(self._begins, time, side="right") - 1
+        powers = np.vander((time - self._begins[k]) / self._lengths[k], NODES.size)
+        return time, (powers * self._series[k]).sum(axis=1)
 
 
 def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     """Unit step response of a system with inner delays over its final value, and that value.
 
-    The first delays are stepped; after them the response is the free motion of the exact poles, which the
-    collocation of the delays starts and integrals of T about them sharpen. The two have to agree
-    where they meet, to 1e-5 of the final value; otherwise stepping goes on.
+    The first delays are walked along; after them the response is the free motion of the exact poles, which
+    the collocation of the delays starts and integrals of T about them sharpen. The two have to agree
+    where they meet, to 1e-7 of the final value; otherwise the walk goes on.
     """
     form = delay_form(system)
     form = replace(form, whole=balanced(form.whole))
@@ -75,17 +72,19 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
         raise InputError(NO_FINAL)
     head = _FIRST * float(form.delays_s.max())
+    walk, u = DelayStepper(system, 0.0, np.zeros(form.states), np.ones(1)), np.ones(1)
     while True:
-        h = _grid_step(form.delays_s, head)
-        values = _stepped(form, h, int(np.ceil(head / h))) / final - 1.0
+        walk.at(head, u)
+        begins, lengths, values = walk.pieces()
+        values = values[..., 0] / final - 1.0
         exact, weights = _modes(system, poles.values, head)
-        late = np.arange(len(values) * 3 // 4, len(values))
-        modes = (np.exp(h * np.outer(late, exact)) @ weights).real / final
+        late = begins > 0.75 * head
+        modes = (np.exp(np.outer(begins[late], exact)) @ weights).real / final
         if np.abs(modes - values[late, 0]).max() <= _MEET:
-            early, n = Stepped(values, h), exact.size
+            n = exact.size
             A = flint.acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
-            state = weights * np.exp(exact * early.end) / final
-            return early, Motion(A, np.ones(n), state, False, early.end), final
+            state = weights * np.exp(exact * head) / final
+            return Stepped(begins, lengths, values), Motion(A, np.ones(n), state, False, head), final
         head *= 2.0
 
 
@@ -96,20 +95,15 @@ def collocated(form: DelayForm, points: int) -> Real:
     x = 1. Eigenvalues with |s| tau well below the number of points are those of the exact delay to near
     machine precision (Breda, Maset, Vermiglio 2005).
     """
-    n, q, N, delays = form.states, form.delays_s.size, points, form.delays_s
+    n, q = form.states, form.delays_s.size
     inner = form.whole[:-1, :-1]
-    x = 0.5 * (1.0 - np.cos(np.pi * np.arange(N + 1) / N))
-    D = BarycentricInterpolator(x, np.eye(N + 1)).derivative(x)
-    M = np.zeros((n + q * N, n + q * N))
-    M[:n, :n] = inner[:n, :n]
-    ends = n + N * np.arange(1, q + 1) - 1
-    M[:n, ends] = inner[:n, n:]
-    for k in range(q):
-        rows = slice(n + k * N, n + (k + 1) * N)
-        M[rows, rows] = -D[1:, 1:] / delays[k]
-        M[rows, :n] -= np.outer(D[1:, 0], inner[n + k, :n]) / delays[k]
-        M[rows, ends] -= np.outer(D[1:, 0], inner[n + k, n:]) / delays[k]
-    return M
+    x = 0.5 * (1.0 - np.cos(np.pi * np.arange(points + 1) / points))
+    D = BarycentricInterpolator(x, np.eye(points + 1)).derivative(x)[1:]
+    ends = np.kron(np.eye(q), np.eye(points)[-1:])
+    rates = np.diag(-1.0 / form.delays_s)
+    begins = np.kron(rates, D[:, :1])
+    lines = np.kron(rates, D[:, 1:]) + begins @ inner[n:, n:] @ ends
+    return np.block([[inner[:n, :n], inner[:n, n:] @ ends], [begins @ inner[n:, :n], lines]])
 
 
 def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]:
@@ -135,43 +129,3 @@ def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]
         found.append((pole + off, residue / (pole + off) * (1.0 if pole.imag == 0.0 else 2.0)))
     exact, weights = np.array(found, dtype=complex).reshape(-1, 2).T
     return exact, weights
-
-
-def _grid_step(delays: Real, horizon: float) -> float:
-    """A step of which every delay is a multiple, where there is one; longer where it would take too many."""
-    shortest, (h, _) = float(delays.min()), step_of(delays)
-    if horizon / h > _MOST:
-        h = shortest / max(int(shortest * _MOST / horizon), 1)
-        if horizon / h > 4 * _MOST:
-            raise InputError("the step response lasts too many delays to be stepped")
-    return h
-
-
-def _stepped(form: DelayForm, h: float, steps: int) -> Real:
-    """March: x exactly for delayed signals that are quartics over a step, zero before t = 0.
-
-    Returns y at the start, at each quarter and at the end of each step (shape (steps + 1, 5)).
-    """
-    n, q, m = form.states, form.delays_s.size, _PARTS.size
-    M = np.zeros((n + m * q + 1, n + m * q + 1))  # of x, the delayed signals with their derivatives, and u
-    M[:n, : n + q], M[:n, -1] = h * form.whole[:n, :-1], h * form.whole[:n, -1]
-    M[n : n + (m - 1) * q, n + q : -1] = np.eye((m - 1) * q)
-    inside = np.stack([expm(M * part)[:n] for part in _PARTS])
-    to_derivatives = np.cumprod([1.0, *range(1, m)])[:, None] * _SERIES[::-1]
-    by_delayed = np.einsum("pnkq,kv->pnqv", inside[:, :, n:-1].reshape(m, n, m, q), to_derivatives)
-    lag = form.delays_s / h
-    whole = np.floor(lag + 1e-9).astype(int)
-    rest = np.where(np.abs(lag - whole) < 1e-9 * lag, 0.0, lag - whole)[:, None]
-    before = rest > _PARTS  # part of a step that looks back into the one before
-    looks = np.stack([np.vander(at, m) @ _SERIES for at in _PARTS - rest + before])
-    late = np.concatenate([looks * ~before[..., None], looks * before[..., None]], axis=2)
-    first, delays = int(whole.max()) + 1, np.arange(q)
-    past, x, y = np.zeros((first + steps + 1, q, m)), np.zeros(n), np.empty((steps + 1, m))
-    for k in range(steps + 1):
-        at = first + k - whole
-        known = np.concatenate([past[at, delays], past[at - 1, delays]], axis=1)
-        z = (late @ known[..., None])[..., 0]
-        states = inside[:, :, :n] @ x + by_delayed.reshape(m, n, -1) @ z.ravel() + inside[:, :, -1]
-        out = np.hstack((states, z.T)) @ form.whole[n:, :-1].T + form.whole[n:, -1]
-        past[first + k], y[k], x = out[:, :-1].T, out[:, -1], states[-1]
-    return y

@@ -58,9 +58,8 @@ def step_figures(system: Any) -> StepFigures:
 
     A rational system is taken exactly as its doubles say, as the free motion of its certified poles; every
     figure is found by halving all of time, so that nothing hides between two points of a grid. A sampled
-    system is looked at at its samples. A system with inner delays is stepped along its first delays, the
-    delayed signals quartics over steps of which at least 12 make the shortest one, and is then the free
-    motion of its exact poles.
+    system is looked at at its samples. A system with inner delays is walked along its first delays, in pieces
+    over which nothing jumps, each a polynomial, and is then the free motion of its exact poles.
 
     All figures are relative to the final value, however small it is beside what comes before: a resonance
     80 dB above the gain at zero frequency gives an overshoot of a million percent.
@@ -136,10 +135,10 @@ def _passage(part: Stepped | Motion, level: float, *, last: bool) -> float:
         best = above.max(initial=best) if last else above.min(initial=best)
         return (most > level) & ((b > best) if last else (a < best))
 
-    for a, series in sorted(part.spans(undecided, of), key=itemgetter(0), reverse=last):
+    for a, h, series in sorted(part.spans(undecided, of), key=itemgetter(0), reverse=last):
         roots = [root for side in sides for root in _within(series, side)]
         if roots:
-            return a + (max(roots) if last else min(roots)) * part.shortest
+            return a + h * (max(roots) if last else min(roots))
     return float(best)
 
 
@@ -154,10 +153,10 @@ def _greatest(part: Stepped | Motion, best: float, place: float) -> tuple[float,
                 best, place = float(e[k]), float(t[k])
         return most > best * (1.0 + _FLAT)
 
-    for a, series in part.spans(undecided, np.asarray):
+    for a, h, series in part.spans(undecided, np.asarray):
         for top in _within(np.polyder(series)):
             if (e := float(np.polyval(series, top))) > best:
-                best, place = e, a + top * part.shortest
+                best, place = e, a + h * top
     return best, place
 
 

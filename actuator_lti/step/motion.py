@@ -53,7 +53,7 @@ NO_FINAL = "the final value of the step response is zero: it has no rise, oversh
 _INTEGRATES = "the system integrates: its step response has no final value"
 _Poles = list[flint.acb]  # each as often as it is repeated
 Undecided = Callable[[Real, Real, Real, Real, Real], Mask]
-Spans = list[tuple[float, Real]]
+Spans = list[tuple[float, float, Real]]  # begin, length, power series of the part of it
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
 
 
@@ -111,7 +111,7 @@ class Motion:
     def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """Halve all of time; a span stays where ``undecided(a, b, of(e(a)), of(e(b)), most of of(e))``.
 
-        Returns the shortest spans that stay: when they begin, and e over them as a power series.
+        Returns the shortest spans that stay, and e over them.
         """
         a, x = np.zeros(1), self._x[None]
         for level in reversed(range(len(self._moves))):
@@ -127,7 +127,9 @@ class Motion:
                 return []
             if a.size > _MOST:
                 raise NumericalError(_LONG)
-        return [] if self.sampled else list(zip(self.start + a, self._series(x), strict=True))
+        if self.sampled:
+            return []
+        return [(t, self.shortest, series) for t, series in zip(self.start + a, self._series(x), strict=True)]
 
     def _series(self, x: Complex) -> Real:
         """Coefficients of e over one shortest span, highest power first; shape (m, terms)."""

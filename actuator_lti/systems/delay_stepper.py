@@ -1,34 +1,49 @@
-"""A system with delays, stepped through a given input: the method of steps.
+"""A system with delays, walked through a given input: the method of steps.
 
-Between two nodes the delayed signals are known from before (a node is never further from the last than the
-shortest delay), so the state moves by the matrix exponential of what a straight input and straight delayed
-signals do. The only error is that of straight lines between the nodes: second order in their distance. Jumps
-travel through the delays unharmed, as each node has a value before it and one after it, and the nodes fall on
-every sum of delays where these have a common measure.
+Jumps and kinks of the input return in the delayed signals after every sum of delays, and their derivatives
+jump by amounts that follow from those before. Between such instants the solution is smooth: there it is
+walked in pieces, each no longer than the shortest delay, so that the delayed signals are known, and short
+enough for a polynomial; the state by the Radau IIA collocation of 7 stages (order 13 at the end of a piece).
+Instants are kept while their jumps matter, for ever where a loop of delays lets a jump through.
+
+Bellen, Zennaro, Numerical Methods for Delay Differential Equations, 2003.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from heapq import heappop, heappush
+from itertools import count
+from math import factorial
+from typing import Any
 
 import numpy as np
+from numpy.polynomial.legendre import Legendre, legvander
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.systems.delay_system import DelaySystem
+from actuator_lti.systems.resolvent import balanced
 
 Real = NDArray[np.float64]
-_FEWEST = 12  # nodes to the shortest delay
-_MOST = 48
-_NODES = 4_000_000
-_SAME = 1e-9  # of a step: closer is on the node
+_STAGES = 7
+_RADAU = (Legendre.basis(_STAGES) - Legendre.basis(_STAGES - 1)).roots()
+NODES = np.concatenate(([-1.0], _RADAU[:-1], [1.0]))  # of a piece, from -1 to 1
+_POWERS = np.arange(NODES.size)
+_SERIES = np.linalg.inv(NODES[:, None] ** _POWERS)  # power series from values at the nodes
+_LAST = np.linalg.inv(legvander(NODES, _STAGES))[-2:]  # Legendre coefficients of the highest degrees
+_HIGHEST = np.array([[0.05], [1.0]])  # weights of these
+_SLOPES = (_POWERS * NODES[1:, None] ** np.maximum(_POWERS - 1, 0)) @ _SERIES
+_RATES, _TURN = np.linalg.eig(_SLOPES[:, 1:])
+_BACK = np.linalg.inv(_TURN)
+_ORDERS = 9  # value and derivatives whose jumps are followed
+_SIZES = np.array([0.25**p / factorial(p) for p in range(_ORDERS)])  # what polynomials cannot follow of them
+_SMALL = 1e-10  # of the largest value so far: a jump that is left out
+_SMOOTH = 1e-9  # of the largest value so far: the highest coefficients of a piece
+_SAME = 1e-9  # of the shortest delay: instants closer are one
+_MOST = 400_000
 
 
 class DelayStepper:
-    """Walks a `DelaySystem` forward in time from a state and an input; nothing moved before the start.
+    """Walks a system with delays forward in time from a state and an input; nothing moved before the start.
 
     Examples
     --------
@@ -42,106 +57,145 @@ class DelayStepper:
     [0.0, 0.0, 0.5, 2.0]
     """
 
-    def __init__(self, system: DelaySystem, start_s: float, state: Real, u: Real) -> None:
-        self.system, self.start_s = system, start_s
-        self.step_s, self._block = step_of(system.delays_s)
-        self._inputs = np.hstack([system.B1, system.B2])
-        self._moves = {count: _many(system.A, self._inputs, self.step_s, count) for count in (1, self._block)}
-        self._node, self._state, self._u = 0, state.copy(), u.copy()
-        self._last = (start_s, u.copy())
-        # Delayed signals v just before and just after each node, behind rows of zeros from before the start.
-        self._pad = int(np.ceil(system.delays_s.max() / self.step_s)) + 2
-        self._columns = np.arange(len(system.delays_s))
-        self._before, self._after = (np.zeros((self._pad + 1024, len(self._columns))) for _ in range(2))
-        self._after[self._pad] = system.C2 @ state + system.D21 @ u
+    def __init__(self, system: Any, start_s: float, state: Real, u: Real) -> None:
+        if not len(system.delays_s):
+            raise InputError("a system without delays: take to_state_space()")
+        self.start_s, self._delays = start_s, system.delays_s
+        self._A, self._B = system.A, np.hstack([system.B2, system.B1])
+        self._C = np.vstack([system.C2, system.C1])  # of v, then y
+        self._D = np.block([[system.D22, system.D21], [system.D12, system.D11]])
+        self._shortest = float(self._delays.min())
+        norm = float(np.linalg.norm(balanced(self._A)[0], 2)) if len(self._A) else 0.0
+        self._unit = self._shortest / max(1.0, self._shortest * norm)
+        self._jumps = self._passed_on()
+        self._t, self._state, self._h = start_s, state.copy(), self._shortest
+        self._last, self._u, self._slope = start_s, u.copy(), np.zeros_like(u)
+        self._due: list[tuple[float, int, int, Real]] = []  # (time, number, delay, its jumps)
+        self._number = count()
+        self._next: tuple[float, Real] | None = None
+        self._same = _SAME * self._shortest
+        self._near = 1.5 * self._same
+        self._driven = np.zeros(self._jumps.shape[1])  # what jumps at the start: state and input
+        self._driven[: len(state)] = state
+        self._driven[len(state) :].reshape(_ORDERS, -1)[0, len(self._delays) :] = u
+        # Pieces: when each begins, its length, and the power series of v and y; first what was before.
+        self._count = 1
+        self._begins, self._lengths = np.full(1024, -np.inf), np.ones(1024)
+        self._series = np.zeros((1024, NODES.size, len(self._C)))
+        self._largest = np.zeros(len(self._C))
 
     def at(self, t: float, u: Real) -> tuple[Real, Real]:
         """State and output at an instant not before the last one, the input straight since then."""
-        self._walk(t, u)
-        system, place = self.system, (t - self.start_s) / self.step_s
-        after = self._delayed(np.array([place]), self._after)[0]
-        state, rest = self._state, place - self._node
-        if rest > _SAME:
-            first = np.concatenate([self._u, self._delayed(np.array([float(self._node)]), self._after)[0]])
-            last = np.concatenate([u, self._delayed(np.array([place]), self._before)[0]])
-            to_state, by_inputs = _many(system.A, self._inputs, rest * self.step_s, 1)
-            state = to_state @ state + by_inputs @ np.concatenate([first, last])
-        self._last = (t, u.copy())
-        return state, system.C1 @ state + system.D11 @ u + system.D12 @ after
+        if t > self._last:
+            slope = (u - self._u) / (t - self._last)
+            self._turned(slope)
+            self._walk(t)
+            self._last, self._u = t, u.copy()
+        z = self._delayed(np.array([t]), np.array([t + self._near]))[0]
+        return self._state, (self._C @ self._state + self._D @ np.concatenate([z, u]))[len(self._delays) :]
 
-    def _walk(self, t: float, u: Real) -> None:
-        """Go on to the last node that is not after ``t``, a whole shortest delay at once where it fits."""
-        until = int(np.floor((t - self.start_s) / self.step_s + _SAME))
-        if until > _NODES:
+    def pieces(self) -> tuple[Real, Real, Real]:
+        """When the pieces so far begin, their lengths, and the outputs at `NODES` of each, (pieces, 8, p)."""
+        some = slice(1, self._count)
+        values = NODES[:, None] ** _POWERS @ self._series[some, :, len(self._delays) :]
+        return self._begins[some], self._lengths[some], values
+
+    def _turned(self, slope: Real) -> None:
+        """The jumps that begin where the input's slope changes, at the start those of both too."""
+        m, driven = len(slope), self._driven.copy()
+        driven[len(self._state) :].reshape(_ORDERS, -1)[1, -m:] = (slope - self._slope) * self._unit
+        self._pass_on(self._last, (self._jumps @ driven).reshape(_ORDERS, -1))
+        self._slope, self._driven = slope, np.zeros_like(driven)
+
+    def _walk(self, t: float) -> None:
+        while t - self._t > self._same:
+            self._advance(self._smooth_until(min(t, self._t + self._shortest)))
+            if self._next is not None and self._next[0] - self._t <= self._same:
+                self._pass_on(*self._next)
+                self._next = None
+
+    def _smooth_until(self, limit: float) -> float:
+        """The next instant at which something that matters jumps, or the limit."""
+        while self._next is None and self._due and self._due[0][0] <= limit:
+            t, driven = self._due[0][0], np.zeros_like(self._driven)
+            by_order = driven[len(self._state) :].reshape(_ORDERS, -1)
+            while self._due and self._due[0][0] <= t + self._same:
+                _, _, k, jumps = heappop(self._due)
+                by_order[:, k] += jumps
+            jumps = (self._jumps @ driven).reshape(_ORDERS, -1)
+            if not self._matters(jumps).any():
+                continue
+            if t - self._t <= self._same:
+                self._pass_on(t, jumps)
+            else:
+                self._next = t, jumps
+        return limit if self._next is None else min(limit, self._next[0])
+
+    def _matters(self, jumps: Real) -> NDArray[np.bool_]:
+        return _SIZES @ np.abs(jumps) > _SMALL * self._largest
+
+    def _pass_on(self, t: float, jumps: Real) -> None:
+        for k in np.flatnonzero(self._matters(jumps)[: len(self._delays)]):
+            heappush(self._due, (t + self._delays[k], next(self._number), int(k), jumps[:, k]))
+
+    def _advance(self, until: float) -> None:
+        """One piece, as long as its polynomials follow."""
+        whole = until - self._t
+        h = whole if self._h >= whole else min(self._h, 0.5 * whole)
+        while True:
+            states, values = self._collocated(h)
+            largest = np.maximum(self._largest, np.abs(values).max(axis=0))
+            rough = np.abs(_LAST @ values) * _HIGHEST
+            if h <= 0.25 * self._unit or (rough <= _SMOOTH * largest).all():
+                break
+            h *= 0.5
+        self._keep(h, _SERIES @ values)
+        self._h = max(2.0 * h, self._h if h == whole else 0.0)
+        self._t, self._state, self._largest = self._t + h if h < whole else until, states[-1], largest
+
+    def _collocated(self, h: float) -> tuple[Real, Real]:
+        """States, and v and y, at the nodes of a piece of length h."""
+        times = self._t + 0.5 * h * (NODES + 1.0)
+        near = min(self._near, 0.5 * h)
+        z = self._delayed(times, np.clip(times, self._t + near, self._t + h - near))
+        driven = np.hstack([z, self._u + (times - self._last)[:, None] * self._slope])
+        right = 0.5 * h * driven[1:] @ self._B.T - _SLOPES[:, :1] * self._state
+        matrices = _RATES[:, None, None] * np.eye(len(self._A)) - 0.5 * h * self._A
+        inner = _TURN @ np.linalg.solve(matrices, (_BACK @ right)[..., None])[..., 0]
+        states = np.vstack([self._state, inner.real])
+        return states, states @ self._C.T + driven @ self._D.T
+
+    def _delayed(self, times: Real, inside: Real) -> Real:
+        """What the delays give at some times, each continued from the piece of a time inside of its own."""
+        begins = self._begins[: self._count]
+        piece = np.searchsorted(begins, inside[:, None] - self._delays, side="right") - 1
+        part = 2.0 * (times[:, None] - self._delays - begins[piece]) / self._lengths[piece] - 1.0
+        series = self._series[piece, :, np.arange(len(self._delays))]
+        return (series * np.clip(part, -1.0, 1.0)[..., None] ** _POWERS).sum(axis=-1)
+
+    def _keep(self, h: float, series: Real) -> None:
+        k = self._count
+        if k > _MOST:
             raise InputError(
-                f"{t - self.start_s:g} s: too long for steps of {self.step_s:g} s; ask for fewer seconds"
+                f"{self._t - self.start_s:g} s take {k - 1} pieces between the instants at which jumps "
+                f"return (sums of the delays, the shortest {self._shortest:g} s): ask for fewer seconds"
             )
-        while self._node < until:
-            self._advance(self._block if until - self._node >= self._block else 1, t, u)
+        if k == len(self._begins):
+            for name in ("_begins", "_lengths", "_series"):
+                kept = getattr(self, name)
+                setattr(self, name, np.concatenate([kept, np.zeros_like(kept)]))
+        self._begins[k], self._lengths[k], self._series[k], self._count = self._t, h, series, k + 1
 
-    def _advance(self, count: int, t: float, u: Real) -> None:
-        """Go on by some nodes, at most the shortest delay: what the delays give there is known already."""
-        system, (last_s, last), n = self.system, self._last, self._node
-        nodes = np.arange(n, n + count + 1)
-        passed = t - last_s or 1.0
-        part = np.clip((self.start_s + nodes * self.step_s - last_s) / passed, 0.0, 1.0)
-        inputs = last + part[:, None] * (u - last)
-        inputs[0] = self._u
-        early, late = (self._delayed(nodes.astype(float), kept) for kept in (self._after, self._before))
-        driven = np.hstack([inputs[:-1], early[:-1], inputs[1:], late[1:]]).ravel()
-        to_state, by_inputs = self._moves[count]
-        states = (to_state @ self._state + by_inputs @ driven).reshape(count, -1)
-        self._state, self._node, self._u = states[-1], n + count, inputs[-1]
-        own = states @ system.C2.T + inputs[1:] @ system.D21.T
-        self._keep(n + 1, own + late[1:] @ system.D22.T, own + early[1:] @ system.D22.T)
+    def _passed_on(self) -> Real:
+        """The jumps of v and y, all orders, from those of x and, all orders, of z and u.
 
-    def _keep(self, node: int, before: Real, after: Real) -> None:
-        rows = slice(self._pad + node, self._pad + node + len(before))
-        if rows.stop >= len(self._before):
-            self._before, self._after = (
-                np.vstack([k, np.zeros_like(k)]) for k in (self._before, self._after)
-            )
-        self._before[rows], self._after[rows] = before, after
-
-    def _delayed(self, places: Real, kept: Real) -> Real:
-        """What the delays give at some places (in steps from the start), from before or from after them."""
-        at = places[:, None] - self.system.delays_s / self.step_s
-        whole = np.floor(at + _SAME).astype(int)
-        part = at - whole
-        row = np.maximum(whole + self._pad, 0)
-        between = (1.0 - part) * self._after[row, self._columns] + part * self._before[row + 1, self._columns]
-        return np.where(np.abs(part) <= _SAME, kept[row, self._columns], between)
-
-
-def step_of(delays_s: NDArray[np.floating[Any]]) -> tuple[float, int]:
-    """Distance of the nodes, and how many of it are no longer than the shortest delay.
-
-    The coarsest distance on which all delays fall, a part of the shortest in any case.
-    """
-    if not len(delays_s):
-        raise InputError("a system without delays: take to_state_space()")
-    shortest = float(delays_s.min())
-    for parts in range(_FEWEST, _MOST + 1):
-        places = delays_s * (parts / shortest)
-        if np.all(np.abs(places - np.round(places)) < _SAME * places):
-            return shortest / parts, parts
-    return shortest / _MOST, _MOST
-
-
-def _many(A: Real, B: Real, h: float, count: int) -> tuple[Real, Real]:
-    """States after 1 .. count steps, from the state and from (first, last) of the straight inputs of each."""
-    n, m = B.shape
-    big = np.zeros((n + 2 * m, n + 2 * m))
-    big[:n, :n], big[:n, n : n + m], big[n : n + m, n + m :] = A * h, B * h, np.eye(m)
-    E = expm(big)
-    move, ends = E[:n, :n], np.hstack([E[:n, n : n + m] - E[:n, n + m :], E[:n, n + m :]])
-    to_state, by_inputs = np.zeros((count * n, n)), np.zeros((count * n, count * 2 * m))
-    power = np.eye(n)
-    for k in range(count):
-        pushed = power @ ends
-        for j in range(k, count):
-            place = j - k
-            by_inputs[j * n : (j + 1) * n, place * 2 * m : (place + 1) * 2 * m] = pushed
-        power = move @ power
-        to_state[k * n : (k + 1) * n] = power
-    return to_state, by_inputs
+        Those of order p in units of p!/unit^p.
+        """
+        n, m = len(self._A), self._D.shape[1]
+        inputs = np.eye(n + _ORDERS * m)
+        x, jumps = inputs[:n], []
+        for order in range(_ORDERS):
+            driven = inputs[n + order * m : n + (order + 1) * m]
+            jumps.append(self._C @ x + self._D @ driven)
+            x = self._unit / (order + 1.0) * (self._A @ x + self._B @ driven)
+        return np.concatenate(jumps)

@@ -67,3 +67,4 @@ def test_a_library_that_makes_an_error_of_its_own_of_it_changes_nothing(capsys) 
     assert run(late) == 3
     assert "not finished within 60 s" in capsys.readouterr().err
     assert not time_limit.struck()
+    assert not time_limit._timers

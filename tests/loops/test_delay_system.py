@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from actuator_lti import DelaySystem, InputError, assemble_loops
+from actuator_lti.systems import delay_stepper
 
 S = 1j * np.geomspace(0.01, 1e4, 40)
 LAG = control.tf([2.0], [0.1, 1.0])
@@ -169,15 +170,11 @@ def test_an_integrator_behind_a_delay(gain: float, delay: float) -> None:
 
 def test_two_delays_without_a_common_measure() -> None:
     lag = DelaySystem.from_system(control.tf([1], [1, 1]))
-    first, second = 2**0.5, e
-    system = lag * (DelaySystem.delay(first) + DelaySystem.delay(second))
     times = np.linspace(0.0, 9.0, 91)
-    wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (first, second))
-    result = control.step_response(system, times).y[0, 0]
-    np.testing.assert_allclose(result, wanted, atol=0.02)  # a jump on no node is spread over one step
-    nodes = lag * (DelaySystem.delay(1.25) + DelaySystem.delay(2.0))
-    wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in (1.25, 2.0))
-    np.testing.assert_allclose(control.step_response(nodes, times).y[0, 0], wanted, atol=1e-12)
+    for delays in ((2**0.5, e), (1.25, 2.0)):
+        system = lag * (DelaySystem.delay(delays[0]) + DelaySystem.delay(delays[1]))
+        wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in delays)
+        np.testing.assert_allclose(control.step_response(system, times).y[0, 0], wanted, atol=1e-10)
 
 
 def test_jumps_that_go_round_for_ever() -> None:
@@ -187,6 +184,16 @@ def test_jumps_that_go_round_for_ever() -> None:
     rounds = np.floor(times / 0.25).astype(int)
     wanted = [sum((-0.5) ** k for k in range(n)) for n in rounds]
     np.testing.assert_allclose(control.step_response(loop, times).y[0, 0][1:], wanted[1:], atol=1e-12)
+
+
+def test_jumps_at_too_many_instants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """y = u - 0.33 (y(t - 1) + y(t - sqrt 2) + y(t - e)): three sums of delays that never fade."""
+    monkeypatch.setattr(delay_stepper, "_MOST", 3000)
+    ring = sum((0.33 * DelaySystem.delay(d) for d in (1.0, 2**0.5, e)), DelaySystem.from_system(0.0))
+    closed = DelaySystem.from_system(1.0).feedback(ring)
+    assert np.isfinite(control.step_response(closed, np.linspace(0.0, 9.0, 10)).y).all()
+    with pytest.raises(InputError, match=r"3000 pieces between the instants at which jumps return.*fewer"):
+        control.step_response(closed, np.linspace(0.0, 900.0, 10))
 
 
 def test_any_input_and_the_states() -> None:

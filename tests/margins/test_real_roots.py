@@ -7,9 +7,16 @@ import pytest
 from flint import acb, acb_poly, arb, ctx, fmpq, fmpz_poly
 
 from actuator_lti.margins.distances import MODULUS
+from actuator_lti.margins.exact import real_roots
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.real_roots import positive_roots
 from actuator_lti.margins.exact.roots import all_roots
+
+
+@pytest.fixture(autouse=True)
+def _of_any_degree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(real_roots, "FEW", 0)
+
 
 CASES = {
     "none": ([], []),

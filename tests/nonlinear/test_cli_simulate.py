@@ -1,6 +1,6 @@
 """`actuator-lti simulate`: commands, loads, records mean what they say, in the outermost stage's unit."""
 
-from math import exp, pi
+from math import exp, radians
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +8,12 @@ import numpy as np
 import pyarrow.parquet
 import pytest
 
+from actuator_lti import load_design, write_design
+from actuator_lti.design.model import Friction
 from actuator_lti.errors import InputError
 from analyses.motion.asked import OF
 from nonlinear import loads
+from tests.changed import changed
 
 TS = 1e-4
 
@@ -184,96 +187,88 @@ def test_an_event_log_is_held(run, tmp_path) -> None:
     assert reference[[99, 100, 129, 130, 999, 1000, 1199]] == pytest.approx(wanted)
 
 
-VOLTAGE = """
-[design]
-name = "small"
-[motor]
-resistance = "12 ohm"
-inductance = "0.3 mH"
-torque_constant = "11 mN*m/A"
-back_emf_constant = "11 mV*s/rad"
-rotor_inertia = "1.2 g*cm^2"
-[[gear]]
-name = "g"
-ratio = 64
-[load]
-inertia = "1e-4 kg*m^2"
-path = "back-drivable"
-[friction]
-dry_torque = "0.2 mN*m"
-[limits]
-voltage = "12 V"
-peak_current = "1 A"
-[control]
-period = "100 us"
-computing_delay = "0 us"
-"""
-CURRENT = VOLTAGE + '[control.current]\ngain = "2 V/A"\nintegral_time = "0.2 ms"\n'
-SPEED = CURRENT + '[control.velocity]\ngain = "10 mA*s/rad"\nintegral_time = "20 ms"\n'
+AMBER = load_design("ilr33-amber")
+C0, kM, kE = (
+    AMBER.friction.dry_torque_Nm,
+    AMBER.motor.torque_constant_Nm_A,
+    AMBER.motor.back_emf_constant_Vs_rad,
+)
+SPEED = ("position",)
+CURRENT = (*SPEED, "velocity")
+VOLTAGE = (*CURRENT, "current")
 
 
-def written(text: str, folder: Path) -> Path:
-    (folder / "drive.toml").write_text(text)
+def without(stages: tuple[str, ...], folder: Path) -> Path:
+    """The baseline without its outer stages, its friction dry."""
+    friction = Friction(dry_torque_Nm=C0)
+    design = changed(AMBER, controller=dict.fromkeys(stages), friction=friction, requirements=())
+    (folder / "drive.toml").write_text(write_design(design))
     return folder / "drive.toml"
 
 
 def test_volts(run, tmp_path) -> None:
     """At rest of the transient U = R i + kE w, with i from the dry friction."""
-    made = run(f"{written(VOLTAGE, tmp_path)} --amplitude 6 --duration 2")
+    made = run(f"{without(VOLTAGE, tmp_path)} --amplitude 6 --duration 2")
     told = {"commanded": "voltage", "status": "becomes steady"}
     told |= {"largest_command_V": 6.0, "largest_error_V": 0.0}
     assert made.facts | told == made.facts
     assert np.all(made.rows["voltage_reference_V"] == 6.0)
-    speed = (6.0 - 12.0 * 0.2 / 11.0) / 11e-3
-    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(speed, rel=1e-6)
+    speed = (6.0 - AMBER.motor.resistance_ohm * C0 / kM) / kE
+    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(speed, rel=1e-9)
 
 
 def test_amperes(run, tmp_path) -> None:
     """The back-EMF rises while the rotor speeds up: the PI lags behind its ramp by kE a Ti / Kp."""
-    made = run(f"{written(CURRENT, tmp_path)} --amplitude 0.1 --duration 0.01")
-    assert made.facts["largest_error_A"] == pytest.approx(0.1)
-    assert np.all(made.rows["current_reference_A"] == 0.1)
-    lag = 11e-3 / (1.2e-7 + 1e-4 / 64**2) * 0.2e-3 / 2.0
-    current = (0.1 + lag * 0.2e-3) / (1.0 + lag * 11e-3)
+    made = run(f"{without(CURRENT, tmp_path)} --amplitude 1 --duration 0.01")
+    assert made.facts["largest_error_A"] == pytest.approx(1.0)
+    assert np.all(made.rows["current_reference_A"] == 1.0)
+    loop = AMBER.controller.current
+    lag = kE / AMBER.inertia_kgm2 * loop.integral_time_s / loop.gain_V_A
+    current = (1.0 + lag * C0) / (1.0 + lag * kM)
     assert made.rows["current_A"][-1] == pytest.approx(current, rel=1e-3)
+    still = run(f"{without(CURRENT, tmp_path)} --amplitude 0.1 --duration 0.1")  # less than its dry friction
+    assert still.rows["current_A"][-1] == pytest.approx(0.1, rel=1e-9)
+    assert not still.rows["motor_speed_rad_s"].any()
 
 
 def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_path) -> None:
-    """What a drive ends in is no matter of how long the run is: cut at less than J/(Kp kT), 1.3 ms."""
-    drive, wanted = written(SPEED, tmp_path), 64.0 * pi / 2.0
-    made = run(f"{drive} --amplitude 90 --duration 3")
+    """What a drive ends in is no matter of how long the run is: cut at less than J/(Kp kM), 1.4 ms."""
+    drive, rate = without(SPEED, tmp_path), radians(20.0)
+    wanted = AMBER.total_ratio * rate
+    made = run(f"{drive} --amplitude 20 --duration 3")
     assert made.facts["status"] == "becomes steady"
-    assert np.all(made.rows["output_speed_reference_rad_s"] == pi / 2.0)
-    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(wanted, rel=1e-3)
-    assert made.facts["largest_error_rad_s"] == pytest.approx(pi / 2.0, rel=0.2)
-    assert made.facts["final_response_rad_s"] == pytest.approx(pi / 2.0, rel=1e-3)
-    cut = run(f"{drive} --amplitude 90 --duration 0.001")
+    assert np.all(made.rows["output_speed_reference_rad_s"] == rate)
+    assert made.rows["motor_speed_rad_s"][-1] == pytest.approx(wanted, rel=1e-6)
+    assert made.rows["speed_command_rad_s"][-1] == pytest.approx(wanted, rel=1e-12)
+    assert made.facts["largest_error_rad_s"] == pytest.approx(rate, rel=0.2)
+    assert made.facts["final_response_rad_s"] == pytest.approx(rate, rel=1e-3)
+    cut = run(f"{drive} --amplitude 20 --duration 0.001")
     assert 0.0 < cut.rows["motor_speed_rad_s"][-1] < (1.0 - exp(-1.0)) * wanted
     assert cut.facts["status"] == "becomes steady"
 
 
-@pytest.mark.parametrize(("text", "unit"), [(VOLTAGE, "V"), (CURRENT, "A"), (SPEED, "deg/s")])
-def test_words_have_the_unit(text: str, unit: str, tmp_path, cli) -> None:
-    said = cli.text("simulate", written(text, tmp_path), "--amplitude", 0.5, "--duration", 0.1, "--quiet")
+@pytest.mark.parametrize(("stages", "unit"), [(VOLTAGE, "V"), (CURRENT, "A"), (SPEED, "deg/s")])
+def test_words_have_the_unit(stages: tuple[str, ...], unit: str, tmp_path, cli) -> None:
+    said = cli.text("simulate", without(stages, tmp_path), "--amplitude", 0.5, "--duration", 0.1, "--quiet")
     rows = [row.split() for row in said.splitlines()]
     assert ["largest", "command", "0.5", unit] in rows
     assert any(row[:2] == ["largest", "error"] and row[3:] == [unit] for row in rows)
 
 
 @pytest.mark.parametrize(
-    ("text", "words", "most"),
+    ("stages", "words", "most"),
     [
         (VOLTAGE, "--amplitude 6 --duration 0.3", 1e-9),
-        (CURRENT, "--amplitude 0.1 --duration 0.3", 1e-9),
-        (SPEED, "--amplitude 90 --duration 0.3", 1e-9),
+        (CURRENT, "--amplitude 1 --duration 0.3", 1e-9),
+        (SPEED, "--amplitude 20 --duration 0.3", 1e-9),
         # a drive with friction that a load makes: without its load the record would not be met
-        ("", f"--command multisine {_those('multisine', frequency=2, to=6, count=3)} --load 1", 1e-6),
+        ((), f"--command multisine {_those('multisine', frequency=2, to=6, count=3)} --load 1", 1e-6),
     ],
 )
-def test_its_own_record_correlates(text: str, words: str, most: float, run, tmp_path, cli) -> None:
+def test_its_own_record_correlates(stages, words: str, most: float, run, tmp_path, cli) -> None:
     """A record of the same drive under the same command: the same run, to the last digits of the file."""
-    drive = written(text, tmp_path) if text else "ilr33-amber"
-    if not text:
+    drive = without(stages, tmp_path) if stages else "ilr33-amber"
+    if not stages:
         k = np.arange(31)
         load = table(tmp_path / "load.csv", "t,M", 0.01 * k, np.sin(0.3 * k))
         words += f" --amplitude 0.5 --duration 0.5 --load-slope -5 --load-file {load}"
@@ -281,5 +276,5 @@ def test_its_own_record_correlates(text: str, words: str, most: float, run, tmp_
     data = cli.data("correlate", drive, tmp_path / "run.csv")
     assert data["passed"] is True
     errors = [one["relative_error"] for one in data["records"][0]["signals"].values()]
-    assert len(errors) >= (1 if text else 3)
+    assert len(errors) >= (1 if stages else 3)
     assert max(errors) < most

@@ -16,7 +16,9 @@ from typing import Any
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.exact.roots import all_roots
 
+FEW = 16  # degree up to which all roots at once take less time
 _MOST_BITS = 1 << 15
 _PLACE = 40503  # over 2^16: intervals end at no number that a root is likely to be
 _SHIFT = fmpz_poly([1, 1])
@@ -34,6 +36,9 @@ def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, i
 
     All that lie in some spans of the logarithm to base 2, and maybe some beside them.
     """
+    if p.degree() <= FEW:
+        real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
+        return sorted(real, key=lambda root: float(root[0].mid()))
     roots, least = [], arb((1, -ctx.prec))
     for factor, times, places in _places(tuple(p.coeffs()), spans):
         with ctx.workprec(ctx.prec + factor.degree() + 32):
