@@ -25,6 +25,9 @@ from reports.cli.main import main
 from reports.nightly.cache import Cache
 from reports.nightly.night import run_night
 
+TESTS = Path(__file__).parents[1]
+MODULES = os.pathsep.join(map(str, (TESTS / "hardness", TESTS / "nightly", TESTS.parent)))  # of the workers
+
 
 def doubled(number: int) -> int:
     if number == 13:
@@ -125,9 +128,7 @@ def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> No
 @pytest.fixture
 def bare(tmp_path, monkeypatch) -> Iterator[Cluster]:
     """A scheduler alone, which can be killed, and to which workers can be added."""
-    tests = Path(__file__).parents[1]
-    paths = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
-    monkeypatch.setenv("PYTHONPATH", paths)
+    monkeypatch.setenv("PYTHONPATH", MODULES)
     cluster = Cluster(tmp_path)
     try:
         cluster.start(workers=0)
@@ -346,8 +347,7 @@ def cluster(tmp_path, monkeypatch):
     import distributed
     from distributed.security import Security
 
-    tests = Path(__file__).parents[1]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "nightly", tests.parent))))
+    monkeypatch.setenv("PYTHONPATH", MODULES)
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()
