@@ -51,10 +51,7 @@ def located(design: Design, path: str) -> tuple[Field, Any]:
 def parameter_value(design: Design, path: str) -> float:
     """The SI value of a numeric key by its dotted path, such as ``"gear.worm.ratio"``.
 
-    Raises
-    ------
-    InputError
-        If the key is unknown, or this design has no value for it.
+    An InputError if the key is unknown, or this design has no value for it.
 
     Examples
     --------
@@ -75,10 +72,7 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
     Its parameters carry the new values; a tolerance in percent follows them. ``check``: whether the relations
     between keys are checked too (kE against kM, speed against supply); each value alone always is.
 
-    Raises
-    ------
-    InputError
-        As :func:`actuator_lti.design.load_design`.
+    An InputError as :func:`actuator_lti.design.load_design`.
 
     Examples
     --------
@@ -118,10 +112,9 @@ def _changed(design: Design, path: str, value: float) -> Parameter:
     return replace(new, source=f"changed from {old.text}", grade=grade, tolerance=tolerance)
 
 
-def unit_in_file(design: Design, path: str, field: Field | None) -> str:
-    """The SI unit of a key as a file has to say it; ``"1"`` for what is no key with one."""
-    unit = "1" if field is None else field.unit(Structure.of(design))
-    return ampere_unit(path, unit, design.motor.constants)
+def unit_in_file(design: Design, path: str, field: Field) -> str:
+    """The SI unit of a key as a file has to say it."""
+    return ampere_unit(path, field.unit(Structure.of(design)), design.motor.constants)
 
 
 def stacked(design: Design, values: Mapping[str, Any]) -> Design:

@@ -118,11 +118,8 @@ class Filter:
         ``(b0 + b1 z^-1 + b2 z^-2)/(1 + a1 z^-1 + a2 z^-2)``, where ``a`` is a1 a2, without the 1.  Roots at
         z = 0 of both are left out, and so are the poles of a filter that is a mere gain.
 
-        Raises
-        ------
-        InputError
-            For other than one to three numbers in ``b``, more than two in ``a``, or a pole on or outside
-            the unit circle.
+        An InputError for other than one to three numbers in ``b``, more than two in ``a``, or a pole on or
+        outside the unit circle.
 
         Examples
         --------
@@ -235,10 +232,7 @@ class Command:
     def lowpass(self, period_s: Any, where: str = "") -> Filter:
         """The filter, w0 = 1/`filter_time_s`, for the period of the outermost stage in s.
 
-        Raises
-        ------
-        InputError
-            For a time constant of T/pi or less: w0 has to lie below pi/T.
+        An InputError for a time constant of T/pi or less: w0 has to lie below pi/T.
         """
         w0 = 1.0 / self.filter_time_s
         if np.any(w0 * np.asarray(period_s) >= pi):
@@ -282,10 +276,7 @@ class Controller:
     def position_loop(self) -> PositionLoop:
         """The position loop, for questions that need one.
 
-        Raises
-        ------
-        InputError
-            Where the drive has none.
+        An InputError where the drive has none.
         """
         if self.position is None:
             raise InputError("control.position: missing; this needs a drive with a position loop")

@@ -57,33 +57,27 @@ def as_stated(tree: Tree, changed: Collection[str]) -> None:
         paths = {f"friction.{key}" for key in keys}
         if any(path.startswith((*paths, "correlation")) or path == "friction" for path in changed):
             continue
-        read = {key: friction[key] for key in keys if key in friction}
-        if all(_is_read(entry, tables) for entry in read.values()):
-            for key, entry in read.items():
-                _put_back(tables, entry)
-                del friction[key]
-            pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
+        read = {key: _words(friction[key], tables) for key in keys if key in friction}
+        if None in read.values():
+            continue
+        for key, words in read.items():
+            grade = friction.pop(key).get("grade", "")
+            for word, source in words or ():
+                tables[word["table"]][word["key"]] = {"value": word["text"], "source": source, "grade": grade}
+        pairs[:] = [pair for pair in pairs if not {pair["first"], pair["second"]} <= paths]
 
 
-def _words(entry: Any) -> tuple[list[re.Match[str] | None], str]:
-    """What a sheet's own keys say in the source of a value that was read from them, and its own source."""
-    said, _, source = entry["source"].removeprefix(FROM).partition("; ")
-    return [_WORD.fullmatch(word) for word in said.split(", ")], source
+def _words(entry: Any, tables: Collection[str]) -> list[tuple[re.Match[str], str]] | None:
+    """A sheet's own keys that a value of friction was read from, each with its source.
 
-
-def _is_read(entry: Any, tables: Collection[str]) -> bool:
-    """Whether a value of friction and its tolerance are as a sheet's keys were read: no words of a user."""
+    None where the value or its tolerance is not as it was read: words of a user.
+    """
     if not isinstance(entry, dict) or not entry.get("source", "").startswith(FROM):
-        return False
-    known = all(word is not None and word["table"] in tables for word in _words(entry)[0])
-    return known and entry.get("tolerance", _OPEN) == _OPEN
-
-
-def _put_back(tables: dict[str, Tree], entry: Tree) -> None:
-    words, source = _words(entry)
-    for word in filter(None, words):
-        stated = {"value": word["text"], "source": source, "grade": entry.get("grade", "")}
-        tables[word["table"]][word["key"]] = stated
+        return None
+    said, _, source = entry["source"].removeprefix(FROM).partition("; ")
+    words = [_WORD.fullmatch(word) for word in said.split(", ")]
+    known = [(word, source) for word in words if word is not None and word["table"] in tables]
+    return known if len(known) == len(words) and entry.get("tolerance", _OPEN) == _OPEN else None
 
 
 class DataSheet:

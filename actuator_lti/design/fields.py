@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, replace
-from functools import cache
 from typing import Any, get_args
 
 from actuator_lti.design.field import Field, Structure, named_after
-from actuator_lti.design.model import Design
-from actuator_lti.design.sections import RECORDS, SECTIONS, template_of
+from actuator_lti.design.sections import HEAD, RECORDS, SECTIONS, template_of
 
 __all__ = ["ALL_FIELDS", "FIELDS", "Field", "Structure", "field_of", "fields_in"]
 
@@ -36,11 +34,10 @@ def _words(kind: Any) -> tuple[str, ...]:
     return parts if all(isinstance(part, str) for part in parts) else get_args(parts[0])
 
 
-ALL_FIELDS: tuple[Field, ...] = (
-    *_declared(Design, "design"),
-    *(field for section in SECTIONS for field in _declared(section.kind, section.template)),
-)
-"""Every key, in the order of a design file."""
+_IN = {one.template: tuple(_declared(one.kind, one.template)) for one in (HEAD, *SECTIONS, *RECORDS)}
+
+ALL_FIELDS: tuple[Field, ...] = tuple(field for one in (HEAD, *SECTIONS) for field in _IN[one.template])
+"""Every key, in the order of a design file, without those of the lists at its end."""
 
 FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
 """Every key of a design file by its dotted path; repeated tables stand under ``*`` (``gear.*``)."""
@@ -57,8 +54,6 @@ def field_of(path: str) -> Field | None:
     return None if "*" in path else FIELDS.get(template_of(path))
 
 
-@cache
 def fields_in(section: str) -> tuple[Field, ...]:
     """All keys of a section such as ``"control.velocity"``, ``"gear.*"`` or ``"requirement"``."""
-    listed = (field for record in RECORDS for field in _declared(record.kind, record.template))
-    return tuple(field for field in (*ALL_FIELDS, *listed) if field.section == section)
+    return _IN[section]

@@ -22,7 +22,7 @@ from actuator_lti.design.fields import FIELDS, fields_in
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
-from actuator_lti.design.sections import BY_PATH, RECORDS, Section, children, part_at, with_part
+from actuator_lti.design.sections import BY_PATH, HEAD, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.spellings import split_quantity
@@ -43,6 +43,7 @@ Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
 GAINS: dict[str, dict[str, Per]] = {
     "control.current.gain": {"rad/s": lambda design: design.effective_motor.inductance_H or UNREAD},
+    "control.position.gain": {"rad/s": lambda _: 1.0},
     "control.velocity.gain": {
         "rad/s": lambda design: design.inertia_kgm2 / torque_per_command(design),
         "{torque}*s/{angle}": lambda design: 1.0 / torque_per_command(design),
@@ -55,7 +56,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     """The design of a tree, `UNREAD` where there are findings; relations between its keys are `checks`."""
     reader = Reader(tree, findings)
     head, _ = reader.values("design", tree.get("design"), "design")
-    meant = reader.known(tree, [*(item.key for item in (_HEAD, *children(""), *RECORDS)), "objects"], "")
+    meant = reader.known(tree, [*(item.key for item in (HEAD, *children(""), *RECORDS)), "objects"], "")
     parts = reader.tables("", tree, meant)
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
     objects = reader.objects(tree.get("objects"))
@@ -73,9 +74,6 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     with suppress(UnreadError):
         return replace(design, friction=UNREAD) if contradicted else sheet.read_into(design)
     return replace(design, friction=UNREAD)
-
-
-_HEAD = Section("design", "", model.Design)
 
 
 class Reader:
@@ -207,10 +205,12 @@ class Reader:
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
         for template, per in GAINS.get(field.path, {}).items() if isinstance(table["value"], str) else ():
-            if template == "rad/s" and not _BANDWIDTH.search(table["value"]):
+            outer = field.section != "control.position" or self.structure.has_velocity
+            if template == "rad/s" and not (outer and _BANDWIDTH.search(table["value"])):
                 continue
             with suppress(InputError):
-                size = self.frame.quantity(table["value"], replace(field, unit_template=template))
+                said = replace(field, path=f"{field.path}, as stated", unit_template=template)
+                size = self.frame.quantity(table["value"], said)
                 self.gains[path] = field, table, size, per
                 return UNREAD
         return self.kept(field, table, self.number(field, table["value"], path), path, into)
@@ -280,7 +280,8 @@ class Reader:
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
-            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}")
+            percent = f'; or is it "{value:g} %"' * (field.high == 1.0 and 2.0 <= value <= 100.0)
+            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}{percent}")
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:

@@ -70,6 +70,9 @@ class Section:
             yield f"{self.path}.{item.name if self.many == 'named' else number}", item
 
 
+HEAD = Section("design", "", model.Design, required=True)
+"""What stands at the beginning of a file: keys of the design itself."""
+
 SECTIONS: tuple[Section, ...] = (
     Section("motor", "motor", model.Motor, required=True),
     Section("screw", "screw", model.Screw),

@@ -131,7 +131,7 @@ _WORDS: dict[str, dict[str, str]] = {
         "pff kff pfg velocity_feedforward": "feedforward",
         "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
         "frequency cycle_time sample_time": _MULTIPLE,
-        "bandwidth": 'gain, which takes "40 Hz" too; of the position 2 pi f',
+        "bandwidth": 'gain, which takes "40 Hz" too',
     },
     ".filter": {
         "bandwidth": "width",

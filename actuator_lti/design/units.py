@@ -78,10 +78,16 @@ _DERIVED = {
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "line": ("4", "count"),  # of an encoder: two edges of two tracks
 }
+_FLUX = (
+    'is of a flux linkage psi: with motor.constants = "peak-phase" and p pole pairs back_emf_constant is '
+    "p psi in V*s/rad, torque_constant 1.5 p psi in N*m/A"
+)
 # What makers write into a unit that is none, and what is to be written instead.
 _ASIDE = {
     "erpm": 'is electrical; over the pole pairs it is "rpm"',
     "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
+    "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
+    **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
 }
@@ -98,7 +104,7 @@ _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
     (_WEIGHTS, r"\1\2f"),
-    (re.compile(r"/ *(rad|deg|rev|turn) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
+    (re.compile(r"/ *(rad|deg|rev|turn|mm|m|in|inch|ft) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
     (re.compile(r"\b(?:degC|C|celsius)\b"), "K"),
 )
 
@@ -182,10 +188,7 @@ def _named(name: str, units: Units) -> Exact:
 def parse_unit(unit: str) -> UnitValue:
     """Read a unit such as ``"N*m/A"``; the empty text and ``"1"`` are dimensionless.
 
-    Raises
-    ------
-    ValueError
-        If it is no unit, with the nearest known one where there is one.
+    A ValueError if it is no unit, with the nearest known one where there is one.
     """
     if len(unit) > LONGEST:
         raise ValueError("a unit of more than 120 characters")
@@ -259,7 +262,6 @@ _GAIN_OF_TORQUE = (
 )
 _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
-    (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     (
         _FREQUENCY,
         "s",
@@ -276,15 +278,12 @@ _ADVICE = {
 """Where engineers mix two up: what is written, the unit wanted, and how to get there."""
 
 
-@lru_cache(maxsize=1)
-def _advices() -> dict[tuple[str, Dimension], str]:
-    return {(kind, parse_unit(unit).dimension): said for (kind, unit), said in _ADVICE.items()}
-
-
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted."""
-    said = _advices().get((_kinds().get(value.dimension, ""), wanted.dimension))
-    if said is not None:
+    kind = _kinds().get(value.dimension)
+    advices = (said for (one, unit), said in _ADVICE.items()
+               if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip
+    if (said := next(advices, None)) is not None:
         size = number * value.factor
         corner = 1.0 / size if size > 0.0 else nan
         here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
@@ -338,10 +337,7 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     float
         In ``unit`` (which is to be an SI unit without prefix).
 
-    Raises
-    ------
-    InputError
-        If it is no number, not finite, has an unknown unit or the wrong dimension.
+    An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
     Examples
     --------

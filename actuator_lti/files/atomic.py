@@ -32,10 +32,7 @@ _OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|s
 def write_text(path: str | os.PathLike[str], text: str) -> None:
     """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
 
-    Raises
-    ------
-    InputError
-        If the folder cannot be made or written.
+    An InputError if the folder cannot be made or written.
     """
     write_bytes(path, text.encode("utf-8"))
 
@@ -58,10 +55,7 @@ def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -
     files : mapping of path to bytes, or pairs of them
         Missing folders are made. Pairs are taken one by one: many files need not be in memory together.
 
-    Raises
-    ------
-    InputError
-        If a folder cannot be made or written; nothing is left behind then.
+    An InputError if a folder cannot be made or written; nothing is left behind then.
     """
     pairs = files.items() if isinstance(files, Mapping) else files
     _write_all((path, partial(_put, data)) for path, data in pairs)

@@ -45,10 +45,7 @@ class MatContent:
 def read_mat5(data: bytes) -> MatContent:
     """Read the numeric arrays of a level 5 file.
 
-    Raises
-    ------
-    InputError
-        Without the file's name: what is wrong, and at which byte.
+    An InputError says, without the file's name, what is wrong, and at which byte.
 
     Examples
     --------

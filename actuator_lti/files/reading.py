@@ -77,10 +77,7 @@ def as_path(path: str | PathLike[str]) -> Path:
 def open_regular(path: str | PathLike[str], what: str = "file") -> BufferedReader:
     """Open a regular file for reading; a directory, a device or a pipe is refused without waiting for it.
 
-    Raises
-    ------
-    InputError
-        Naming the file and what is allowed.
+    An InputError names the file and what is allowed.
     """
     with in_file(shown_path(path)):
         try:
@@ -115,10 +112,7 @@ def reason(error: OSError | ValueError) -> str:
 def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound = TOML_BYTES) -> bytes:
     """The bytes of a regular file of bounded size.
 
-    Raises
-    ------
-    InputError
-        Naming the file and what is allowed.
+    An InputError names the file and what is allowed.
     """
     data = bytearray()
     with in_file(shown_path(path)), open_regular(path, what) as stream:
@@ -155,10 +149,7 @@ def read_toml(
 ) -> Tree:
     """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
 
-    Raises
-    ------
-    InputError
-        Naming the file, the place and what is allowed.
+    An InputError names the file, the place and what is allowed.
     """
     return parse_toml(read_text(path, what, size), shown_path(path), size=size, values=values)
 

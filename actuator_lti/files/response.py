@@ -65,10 +65,7 @@ class RecordedResponse:
         >>> float(half.as_loop("T").response[0].real), float(half.as_loop("T").deviation[0])
         (1.0, 0.2)
 
-        Raises
-        ------
-        InputError
-            Where a closed loop is 1, or a sensitivity 0, to the last digit.
+        An InputError where a closed loop is 1, or a sensitivity 0, to the last digit.
         """
         if of == "L":
             return self
@@ -96,10 +93,7 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
         Of the coherence; or as a column or array of this name. The deviation is then
         sqrt((1 - g2)/(g2 (n - 1))) (Bendat, Piersol, Random Data, chapter 9).
 
-    Raises
-    ------
-    InputError
-        Naming the file and what is allowed.
+    An InputError names the file and what is allowed.
     """
     if hasattr(source, "frdata") and hasattr(source, "omega"):
         columns = {"f_hz": np.asarray(source.omega) / (2.0 * np.pi)}

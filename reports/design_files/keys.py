@@ -52,10 +52,7 @@ class Keys:
 def keys(asked: Asked) -> Keys:
     """The keys whose name or meaning holds a text, or that a data sheet or a controller calls so.
 
-    Raises
-    ------
-    InputError
-        If none does, or the design that is to be explained is refused.
+    An InputError if none does, or the design that is to be explained is refused.
     """
     from actuator_lti.design import load_design
     from actuator_lti.design.key_reference import explained, key_reference, record_reference

@@ -36,10 +36,7 @@ def parts() -> Tree:
 def part(kind: str, name: str) -> Tree:
     """A motor or a gear.
 
-    Raises
-    ------
-    InputError
-        With the nearest name and all that there are.
+    An InputError has the nearest name and all that there are.
     """
     known = parts()[kind]
     if name not in known:

@@ -58,37 +58,23 @@ class Started:
 def start(asked: Asked) -> Started:
     """Write a commented design file, named as the file is.
 
-    Raises
-    ------
-    InputError
-        If there is such a file already, or the source is no design.
+    An InputError if there is such a file already, or the source is no design.
     """
     from actuator_lti.design import read_design_text
+    from actuator_lti.design.loader import design_text
     from actuator_lti.files.atomic import write_text
     from reports.cli.options import refuse_existing
     from reports.design_files.parts import with_parts
 
     refuse_existing(asked.file, asked.force)
-    text = _source_text(KINDS[asked.kind] if asked.kind else asked.source)
+    source = KINDS[asked.kind] if asked.kind else asked.source
+    starter = Path(__file__).parents[1] / "templates" / "design.toml"
+    text = starter.read_text(encoding="utf-8") if source is None else design_text(source)
     if asked.motor is not None or asked.gear is not None:
         text = with_parts(text, asked.motor, asked.gear)
-    text = _renamed(text, asked.file.stem)
+    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", name := asked.file.stem):  # can be a design's, too
+        head = r'(?m)^(\[design\]\n(?:[^\[\n]*\n)*?name = )"[^"\n]*"'
+        text = re.sub(head, rf'\1"{name}"', text, count=1)
     read_design_text(text, str(asked.file))
     write_text(asked.file, text)
     return Started(str(asked.file))
-
-
-def _source_text(source: str | None) -> str:
-    """The text to start from, comments included."""
-    from actuator_lti.design.loader import design_text
-
-    if source is None:
-        return (Path(__file__).parents[1] / "templates" / "design.toml").read_text(encoding="utf-8")
-    return design_text(source)
-
-
-def _renamed(text: str, name: str) -> str:
-    """The text with the design's name set to that of the file, where it can be one."""
-    if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", name):
-        return text
-    return re.sub(r'(?m)^(\[design\]\n(?:[^\[\n]*\n)*?name = )"[^"\n]*"', rf'\1"{name}"', text, count=1)

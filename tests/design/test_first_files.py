@@ -29,7 +29,7 @@ computing_delay = "0.1 ms"
 
 def with_law(text: str) -> Design:
     """The drive with a law of its position loop."""
-    return read_design_text(f'{DRIVE}[control.position.law]\ninputs = ["error"]\n{text}')
+    return read_design_text(f"{DRIVE}{LAW}{text}")
 
 
 def told(text: str) -> str:
@@ -37,12 +37,6 @@ def told(text: str) -> str:
     with pytest.raises((InputError, Mistakes)) as caught:
         read_design_text(text)
     return str(caught.value)
-
-
-def test_a_continuous_law_alone_is_told_that_the_law_that_runs_is_missing() -> None:
-    text = DRIVE + '[control.position.law]\ninputs = ["error"]\n[control.position.law.continuous]\nD = [3]\n'
-    assert told(text).count("\n") == 0
-    assert "control.position.law.D: missing; allowed: the law as it runs" in told(text)
 
 
 def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> None:
@@ -62,26 +56,43 @@ def test_what_could_not_be_read_is_not_shown_where_it_is_asked_for_again() -> No
         assert words in text
 
 
-STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]"
+LAW = '[control.position.law]\ninputs = ["error"]\n'
+STATE = "A = [[0.5]]\nB = [[1]]\nC = [0]\n"
+CURRENT = '[control.current]\ngain = "1 V/A"\n'
+NO_BANDWIDTH, ANGLE = "a bandwidth is written in Hz or rad/s", "write rev or rad into it"
+# 1024 ppr are of one maker 4096 counts after quadrature, of another 1024
+COUNTS = 'write "1024 lines" (4096 counts) or "1024 counts"'
+TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
 
 
-@pytest.mark.parametrize("zero", ["D = [0]", "D = [[0]]", STATE, f"{STATE}\nD = [0]"])
-def test_a_law_that_gives_nothing_is_refused(zero: str) -> None:
-    with pytest.raises(InputError, match="the law gives nothing"):
-        with_law(zero)
-
-
-@pytest.mark.parametrize("part", ["", "[control.position.law.continuous]\n"])
-def test_a_transfer_function_is_told_how_to_become_matrices(part: str) -> None:
-    law = '[control.position.law]\ninputs = ["error"]\n'
-    text = told(f"{DRIVE}{law}{'D = [1]' if part else ''}\n{part}num = [185.0, -150.0]\nden = [1.0, -0.65]\n")
-    assert text.count("tf2ss(num,den)") == 2
+@pytest.mark.parametrize(
+    ("more", "words", "times"),
+    [
+        (f"{LAW}[control.position.law.continuous]\nD = [3]", "D: missing; allowed: the law as it runs", 1),
+        *((LAW + zero, "the law gives nothing", 1)
+          for zero in ("D = [0]", "D = [[0]]", STATE, f"{STATE}D = [0]")),
+        (LAW + TF, "tf2ss(num,den)", 2),
+        (f"{LAW}D = [1]\n[control.position.law.continuous]\n{TF}", "tf2ss(num,den)", 2),
+        (f"{LAW}D = [1]\nkp = 3", "a number of D", 1),
+        *((f'{CURRENT}[control.velocity]\ngain = "{speed}"', NO_BANDWIDTH, 1)
+          for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
+        # at 2^19 counts it is 9.2 A s/rad, not 1.1e-4
+        (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
+        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
+          for word in ("ppr", "CPT", "pulses", "CPR")),
+        # makers state it at the output as often as at the motor
+        (f'{CURRENT}[control.position]\ngain = "50 Nm/rev"', "over kM, and over the ratio squared", 1),
+        ('[command]\nacceleration = "1500 1/s²"', ANGLE, 1),
+        ('[command]\nrate = "100 1/s"', ANGLE, 1),
+        ('[load]\ninertia = "3 counts"', "counts_per_rev", 0),
+    ],
+)  # fmt: skip
+def test_what_a_first_file_is_answered_with(more: str, words: str, times: int) -> None:
+    """Nothing is said of sizes of matrices that are not there."""
+    text = told(f"{DRIVE}{more}\n")
+    assert text.count(words) == times
     assert "other sizes" not in text
-
-
-def test_gains_in_a_law_are_not_said_to_be_its_factor() -> None:
-    law = '[control.position.law]\ninputs = ["error"]\n'
-    assert "a number of D" in told(f"{DRIVE}{law}D = [1]\nkp = 3\n")
+    assert text.count("\n") == max(times, 1) - 1
 
 
 def motor(constants: str, **values: str) -> str:
@@ -196,37 +207,6 @@ def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings
 def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
     design = read_design_text(f'{DRIVE}[encoder]\ncounts_per_rev = "{written}"\n')
     assert design.encoder.counts_per_rev == counts
-
-
-@pytest.mark.parametrize("stated", ["2400 rpm", "40 rev/s", "250 1/s"])
-def test_a_speed_is_no_bandwidth_of_a_gain(stated: str) -> None:
-    text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "{stated}"\n'
-    assert "a bandwidth is written in Hz or rad/s" in told(text)
-
-
-def test_counts_are_no_angle_of_a_gain() -> None:
-    """1.1e-4 A/(count/s) at 2^19 counts is 9.2 A s/rad, not 1.1e-4."""
-    text = f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"\n'
-    assert "one is 2 pi/counts_per_rev rad" in told(text)
-    assert "counts_per_rev" not in told(f'{DRIVE}[limits]\nvoltage = "3 counts"\n')
-
-
-@pytest.mark.parametrize("word", ["ppr", "CPT", "pulses", "CPR"])
-def test_pulses_are_not_guessed_to_be_counts(word: str) -> None:
-    # of one maker 1024 ppr are 4096 counts after quadrature, of another 1024
-    text = told(f'{DRIVE}[encoder]\ncounts_per_rev = "1024 {word}"\n')
-    assert 'write "1024 lines" (4096 counts) or "1024 counts"' in text
-
-
-@pytest.mark.parametrize("limit", ['acceleration = "1500 1/s²"', 'speed = "100 1/s"'])
-def test_a_speed_without_an_angle_is_asked_for_it(limit: str) -> None:
-    assert "write rev or rad into it" in told(DRIVE.replace("[limits]\n", f"[limits]\n{limit}\n"))
-
-
-def test_a_gain_of_the_position_in_torque_is_told_how_to_become_one_in_amperes() -> None:
-    """Makers state it at the output as often as at the motor."""
-    text = told(f'{DRIVE}[control.current]\ngain = "1 V/A"\n[control.position]\ngain = "50 Nm/rev"\n')
-    assert "over kM, and over the ratio squared" in text
 
 
 def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -> None:

@@ -1,9 +1,11 @@
 """What a mistyped value is answered with: one line that says what to write instead."""
 
+import re
+
 import pytest
 
 from actuator_lti import assemble_loops
-from actuator_lti.design import load_design, read_design_text, write_design
+from actuator_lti.design import load_design, write_design
 from actuator_lti.design.key_reference import key_reference
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import with_overrides
@@ -18,7 +20,6 @@ AMBER = load_design("ilr33-amber")
     [
         ("ilr33-amber", "motor.resistance", "0,6 ohm", 'use a decimal point: "0.6 ohm"'),
         ("ilr33-amber", "motor.inductance", "6 ohm", '"ohm" is the unit of a resistance'),
-        ("ilr33-amber", "control.position.gain", "20 Hz", "times 2 pi: 125.664 1/s"),
         ("ilr33-amber", "motor.rotor_inertia", "3 kg", r"m \(p/2 pi\)\^2"),
         ("ilr33-amber", "limits.voltage", "3 vots", 'nearest known: "volt'),
         ("emps", "motor.rotor_inertia", "3 kg*cm^2", r"J \(2 pi/p\)\^2"),
@@ -31,19 +32,6 @@ def test_a_wrong_unit_is_named_with_what_is_wanted(name: str, key: str, value: s
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("[motor]\nresistance = 55 mohm\n", 'line 2.*in quotes: resistance = "55 mohm"'),
-        ("[motor]\nresistance = 0,6\n", "line 2.*decimal point: resistance = 0.6"),
-        ("# only a comment\n", "is empty"),
-    ],
-)
-def test_slips_of_syntax(text: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        read_design_text(text)
-
-
 def test_the_key_reference_has_every_key_once() -> None:
     paths = [entry.path for entry in key_reference()]
     assert len(paths) == len(set(paths)) > 100
@@ -53,6 +41,9 @@ def test_the_key_reference_has_every_key_once() -> None:
 
 FILES = {
     "empty.toml": ("", "is empty; allowed: a design file"),
+    "comment.toml": ("# only a comment\n", "is empty"),
+    "unquoted.toml": ("[motor]\nresistance = 55 mohm\n", 'line 2.*in quotes: resistance = "55 mohm"'),
+    "number.toml": ("[motor]\nresistance = 0,6\n", "line 2.*decimal point: resistance = 0.6"),
     "comma.toml": ('[motor]\nresistance = "0,6 ohm"\n', None),
     "quotes.toml": ("[motor]\nresistance = “55 mohm”\n", "use straight quotes"),
     "semicolon.toml": ('[motor];\nresistance = "1 ohm"\n', "no semicolon at the end of a line"),
@@ -68,7 +59,7 @@ def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path
     status, _, said = cli("margins", tmp_path / name)
     assert status == 2
     assert all(name in line for line in said.splitlines())
-    assert words is None or (words in said and said.count("\n") == 1)
+    assert words is None or (re.search(words, said) and said.count("\n") == 1)
 
 
 def test_python_names_its_arguments() -> None:

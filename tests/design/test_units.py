@@ -6,7 +6,7 @@ from math import pi
 
 import pytest
 
-from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design import read_design_text
 from actuator_lti.design.units import parse_quantity, parse_unit, scaled
 from actuator_lti.errors import InputError
 
@@ -92,6 +92,7 @@ WRITTEN = [
     ("i = 8", "1", 8.0),
     ("i=43:1", "1", 43.0),
     ("R = 0.36 ohm", "ohm", 0.36),
+    ("0.99 V/in/s", "V*s/m", 0.99 / 0.0254),
     ("150 lbm", "kg", 150 * 0.45359237),
     ("85 %", "1", 0.85),
     ("3 kilograms", "kg", 3.0),
@@ -176,6 +177,8 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("1:43", "1", 'a reduction is written "43:1"'),
         ("16 kHz", "s", "a period 6.25e-05 s"),
         ("25 Hz", "s", "of it is 0.006366 s, 1/(2 pi f), a period 0.04 s"),
+        ("0.32 ohm (L-L)", "ohm", "is no unit; leave it out: R and L are so"),
+        ("4.1 mWb", "V*s/rad", "back_emf_constant is p psi in V*s/rad"),
         ("2 g", "m/s^2", "here 19.6133 m/s^2"),
         ("5 kg", "N", "a weight is written kgf"),
         ("1,000 rpm", "rad/s", 'write "1000 rpm" or "1.000 rpm"'),
@@ -301,12 +304,6 @@ def test_a_lead_may_be_per_revolution_and_a_wrong_one_is_one_mistake() -> None:
             read_design_text(TEXT.replace(lead, wrong))
         assert "screw." in str(refused.value)
         assert "wrong dimension" not in str(refused.value).replace('screw.lead = "10 rad": wrong dim', "")
-
-
-def test_it_is_written_as_it_was_read() -> None:
-    design = read_design_text(TEXT)
-    assert read_design_text(write_design(design)) == design
-    assert '"0.2 N*m/A"' in write_design(design)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.errors import InputError
 from analyses.margins.run import measured_over
 from reports.build import report
-from reports.cli.main import main
 from reports.sections.measured import blocks, words
 
 LOOPS = assemble_loops("ilr33-amber")
@@ -53,7 +52,7 @@ def test_margins_are_ranges_that_hold_the_true_ones() -> None:
     assert {block["kind"] for block in blocks(one)} >= {"table", "figure"}
 
 
-def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
+def test_stated_noise_covers_as_many_points_as_it_says(tmp_path, cli) -> None:
     rng, truth = np.random.default_rng(5), bench("position", gain=1.0)
     L, n = truth.frdata.ravel(), truth.omega.size
     noisy = L * (1.0 + 0.02 * (rng.normal(size=n) + 1j * rng.normal(size=n)) / np.sqrt(2.0))
@@ -61,7 +60,7 @@ def test_stated_noise_covers_as_many_points_as_it_says(tmp_path) -> None:
     path = saved(tmp_path / "r.csv", truth, "real,imag,deviation", *columns)
     one = measured_over(LOOPS, path)
     assert 0.95 * n <= one.within <= n  # 99 % of the circles
-    assert main(["margins", "ilr33-amber", "--response", str(path), "--out", str(tmp_path / "x")]) == 0
+    cli.text("margins", "ilr33-amber", "--response", path, "--out", tmp_path / "x")
 
 
 def test_command_line(tmp_path, cli) -> None:
