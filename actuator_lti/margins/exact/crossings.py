@@ -11,7 +11,7 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.real_roots import positive_roots
+from actuator_lti.margins.exact.real_roots import FEW, positive_roots
 from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
@@ -71,9 +71,9 @@ def _crossings(
     A line just missed is a pair of complex roots, with a turn of p between; few loops have one.
     """
     with ctx.workprec(_TURN_BITS):
-        turns = positive_roots(p.derivative())
+        turns = [] if p.degree() <= FEW else positive_roots(p.derivative())
     with ctx.workprec(_FIRST_BITS + p.degree()):
-        missed = any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
+        missed = p.degree() <= FEW or any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
 
     def accurate() -> list[Crossing] | None:
         roots = all_roots(p) if missed or any(touched_ends) else []

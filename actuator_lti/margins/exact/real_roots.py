@@ -17,7 +17,9 @@ from typing import Any
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.exact.roots import all_roots
 
+FEW = 16  # degree up to which all roots at once take less time
 _MOST_BITS = 1 << 15
 _PLACE = 40503  # over 2^16: intervals end at no number that a root is likely to be
 _SHIFT = fmpz_poly([1, 1])
@@ -29,6 +31,9 @@ Places = tuple[tuple[fmpz_poly, int, tuple[tuple[arb, arb], ...]], ...]
 
 def positive_roots(p: fmpz_poly) -> list[tuple[arb, int]]:
     """The positive real roots in order, to the working precision, with their multiplicity."""
+    if p.degree() <= FEW:
+        real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
+        return sorted(real, key=lambda root: float(root[0].mid()))
     roots, least = [], arb((1, -ctx.prec))
     for factor, times, places in _places(tuple(p.coeffs())):
         with ctx.workprec(ctx.prec + factor.degree() + 32):
