@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf, isfinite, pi
+from math import inf, isfinite, pi, sqrt
 
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
@@ -145,12 +145,18 @@ def _loads(design: Design) -> Iterator[str]:
 
 def elastic_warnings(design: Design) -> Iterator[str]:
     """A rigid self-locking drive that cannot lock its load, and a spring that nothing damps."""
-    behind, load = design.load.friction, design.load
-    free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
-    damped = load.moment_damping_Nms_rad > 0.0
-    if free and design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
-        yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
-    elif free and design.coupling is not None and design.coupling.play_rad > 0.0 and not damped:
+    behind, load, coupling = design.load.friction, design.load, design.coupling
+    rubs = behind is not None and behind.dry_torque_Nm > 0.0
+    viscous = behind is not None and behind.viscous_Nms_rad > 0.0
+    free, damped = not (rubs or viscous), load.moment_damping_Nms_rad > 0.0
+    if coupling is not None and not (viscous or damped) and coupling.damping_Nms_rad == 0.0:
+        least = 0.02 * sqrt(coupling.stiffness_Nm_rad * design.load_side_inertia_kgm2)  # 2 zeta sqrt(k J)
+        but = " (its dry friction is in no linear loop)" if rubs else ""
+        yield (
+            "coupling.damping: 0, and no load.friction.viscous: with the motor at rest the load keeps ringing"
+            f"{but}; {least:.3g} in SI units damps it by 1 %"
+        )
+    elif free and coupling is not None and coupling.play_rad > 0.0 and not damped:
         yield "coupling.play: in the gap nothing stops a load without load.friction, it may never rest"
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"
