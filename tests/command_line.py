@@ -51,3 +51,16 @@ class Command:
         ran = self(*words)
         assert (ran.status, ran.out, ran.err.count("\n"), ran.err[-1:]) == (2, "", 1, "\n"), ran
         return ran.err
+
+
+def commands(command: Any = None, path: str = "") -> dict[str, Any]:
+    """Every command of `actuator-lti` by its words."""
+    if command is None:
+        from typer.main import get_command
+
+        from reports.cli.app import build
+
+        command = get_command(build())
+    inner = getattr(command, "commands", None) or {}
+    below = [commands(one, f"{path} {key}".strip()) for key, one in inner.items()]
+    return {name: leaf for each in below for name, leaf in each.items()} or {path: command}

@@ -12,9 +12,11 @@ from actuator_lti.design.plant import MotorConstants
 from actuator_lti.design.units import ampere_unit, parse_quantity
 from actuator_lti.errors import InputError
 
-CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|phase)\b\)?", re.IGNORECASE)
+CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|p|phase)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
+_MAINS = re.compile(r"(?<=V)[ _]?\(?(?:ac|rms|eff)\b\)?|(?<=V) ?~", re.IGNORECASE)
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
+_PER_TRAVEL = re.compile(r"/ *\(?[kcmnuµ]?m\b")  # of a linear encoder
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
 _PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
 _DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
@@ -44,6 +46,8 @@ class Frame:
         unit, power = field.unit(self.structure), field.travel_power()
         if isinstance(text, str):
             text = _PER_TURN.sub("", text) if field.key in ("lead", "counts_per_rev") else text
+            if field.path == "limits.voltage" and _MAINS.search(text):
+                _refuse_mains(_MAINS.sub("", text))
             if convention := CONVENTION.search(text):
                 plain = self.quantity(CONVENTION.sub(" dc", text), field)
                 return plain * self._amperes(field, unit, convention[1].lower())
@@ -51,6 +55,10 @@ class Frame:
         factors = {unit: 1.0}
         if self.travel_m_rad is not None and power and rotary != unit:
             factors = {rotary: self.travel_m_rad**power, unit: 1.0}
+        counted = field.key == "counts_per_rev" and self.structure.axis == "linear"
+        if counted and _PER_TRAVEL.search(f"{text}"):
+            own = field.section == "encoder" and self.travel_m_rad
+            factors = {"count/m": 2.0 * pi * own if own else 1.0}  # of a lead, or of a metre
         refused: list[InputError] = []
         for one, factor in factors.items():
             try:
@@ -110,6 +118,12 @@ class Frame:
         except InputError:
             return ""
         return f'; {unit} with design.axis = "{other.axis}"' if unit != field.unit(self.structure) else ""
+
+
+def _refuse_mains(text: str) -> None:
+    """A supply in volts of the mains: the bus is direct."""
+    volts = sqrt(2.0) * parse_quantity(text, "V")
+    raise InputError(f"the bus is direct; allowed: sqrt(2) times the mains behind a rectifier, {volts:.4g} V")
 
 
 def _turned(path: str, text: Any, unit: str) -> float | None:

@@ -78,10 +78,16 @@ _DERIVED = {
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "line": ("4", "count"),  # of an encoder: two edges of two tracks
 }
+_FLUX = (
+    'is of a flux linkage psi: with motor.constants = "peak-phase" and p pole pairs back_emf_constant is '
+    "p psi in V*s/rad, torque_constant 1.5 p psi in N*m/A"
+)
 # What makers write into a unit that is none, and what is to be written instead.
 _ASIDE = {
     "erpm": 'is electrical; over the pole pairs it is "rpm"',
     "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
+    "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
+    **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
 }
@@ -98,7 +104,7 @@ _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
     (_WEIGHTS, r"\1\2f"),
-    (re.compile(r"/ *(rad|deg|rev|turn) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
+    (re.compile(r"/ *(rad|deg|rev|turn|mm|m|in|inch|ft) */ *(s|sec|min)\b(?!\^)"), r"/(\1/\2)"),
     (re.compile(r"\b(?:degC|C|celsius)\b"), "K"),
 )
 
@@ -256,7 +262,6 @@ _GAIN_OF_TORQUE = (
 )
 _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
-    (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     (
         _FREQUENCY,
         "s",

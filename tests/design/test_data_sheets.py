@@ -161,13 +161,16 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         ("limits.peak_current", "12 Arms", 12 * sqrt(1.5)),
         ("limits.peak_current", "12 A peak", 12 * sqrt(3) / 2),
         ("limits.peak_current", "12 Apk", 12 * sqrt(3) / 2),
+        ("limits.peak_current", "12 Ap", 12 * sqrt(3) / 2),
         ("limits.peak_current", "12 A dc", 12.0),
+        ("control.position.gain", "20 Hz", 40 * pi),
         ("control.velocity.gain", "0.04 A rms*s/rad", 0.04 * sqrt(1.5)),
         ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
         ("control.current.gain", "12.5 V/A phase", 25.0),  # L w of a phase is half of L w line-line
         ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
         ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
+        ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vp/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vpeak/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("control.period", "16 kHz", 62.5e-6),
     ],
@@ -184,6 +187,7 @@ def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value
     [
         (FLAT, "motor.torque_constant", "0.1 Nm/Apk"),
         (SERVO, "limits.voltage", "230 Vrms"),
+        (FLAT, "limits.voltage", "230 V AC"),
         (FLAT, "limits.peak_current", "5 A rms"),
         (SERVO, "limits.peak_current", "5 A phase"),
     ],
@@ -240,7 +244,13 @@ def test_a_filter_is_added_behind_those_that_there_are() -> None:
 
 
 def test_a_magnet_pitch_is_the_order_of_the_cogging() -> None:
-    """24 mm a period are 2 pi/0.024 rad per metre."""
+    """24 mm a period are 2 pi/0.024 rad per metre; counts of a linear encoder are of a metre or a lead."""
+    for drive, path, counts in (
+        ("emps", "encoder.counts_per_rev", 1e7),
+        ("ballscrew", "encoder.counts_per_rev", 1e4 * 10),  # lead 10 mm
+        ("ballscrew", "output_encoder.counts_per_rev", 1e7),
+    ):
+        assert parameter_value(with_overrides(load_design(drive), {path: "10000 counts/mm"}), path) == counts
     design = with_overrides(load_design("emps"), {"motor.cogging_periods": "24 mm"})
     assert design.motor.cogging_periods == pytest.approx(2 * pi / 0.024, rel=1e-14)
     with pytest.raises(InputError, match=r"cogging_periods.*wrong dimension"):
@@ -379,11 +389,15 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ('no_load_speed = "7580 rpm"\n', "", "motor.no_load_speed: missing"),
         ('no_load_current = "137 mA"\n', "", "no_load_speed = 7580 rpm: needs motor.no_load_current"),
         ("efficiency = 0.9", "efficiency = 1.1", "gear.second.efficiency = 1.1: allowed"),
+        ("efficiency = 0.9", 'efficiency = "86"', 'or is it "86 %"'),
+        ('"48 V"', '"230 Vac"', r"sqrt\(2\) times the mains behind a rectifier, 325\.3 V"),
         ("= 0.9", '= {value = 0.9, tolerance = "2 %"}', "efficiency.tolerance: allowed"),
         ("[limits]", '[friction]\ndry_torque = "1 mN*m"\n[limits]', "beside friction.dry_torque"),
         ("[limits]", "[friction]\nload_coefficient = 0.1\n[limits]", "beside friction.load_coefficient"),
         ('torque_constant = "30.2 mN*m/A"\n', "", "no_load_current = 137 mA: needs motor.torque_constant"),
         # a word of data sheets, answered with its key
+        ("back_emf_constant =", "speed_constant =", 'which takes "317 rpm/V" too'),
+        ('back_emf_constant = "317', 'speed_constant = "107', 'which takes "107 rpm/V" too'),
         ('back_emf_constant = "317', 'speed_constant = "317', 'back_emf_constant, which takes "317 rpm/V"'),
         ('torque_constant = "30', 'Kt = "30', r"motor.Kt = .* \(it is torque_constant\)\Z"),
         ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
@@ -417,6 +431,29 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
     [
         ("ratio = ", "reduction_ratio = ", ('reduction_ratio = "43:1": unknown key (it is ratio)',)),
         ("resistance", "terminal_resistance", ("(it is resistance)",)),
+        ("resistance", "resistence", ('(nearest known: "resistance")',)),
+        ('resistance = "0.299', 'resistence = "3 k', ('known: "resistance")', "motor.resistance = ")),
+        ('inertia = "1e-3 kg*m^2', 'mass = "150 V', ("(it is inertia, in kg on", "load.inertia = ")),
+        (
+            'resistance = "0.299 ohm"\n',
+            'resistance = "0.3 ohm/phase"\nholding_torque = "2 Nm"\n',
+            ('"phase" is no unit', "it is torque_constant, over"),
+        ),
+        # 0.082 mH/0.299 ohm; 2 ms in ticks of 0.1 ms
+        (
+            "[control]",
+            CURRENT.replace('gain = "1 V/A', 'bandwidth = "9 Hz')
+            + 'gain = "1 Hz"\nperiod = "2 ms"\n[control]',
+            ("integral_time = L/R, here 0.0002742 s", "so many ticks of control.period; here 20)"),
+        ),
+        # 7 pole pairs of 4.1 mV s: kE of a phase, kM 1.5 times that
+        (
+            "no_load_current",
+            'flux_linkage = "4.1 mWb"\npoles = 14\nno_load_current',
+            ("0.0287 V*s/rad and 0.04305 N*m/A", "not needed"),
+        ),
+        ("no_load_current", 'detent_torque = "1 Nm"\nno_load_current', ('cogging_phase = "180 deg"',)),
+        ("efficiency = 0.9", 'starting_torque = "1 Nm"', ("dry_torque of [friction]",)),
         ('inductance = "0.082', 'rotor_L = "0.082 V', ("(it is inductance)", "line 6: motor.inductance = ")),
         ("[load]", '[load]\nmax_torque = "2 Nms"', ("(it is moment_max)", "load.moment_max = ")),
         ("[control]", f'{CURRENT}vel_gain = "40 Hz"\n[control]', ("(it is gain)",)),

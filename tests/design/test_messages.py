@@ -20,7 +20,6 @@ AMBER = load_design("ilr33-amber")
     [
         ("ilr33-amber", "motor.resistance", "0,6 ohm", 'use a decimal point: "0.6 ohm"'),
         ("ilr33-amber", "motor.inductance", "6 ohm", '"ohm" is the unit of a resistance'),
-        ("ilr33-amber", "control.position.gain", "20 Hz", "times 2 pi: 125.664 1/s"),
         ("ilr33-amber", "motor.rotor_inertia", "3 kg", r"m \(p/2 pi\)\^2"),
         ("ilr33-amber", "limits.voltage", "3 vots", 'nearest known: "volt'),
         ("emps", "motor.rotor_inertia", "3 kg*cm^2", r"J \(2 pi/p\)\^2"),

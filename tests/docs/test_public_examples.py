@@ -9,9 +9,8 @@ from types import ModuleType
 from typing import Any
 
 import pytest
-import typer
 
-from reports.cli.app import build
+from tests.command_line import commands
 
 ROOT = Path(__file__).parents[2]
 PAGES = [path for path in (ROOT / "docs").rglob("*.md") if path.parent.name != "generated"]
@@ -70,17 +69,11 @@ def test_every_public_name_has_an_example_and_words(name: str) -> None:
         assert (inspect.getdoc(thing) or "").strip(), f"{name}: no docstring"
 
 
-def commands() -> list[str]:
-    def leaves(command: Any, path: str) -> list[str]:
-        inner = getattr(command, "commands", None) or {}
-        return [one for key, sub in inner.items() for one in leaves(sub, f"{path} {key}")] or [path]
-
-    return leaves(typer.main.get_command(build()), "actuator-lti")
-
-
 @pytest.mark.parametrize("command", commands())
 def test_every_command_has_an_example(command: str) -> None:
-    assert re.search(rf"^{command}\b", SHELL, re.M), f"{command}: no example that is run on a page"
+    assert re.search(rf"^actuator-lti {command}\b", SHELL, re.M), (
+        f"{command}: no example that is run on a page"
+    )
 
 
 def test_what_counts_as_an_example() -> None:

@@ -9,11 +9,12 @@ from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Requirement
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import StiffnessFigures, compliance
 from analyses.specification.requirements import evaluate_requirements
 from nonlinear import commands, simulate
+from tests.changed import changed
 from tests.loops.two_mass import drive_e
 
 
@@ -51,20 +52,19 @@ def test_stacked_designs_have_the_figures_of_each_alone(
 
 
 def test_static_stiffness_by_hand() -> None:
-    """P on the motor's sensor with an integral in the velocity loop: the spring alone, 400 N m/rad; a rigid
-    one comes back."""
+    """P on the motor's sensor, a velocity integral: the spring alone, 400 N m/rad; a rigid one comes back."""
     assert drive_figure(drive_e(), "static_stiffness") == pytest.approx(400.0, rel=1e-6)
     assert StiffnessFigures(replace(drive_e(), coupling=None)).static_stiffness_Nm_rad == np.inf
-
-
-def test_requirements_on_stiffness_and_lost_motion() -> None:
-    """K of drive E is 400 N m/rad; the fin has 1.5 mrad of play and 2 * 0.36/800 rad of twist."""
     stiff = [
-        Requirement(id="soft", quantity="static_stiffness", unit="N*m/rad", minimum=399.0),
-        Requirement(id="stiff", quantity="static_stiffness", unit="N*m/rad", minimum=401.0),
+        Requirement(id=str(limit), quantity="static_stiffness", unit="N*m/rad", minimum=limit)
+        for limit in (399.0, 401.0)
     ]
     verdicts = evaluate_requirements(replace(drive_e(), requirements=tuple(stiff)))
     assert [one.verdict for one in verdicts] == ["met", "not met"]
+
+
+def test_lost_motion_is_a_requirement() -> None:
+    """The fin has 1.5 mrad of play and 2 * 0.36/800 rad of twist."""
     lost = Requirement(id="lost", quantity="lost_motion", unit="deg", maximum=0.2, load_Nm=8.0)
     (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
     assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
@@ -74,33 +74,24 @@ def test_requirements_on_stiffness_and_lost_motion() -> None:
 AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
 
 
-def test_by_hand() -> None:
-    """kM i_peak (or kM U/R) over CM |M| passed to the motor, breakaway on the dry part alone."""
+def test_torque_margin_by_hand() -> None:
+    """kM i_peak (or kM U/R) over C0 + CM |M|, which breakaway multiplies: the path locks itself."""
     friction, motor, limits = AMBER.friction, AMBER.motor, AMBER.limits
     torque = motor.torque_constant_Nm_A * min(limits.peak_current_A, limits.voltage_V / motor.resistance_ohm)
-    dry = friction.dry_torque_Nm + friction.load_coefficient * 4.0
-    held = dry * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
-    if AMBER.load.path == "back-drivable":
-        held += 4.0 / AMBER.total_ratio
+    held = 1.3 * (friction.dry_torque_Nm + friction.load_coefficient * 4.0) + abs(friction.offset_torque_Nm)
+    assert AMBER.load.path == "self-locking"
     assert drive_figure(AMBER, "torque_margin", 4.0) == pytest.approx(torque / held, rel=1e-12)
-
-
-def weak(design: Design, load_Nm: float, margin: float) -> Design:
-    """The same drive with a current limit that gives it this margin."""
-    torque = drive_figure(design, "torque_margin", load_Nm)
-    peak = design.limits.peak_current_A * margin / torque
-    return replace(design, limits=replace(design.limits, peak_current_A=float(peak)))
 
 
 @pytest.mark.parametrize("load_Nm", [0.0, 1.0, 6.0])
 @pytest.mark.parametrize(("margin", "moves"), [(0.98, False), (1.02, True)])
 def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bool) -> None:
-    """A large step in the worse direction, within a voltage that is no limit."""
-    base = replace(AMBER, limits=replace(AMBER.limits, peak_current_A=1.0))
-    design = weak(base, load_Nm, margin)
+    """A current limit gives the margin; a large step either way, within a voltage that is no limit."""
+    peak_A = margin / drive_figure(changed(AMBER, limits={"peak_current_A": 1.0}), "torque_margin", load_Nm)
+    design = changed(AMBER, limits={"peak_current_A": float(peak_A)})
     assert drive_figure(design, "torque_margin", load_Nm) == pytest.approx(margin, rel=1e-9)
-    starts = []
-    for sign in (1.0, -1.0):
-        run = simulate(design, commands.step(sign * 0.2), duration_s=0.3, load_Nm=-sign * load_Nm)
-        starts.append(bool(np.abs(run.motor_speed_rad_s).max() > 1e-6))
-    assert all(starts) is moves
+    runs = [
+        simulate(design, commands.step(sign * 0.2), duration_s=0.3, load_Nm=-sign * load_Nm)
+        for sign in (1.0, -1.0)
+    ]
+    assert all(np.abs(run.motor_speed_rad_s).max() > 1e-6 for run in runs) is moves

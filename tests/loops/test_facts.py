@@ -11,42 +11,27 @@ from two_mass import drive_d, drive_e
 from actuator_lti import load_design
 from actuator_lti.design import model
 from actuator_lti.design.access import stacked
-from actuator_lti.drive.facts import (
-    RATE_LIMITS,
-    Capability,
-    breakaway_torque_Nm,
-    capability,
-    stall_torque_Nm,
-)
+from actuator_lti.drive.facts import RATE_LIMITS, Capability, breakaway_torque_Nm, capability, stall_torque_Nm
 from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses.specification.capability import drive_figures
-
-
-def force_source(ratio: float = 2.0) -> model.Design:
-    """A mass of 2 kg m2 pushed by an ideal source of 4 N m/V at up to 10 V, friction 5 N m."""
-    return model.Design(
-        name="source",
-        title="",
-        motor=model.Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
-        controller=model.Controller(
-            period_s=1e-4, computing_delay_s=0.0, position=model.PositionLoop(gain=1e6)
-        ),
-        limits=model.Limits(voltage_V=10.0),
-        validation=model.Validation(full_deflection_rad=1.0),
-        load=model.Load(path="back-drivable", moment_max_Nm=30.0),
-        friction=model.Friction(dry_torque_Nm=5.0, breakaway_ratio=ratio),
-    )
+from nonlinear import commands, simulate
 
 
 @pytest.mark.parametrize(("load", "starts"), [(-20.0, True), (-29.0, True), (-31.0, False)])
 def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: bool) -> None:
-    """40 N m against 2 x 5 + load: the drive starts up to 30 N m, and then 5 + load holds it back."""
-    from nonlinear import commands, simulate
-
-    design = force_source()
-    result = drive_figures(design, load)
+    """An ideal source of 40 N m on 2 kg m2 against 2 x 5 + load: starts up to 30 N m, held by 5 + load."""
+    loop = model.PositionLoop(gain=1e6)
+    design = model.Design(
+        name="source",
+        motor=model.Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
+        controller=model.Controller(period_s=1e-4, computing_delay_s=0.0, position=loop),
+        limits=model.Limits(voltage_V=10.0),
+        validation=model.Validation(full_deflection_rad=1.0),
+        load=model.Load(path="back-drivable", moment_max_Nm=30.0),
+        friction=model.Friction(dry_torque_Nm=5.0, breakaway_ratio=2.0),
+    )
     expected = (40.0 - 5.0 - abs(load)) / 2.0 if starts else 0.0
-    assert result.acceleration_rad_s2 == pytest.approx(expected)
+    assert drive_figures(design, load).acceleration_rad_s2 == pytest.approx(expected)
     run = simulate(design, commands.step(1.0), duration_s=0.02, load_Nm=load)
     travelled = run.output_angle_rad[-1]
     assert travelled == pytest.approx(0.5 * expected * run.time_s[-1] ** 2, rel=1e-6, abs=1e-12)
@@ -68,12 +53,8 @@ def test_a_map_of_friction_bounds_the_speed() -> None:
 def test_friction_behind_the_coupling_counts() -> None:
     """Both frictions at the motor: Cv + Cv_l/N_c^2, C0_l/N_c; each dry part held by its own ratio."""
     behind = model.LoadFriction(dry_torque_Nm=3.0, viscous_Nms_rad=0.2, breakaway_ratio=1.5)
-    design = drive_d()
-    design = replace(
-        design,
-        friction=model.Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2),
-        load=replace(design.load, friction=behind),
-    )
+    friction = model.Friction(dry_torque_Nm=0.01, viscous_Nms_rad=1e-5, breakaway_ratio=1.2)
+    design = replace(drive_d(), friction=friction, load=replace(drive_d().load, friction=behind))
     assert breakaway_torque_Nm(design, 0.0, 1) == pytest.approx(1.2 * 0.01 + 1.5 * 3.0 / 10)
     w = capability(design).output_rate_rad_s * 10
     needed = 0.01 + 0.3 + (1e-5 + 0.2 / 100) * w
@@ -81,8 +62,7 @@ def test_friction_behind_the_coupling_counts() -> None:
 
 
 def test_a_hot_motor_is_weaker() -> None:
-    warm = model.Temperature(winding_degC=125.0, magnet_degC=75.0)
-    hot = replace(drive_d(), temperature=warm)
+    hot = replace(drive_d(), temperature=model.Temperature(winding_degC=125.0, magnet_degC=75.0))
     R, kM = 0.5 * (1 + 0.00393 * 100), 0.05 * (1 - 0.0011 * 50)
     assert stall_torque_Nm(hot) == pytest.approx(kM * 48.0 / R)
 
@@ -116,8 +96,6 @@ def test_the_speed_limit_belongs_to_the_position_stage() -> None:
 @pytest.mark.parametrize("load", [0.0, 4.0])
 def test_a_sagging_supply_slows_the_drive(load: float) -> None:
     """At the voltage limit U_s = (R + R_s) i + kE w: by hand, and where the simulator ends up."""
-    from nonlinear import commands, simulate
-
     base = amber()
     design = replace(
         base, supply=model.Supply(resistance_ohm=0.04), coupling=None,
@@ -137,8 +115,6 @@ def test_a_sagging_supply_slows_the_drive(load: float) -> None:
 @pytest.mark.parametrize(("load", "deg_s"), [(0.0, 454.844), (8.0, 423.775)])
 def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(load: float, deg_s: float) -> None:
     """The fin: kM (Kp (w_lim - w) - kE w)/R against friction, bearing and load, solved by hand for w."""
-    from nonlinear import commands, simulate
-
     fin = load_design("fin")
     torque = 8e-3 + 1.7e-3 * (load + 0.05) + (load + 0.05) / 60.0  # and what grows with w:
     viscous = 1e-5 + 0.02 / 60.0 * (1.7e-3 + 1.0 / 60.0)
@@ -155,10 +131,9 @@ def test_a_p_velocity_loop_stays_below_its_limit_by_its_droop(load: float, deg_s
 def test_an_integral_or_a_drive_without_friction_leaves_no_droop() -> None:
     """Kp (w_lim - w) is nothing where nothing holds the motor back: a current integral feeds the back-EMF."""
     free = controlled(amber(friction=model.Friction()), velocity={"integral_time_s": None})
-    assert drive_figures(free) == replace(drive_figures(replace(free, controller=amber().controller)))
+    assert drive_figures(free) == drive_figures(replace(free, controller=amber().controller))
     held = replace(free, friction=model.Friction(dry_torque_Nm=0.01))
-    current = 0.01 / held.motor.torque_constant_Nm_A
-    below = held.limits.speed_rad_s - current / held.controller.velocity.gain
+    below = held.limits.speed_rad_s - 0.01 / held.motor.torque_constant_Nm_A / held.controller.velocity.gain
     assert capability(held).output_rate_rad_s * held.total_ratio == pytest.approx(below, rel=1e-12)
 
 

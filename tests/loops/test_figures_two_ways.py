@@ -8,10 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from loop_designs import controlled
 from test_recursion import wide_designs
+from test_stacked import everything
 
+from actuator_lti import closed_loop_bandwidth, load_design, step_figures
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 from actuator_lti.batch import Population, linear_figures
@@ -49,8 +52,13 @@ def test_drive_figures(design: Design, load_Nm: float) -> None:
         assert drive_figures(many, name, load_Nm) == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), name
 
 
+LOUD = controlled(load_design("ilr33-amber"), position={"gain": 4800.0})  # S of its position loop has no peak
+
+
 @settings(max_examples=8)
 @given(wider_designs())
+@example(everything())
+@example(LOUD)
 def test_loop_figures(design: Design) -> None:
     """The margins of every loop; where one of the two withholds them it has no say."""
     figures = linear_figures(Population(design, {}, 1), time_figures=False)
@@ -59,14 +67,26 @@ def test_loop_figures(design: Design) -> None:
     for name, loop in loops.items():
         truth = stability_margins(loop.open_loop)
         if truth.stable is None or figures.withheld(name)[0]:
+            assert design not in (everything(), LOUD)
             continue
         assert bool(figures.stable(name)[0]) is truth.stable
         for key in ("gain_margin", "phase_margin", "modulus_margin", "sensitivity_peak", "delay_margin"):
-            reader = LOOP_QUANTITIES[key].reader.removeprefix("margins.")
-            value = getattr(truth, reader)
+            value = getattr(truth, LOOP_QUANTITIES[key].reader.removeprefix("margins."))
             expected = np.inf if value is None else value
             if key == "sensitivity_peak" and not truth.stable:
                 assert value is None
                 expected = np.nan  # S of an unstable loop has no peak
             got = figures.quantity(key, name)[0]
             assert got == pytest.approx(expected, rel=1e-6, nan_ok=True), (name, key)
+
+
+def test_figures_of_the_response_to_the_command() -> None:
+    """Of a drive with every slot of the controller filled."""
+    figures = linear_figures(Population(everything(), {}, 1))
+    response = assemble_loops(everything()).reference_to_output
+    width, step = closed_loop_bandwidth(response), step_figures(response)
+    pairs = {"bandwidth": width.minus3db_hz, "resonance_peak": width.resonance_peak_db,
+             "overshoot": step.overshoot_percent, "rise_time": step.rise_time_s}  # fmt: skip
+    for quantity, expected in pairs.items():
+        found = figures.quantity(quantity, "position")[0]
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity

@@ -43,12 +43,9 @@ def test_speed_clamp_of_a_p_position_loop_with_ideal_inner_loops() -> None:
     # inner loops so fast that they count as ideal
     motor = replace(amber().motor, inductance_H=1e-12, back_emf_constant_Vs_rad=1e-9)
     fast = controlled(amber(motor=motor), velocity={"gain": 1e4}, current={"gain_V_A": 1e6})
-    path = assemble_loops(fast, "ideal").limiters["speed"]
-    omega = np.array([10.0, 120.0, 500.0])
-    R = 942.5 / 2376
-    np.testing.assert_allclose(
-        path.onset_amplitude_rad(omega), R * np.sqrt(1 + (omega / 120) ** 2) / omega, rtol=2e-5
-    )
+    omega, R = np.array([10.0, 120.0, 500.0]), 942.5 / 2376
+    found = assemble_loops(fast, "ideal").limiters["speed"].onset_amplitude_rad(omega)
+    np.testing.assert_allclose(found, R * np.sqrt(1 + (omega / 120) ** 2) / omega, rtol=2e-5)
 
 
 def test_the_active_limiter_and_its_bias() -> None:
@@ -67,9 +64,7 @@ def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
     """At low frequency the voltage is what a steady speed takes: N (k_E + R C_v/k_M) of it, in every form."""
     design = controlled(amber(), position=None)
     motor, viscous = design.effective_motor, design.friction.viscous_Nms_rad
-    constants = motor.back_emf_constant_Vs_rad, motor.resistance_ohm, motor.torque_constant_Nm_A
-    k_E, R, k_M = (float(value or 0.0) for value in constants)
-    a_speed = k_E + R * viscous / k_M
+    a_speed = motor.back_emf_constant_Vs_rad + motor.resistance_ohm * viscous / motor.torque_constant_Nm_A
     wanted = design.limits.voltage_V / (design.total_ratio * a_speed)
     for form in ("sampled", "continuous", "ideal"):
         border = onset(assemble_loops(design, form), [1e-3])  # type: ignore[arg-type]
@@ -128,10 +123,8 @@ def test_onset_is_that_of_the_difference_of_a_sine(n_v: int) -> None:
 @pytest.mark.parametrize("hertz", [7.3, 61.7])
 def test_multirate_onset_divides_the_runs(hertz: float) -> None:
     """Three velocity updates in a position update: 1 % below the border nothing acts, 1 % above it does."""
-    design = amber(2, 6)
-    design = replace(
-        design, friction=Friction(viscous_Nms_rad=5e-6), limits=Limits(voltage_V=1e9, current_rate_A_s=1e3)
-    )
+    limits, friction = Limits(voltage_V=1e9, current_rate_A_s=1e3), Friction(viscous_Nms_rad=5e-6)
+    design = amber(2, 6, friction=friction, limits=limits)
     border = float(assemble_loops(design).limiters["current-rate"].onset_amplitude_rad(2 * pi * hertz)[0])
     for factor, acts in ((0.99, False), (1.01, True)):
         run = simulate(design, commands.sine(factor * border, hertz), 1.2)
@@ -142,20 +135,16 @@ def test_a_torque_drive_ramps() -> None:
     """A step of 5 A at 2 A/ms and Ts = 0.1 ms: 0.2 A a tick, 25 ticks, of which the last needs no limit."""
     torque_drive = controlled(load_design("ilr33-amber"), position=None, velocity=None)
     design = replace(torque_drive, limits=Limits(voltage_V=1e6, current_rate_A_s=2000.0))
-    period_s = design.controller.period_s
-    run = simulate(design, commands.step(5.0), 40 * period_s)
-    step = 2000.0 * period_s
-    expected = np.minimum(5.0, step * np.arange(1, run.time_s.size + 1))
+    step_A = 2000.0 * design.controller.period_s
+    run = simulate(design, commands.step(5.0), 40 * design.controller.period_s)
+    expected = np.minimum(5.0, step_A * np.arange(1, run.time_s.size + 1))
     assert np.allclose(run.current_command_A, expected, rtol=0, atol=1e-12)
     acting = run.limit_active("current-rate")
     assert acting[:24].all()
     assert not acting[26:].any()
-    assert run.limits["current-rate"].limit == 2000.0
-    assert run.limits["current-rate"].unit == "A/s"
-    assert (
-        "current-rate"
-        not in simulate(replace(design, limits=Limits(voltage_V=1e6)), commands.step(1.0), 0.01).limits
-    )
+    assert (run.limits["current-rate"].limit, run.limits["current-rate"].unit) == (2000.0, "A/s")
+    free = simulate(replace(design, limits=Limits(voltage_V=1e6)), commands.step(1.0), 0.01)
+    assert "current-rate" not in free.limits
 
 
 def test_the_integral_of_a_position_controller_waits() -> None:

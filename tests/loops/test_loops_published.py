@@ -63,13 +63,8 @@ def test_emps_at_the_plant_input(delay_s: float, phase_margin: float, gain_db: f
 
 def motor_speed(gain: float) -> Design:
     """G5: CTMS motor speed; J .01, b .1, K .01, R 1, L .5."""
-    motor = Motor(
-        rotor_inertia_kgm2=0.01,
-        resistance_ohm=1.0,
-        inductance_H=0.5,
-        torque_constant_Nm_A=0.01,
-        back_emf_constant_Vs_rad=0.01,
-    )
+    k = {"torque_constant_Nm_A": 0.01, "back_emf_constant_Vs_rad": 0.01}
+    motor = Motor(rotor_inertia_kgm2=0.01, resistance_ohm=1.0, inductance_H=0.5, **k)
     bare = replace(amber(), motor=motor, gears=(), friction=Friction(viscous_Nms_rad=0.1))
     return controlled(without(bare, "current", gain=gain), velocity={"integral_time_s": None})
 

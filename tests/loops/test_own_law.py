@@ -243,9 +243,9 @@ def test_a_law_unstable_of_itself_is_allowed_and_said() -> None:
     assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None  # type: ignore[union-attr]
 
 
-def _refused(what: Any) -> str:
+def refused(call: Any, *arguments: Any) -> str:
     with pytest.raises(InputError) as error:
-        what()
+        call(*arguments)
     return str(error.value)
 
 
@@ -254,7 +254,7 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     unit = ([[0.5]], [[1.0]], [[1.0]], [[0.0]], T)
 
     def made(system: Any, inputs: Any = ("error",), stage: str = "velocity", **more: Any) -> str:
-        return _refused(lambda: base.with_law(stage, system, inputs, **more))
+        return refused(lambda: base.with_law(stage, system, inputs, **more))
 
     assert "0.0001 s, that of its stage" in made((*unit[:4], 2e-4))
     assert "continuous; allowed: a sampled one of dt = 0.0001 s" in made(control.ss(*unit[:4]))
@@ -278,21 +278,20 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
         assert "of python-control or scipy.signal" in made(none)
     assert "each at most once" in made(unit, ["error", "error"])
     twice = base.with_law("velocity", unit, ["error"])
-    assert "at one stage" in _refused(lambda: twice.with_law("position", unit, ["error"]))
+    assert "at one stage" in refused(twice.with_law, "position", unit, ["error"])
     for key, value in (("gain", "0.1 A*s/rad"), ("integral_time", "1 ms")):
-        refused = _refused(lambda key=key, value=value: twice.with_values({f"control.velocity.{key}": value}))
-        assert refused.split("control.velocity.", 1)[1].startswith(key)
-        assert "not allowed beside control.velocity.law" in refused
+        said = refused(twice.with_values, {f"control.velocity.{key}": value})
+        assert said.split("control.velocity.", 1)[1].startswith(key)
+        assert "not allowed beside control.velocity.law" in said
     notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz"}
-    assert "not allowed beside" in _refused(lambda: twice.add_filter("velocity", **notch))
-    filtered = {"encoder.filter_time": "1 ms"}
-    assert "without encoder.filter_time" in _refused(lambda: twice.with_values(filtered))
+    assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
+    assert "without encoder.filter_time" in refused(twice.with_values, {"encoder.filter_time": "1 ms"})
     force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)
-    assert "no current" in _refused(lambda: force.with_law("position", slow, ["current"]))
-    assert "control.*.law is a sampled one" in _refused(lambda: assemble_loops(twice, "continuous"))
+    assert "no current" in refused(force.with_law, "position", slow, ["current"])
+    assert "control.*.law is a sampled one" in refused(assemble_loops, twice, "continuous")
+    (tmp_path / "k.csv").write_text("1")
+    (tmp_path / "k.mat").write_text("x")
     wrong = (("none.mat", "no such file"), ("k.csv", ".mat up to version 7"), ("k.mat", "cannot be read"))
     for name, words in wrong:
-        (tmp_path / "k.csv").write_text("1")
-        (tmp_path / "k.mat").write_text("x")
         _with_file(twice, name, tmp_path)
-        assert words in _refused(lambda: load_design(tmp_path / "mine.toml"))
+        assert words in refused(load_design, tmp_path / "mine.toml")

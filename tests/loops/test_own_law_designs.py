@@ -61,26 +61,14 @@ def test_lqg_velocity_controller() -> None:
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
 
 
-def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[np.ndarray, ...]:
-    """s = (z - 1)/(z + 1): sampled to continuous; the unit circle becomes the imaginary axis."""
-    inverse = np.linalg.inv(A + np.eye(len(A)))
-    return (
-        inverse @ (A - np.eye(len(A))),
-        np.sqrt(2) * inverse @ B,
-        np.sqrt(2) * C @ inverse,
-        D - C @ inverse @ B,
-    )
-
-
-def back(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray) -> tuple[np.ndarray, ...]:
-    """The other way: z = (1 + s)/(1 - s)."""
-    inverse = np.linalg.inv(np.eye(len(A)) - A)
-    return (
-        inverse @ (np.eye(len(A)) + A),
-        np.sqrt(2) * inverse @ B,
-        np.sqrt(2) * C @ inverse,
-        D + C @ inverse @ B,
-    )
+def bilinear(
+    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0
+) -> tuple[np.ndarray, ...]:
+    """s = (z - 1)/(z + 1): sampled to continuous, or back with ``way`` -1; the unit circle is the axis."""
+    one = np.eye(len(A))
+    inverse = np.linalg.inv(one + way * A)
+    B, C, D = np.sqrt(2) * inverse @ B, np.sqrt(2) * C @ inverse, D - way * C @ inverse @ B
+    return inverse @ (A - way * one), B, C, D
 
 
 def test_h_infinity_position_controller_of_order_6() -> None:
@@ -103,7 +91,8 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     F = -(D.T @ C + B.T @ X) / R
     W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
     H = gamma**2 * W @ Z @ C.T
-    Ak, Bk, Ck, Dk = back(A + B @ F + H @ (C + D @ F), H, B.T @ X, -D.T)
+    continuous = A + B @ F + H @ (C + D @ F)
+    Ak, Bk, Ck, Dk = bilinear(continuous, H, B.T @ X, -D.T, -1.0)
     mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
     law = mine.controller.position_loop.law
     assert law is not None

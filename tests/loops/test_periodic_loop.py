@@ -14,6 +14,7 @@ from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
+from nonlinear import commands, simulate
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
@@ -69,8 +70,6 @@ def test_a_rest_that_an_integral_holds_is_no_border(seed: int, gain: float) -> N
 
 def test_the_mean_is_what_the_running_drive_does_to_a_command() -> None:
     """Both runs are linear, so their ratio at the command's frequency is the mean's response."""
-    from nonlinear import commands, simulate
-
     base = amber()
     base = replace(base, friction=replace(base.friction, dry_torque_Nm=0.0, load_coefficient=0.0))
     period = base.controller.position_loop.every * base.controller.period_s

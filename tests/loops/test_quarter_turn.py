@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import cos, pi, radians
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,15 +10,11 @@ from loop_designs import sprung
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design.model import Design, Gravity
+from actuator_lti.design.model import Gravity
 from actuator_lti.drive.operating import Operating, moment_slope
 from analyses.linear.loop_figures import all_loop_figures
 
 QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
-
-
-def hung(name: str, gravity: Gravity | None, slope_Nm_rad: float = 0.0) -> Design:
-    return sprung(name, slope_Nm_rad, gravity=gravity)
 
 
 def level(offset_rad: float) -> Gravity:
@@ -28,7 +25,7 @@ def level(offset_rad: float) -> Gravity:
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint"])
 def test_level_is_without_slope(name: str, offset: float) -> None:
     """Every loop is that of a drive without gravity, to the bit."""
-    with_it, without = hung(name, level(offset)), hung(name, None)
+    with_it, without = (sprung(name, 0.0, gravity=gravity) for gravity in (level(offset), None))
     for form in ("sampled", "continuous", "ideal"):
         ours, theirs = (assemble_loops(each, form=form).present for each in (with_it, without))
         for loop in theirs:
@@ -46,25 +43,20 @@ def test_level_is_without_slope(name: str, offset: float) -> None:
 
 def test_a_slope_beside_it_stays() -> None:
     """k + m g l cos(angle), by hand; a hundredth of a degree off level is a slope."""
+
+    def slope(gravity: Gravity | None, slope_Nm_rad: float = 0.0, **at: float) -> Any:
+        return moment_slope(sprung("joint", slope_Nm_rad, gravity=gravity), Operating(**at))
+
     peak = 3.5 * 9.80665 * 0.28
     for degrees in (0.0, 89.99, 90.01, 180.0, 269.9999, 360.0):
-        design = hung("joint", level(radians(degrees)))
-        expected = peak * cos(radians(degrees))
-        assert moment_slope(design, Operating()) == pytest.approx(expected, rel=1e-9)
-    assert moment_slope(hung("joint", level(pi / 2), -1e-9), Operating()) == pytest.approx(-1e-9, rel=1e-5)
-    assert moment_slope(hung("joint", None, -1e-14), Operating()) == -1e-14
-    balanced = hung("joint", level(0.0), -peak)  # a spring that takes the pendulum's slope
-    assert moment_slope(balanced, Operating()) == 0.0
-    turned = moment_slope(hung("joint", level(radians(60))), Operating(angle_rad=radians(30)))
-    assert turned == 0.0
-
-
-def test_stacked_designs_are_each_of_them_alone() -> None:
-    offsets = np.array([0.0, pi / 2, 2.0, 3 * pi / 2])
-    gravity = replace(level(0.0), offset_rad=offsets)
-    many = moment_slope(hung("joint", gravity), Operating())
-    alone = [moment_slope(hung("joint", level(each)), Operating()) for each in offsets]
-    assert many.tolist() == alone
+        assert slope(level(radians(degrees))) == pytest.approx(peak * cos(radians(degrees)), rel=1e-9)
+    assert slope(level(pi / 2), -1e-9) == pytest.approx(-1e-9, rel=1e-5)
+    assert slope(None, -1e-14) == -1e-14
+    assert slope(level(0.0), -peak) == 0.0  # a spring that takes the pendulum's slope
+    assert slope(level(radians(60)), angle_rad=radians(30)) == 0.0
+    offsets = np.array([0.0, pi / 2, 2.0, 3 * pi / 2])  # many designs are each of them alone
+    many = slope(replace(level(0.0), offset_rad=offsets))
+    assert many.tolist() == [slope(level(each)) for each in offsets]
     assert (many == 0.0).tolist() == [False, True, False, True]
 
 
@@ -74,7 +66,7 @@ SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 @pytest.mark.parametrize("slope", SLOPES)
 def test_a_weak_spring_behind_a_pi(slope: float) -> None:
     """T(0) = L0/(1 + L0) with L0 = Kp/Tn kM/k, however weak the spring."""
-    design = hung("ilr33-amber", None, slope)
+    design = sprung("ilr33-amber", slope, gravity=None)
     law, N = design.controller.velocity, design.total_ratio
     L0 = law.gain / law.integral_time_s * design.effective_motor.torque_constant_Nm_A * N**2 / -slope
     band = closed_loop_bandwidth(assemble_loops(design).velocity.closed_loop)
@@ -85,7 +77,7 @@ def test_a_weak_spring_behind_a_pi(slope: float) -> None:
 @pytest.mark.parametrize("slope", SLOPES)
 def test_no_resonance_over_nothing(slope: float) -> None:
     """A P velocity loop against a spring has T(0) = 0: what rounding leaves of it measures nothing."""
-    design = hung("joint", None, slope)
+    design = sprung("joint", slope, gravity=None)
     loops = assemble_loops(design)
     refused: list[str] = []
     figures = all_loop_figures(loops, refused=refused)

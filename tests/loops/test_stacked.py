@@ -89,6 +89,8 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
         values[path] = nominal * 10 ** rng.uniform(-decades, decades, count)
     if design.command.filter_time_s:
         values["control.period"] = np.minimum(values["control.period"], 3e-4)
+    ticks = design.controller.computing_delay_s / design.controller.period_s
+    values["control.computing_delay"] = ticks * values["control.period"]
     for path in values:  # what a filter may be is bounded by its period
         if path.startswith("control.velocity.filter") and not path.endswith(("depth", "damping")):
             velocity = design.controller.velocity
@@ -99,11 +101,8 @@ def scattered(design: Design, count: int) -> dict[str, Any]:
 
 @pytest.mark.parametrize("name", DRIVES)
 def test_stacked_blocks_are_the_single_ones(name: str) -> None:
-    design, count = DRIVES[name], 6
+    design, count, at = DRIVES[name], 6, Operating(load_Nm=2.0)
     values = scattered(design, count)
-    ticks = design.controller.computing_delay_s / design.controller.period_s
-    values["control.computing_delay"] = ticks * values["control.period"]
-    at = Operating(load_Nm=2.0)
     many = wire(stacked(design, values), at)
     for k in range(count):
         alone = wire(stacked(design, {path: float(array[k]) for path, array in values.items()}), at)
@@ -129,27 +128,6 @@ def same(blocks: list[Any], k: int) -> None:
         np.testing.assert_array_less(np.abs(mine - one), 1e-9 * scale + 1e-300)
 
 
-def test_many_designs_figures_know_the_wide_drive() -> None:
-    """The figures of one stacked design are those of its loops, notch and output sensor and all."""
-    from actuator_lti import closed_loop_bandwidth, step_figures
-
-    design = everything()
-    figures = linear_figures(Population(design, {}, 1))
-    loops = assemble_loops(design)
-    for name, loop in loops.present.items():
-        truth = stability_margins(loop.open_loop)
-        assert figures.stable(name)[0] == truth.stable, name
-        for quantity in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
-            mine = figures.quantity(quantity.removesuffix("_db").removesuffix("_deg"), name)[0]
-            assert mine == pytest.approx(getattr(truth, quantity), rel=1e-6), (name, quantity)
-    width, step = (f(loops.reference_to_output) for f in (closed_loop_bandwidth, step_figures))
-    pairs = {"bandwidth": width.minus3db_hz, "resonance_peak": width.resonance_peak_db,
-             "overshoot": step.overshoot_percent, "rise_time": step.rise_time_s}  # fmt: skip
-    for quantity, expected in pairs.items():
-        result = figures.quantity(quantity, "position")[0]
-        assert result == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity
-
-
 @pytest.mark.parametrize(
     ("design", "k", "loop", "told"),
     [
@@ -162,11 +140,8 @@ def test_many_designs_figures_know_the_wide_drive() -> None:
 def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
     design: Design, k: int, loop: str, told: bool
 ) -> None:
-    count = k + 1
-    values = scattered(design, count)
-    ticks = design.controller.computing_delay_s / design.controller.period_s
-    values["control.computing_delay"] = ticks * values["control.period"]
-    figures = linear_figures(Population(design, values, count), time_figures=False)
+    values = scattered(design, k + 1)
+    figures = linear_figures(Population(design, values, k + 1), time_figures=False)
     alone = stacked(design, {path: float(array[k]) for path, array in values.items()})
     truth = stability_margins(assemble_loops(alone).present[loop].open_loop, certify=True)
     assert truth.evidence == "certified"
@@ -174,12 +149,8 @@ def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
     if not told:
         return
     assert bool(figures.stable(loop)[k]) is truth.stable
-    pairs = {
-        "gain_margin": truth.gain_margin_db,
-        "phase_margin": truth.phase_margin_deg,
-        "modulus_margin": truth.modulus_margin,
-    }
-    for quantity, expected in pairs.items():
+    for name in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
+        quantity, expected = name.removesuffix("_db").removesuffix("_deg"), getattr(truth, name)
         assert figures.quantity(quantity, loop)[k] == pytest.approx(expected, rel=1e-7), quantity
 
 

@@ -17,6 +17,7 @@ from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
 from nonlinear._kernels import layout
 from nonlinear.bench.operating_motion import operating_motion
+from tests.changed import changed
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
 
@@ -67,21 +68,16 @@ def rotor(
     )
 
 
-def held_recursion(case: Case, angle: float, speed: float, ticks: int) -> np.ndarray:
-    """Angles of a frictionless rotor under a torque that is held over each tick."""
-    angles = []
-    for _ in range(ticks):
+@each
+def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
+    """Without friction, its torque held over each tick."""
+    angle, speed, angles = case.stable + 0.9 / case.order, 0.0, []
+    run = simulate(case.put(rotor()), commands.hold(), 0.1, initial=State(motor_angle_rad=angle))
+    for _ in range(1000):
         angles.append(angle)
         rate = case.torque(angle) / J
         angle, speed = angle + speed * Ts + 0.5 * rate * Ts**2, speed + rate * Ts
-    return np.array(angles)
-
-
-@each
-def test_a_rotor_swings_as_the_held_recursion_does(case: Case) -> None:
-    start = case.stable + 0.9 / case.order
-    run = simulate(case.put(rotor()), commands.hold(), 0.1, initial=State(motor_angle_rad=start))
-    assert run.motor_angle_rad == pytest.approx(held_recursion(case, start, 0.0, 1000), rel=1e-11)
+    assert run.motor_angle_rad == pytest.approx(np.array(angles), rel=1e-11)
 
 
 @each
@@ -178,35 +174,36 @@ def test_every_wave_has_its_place_in_the_row() -> None:
     assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
 
 
-def test_keys_of_the_gear_error() -> None:
-    fin = load_design("fin")
-    values = {"load.gear_error": "0.1 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "90 deg"}
+HELD = r" = .*: held over a tick,? .*; allowed: at most"
+
+
+@pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
+def test_keys_of_a_wave(name: str) -> None:
+    fin, part, peak = load_design("fin"), name.partition(".")[0], 0.1 if name.startswith("load") else 5e-3
+    values = {name: f"{peak} N*m", f"{name}_periods": 3, f"{name}_phase": "90 deg"}
     design = fin.with_values(values)
-    assert design.load.moment_Nm(0.2) - fin.load.moment_Nm(0.2) == pytest.approx(0.1 * cos(0.6), rel=1e-12)
-    assert "load.gear_error" in design.load.acting()
-    assert not design.load.bare().acting()
-    assert read_design_text(write_design(design)).load == design.load
-    with pytest.raises(
-        InputError, match=r"load\.gear_error_periods = .*: held over a tick, .*; allowed: at most"
-    ):
-        fin.with_values({**values, "load.gear_error_periods": 1e6})
+    other, own = (getattr(each, part).over_angle.at(0.2) for each in (fin, design))
+    assert own - other == pytest.approx(peak * cos(0.6), rel=1e-12)
+    assert getattr(read_design_text(write_design(design)), part) == getattr(design, part)
+    with pytest.raises(InputError, match=f"{name}_periods{HELD}"):
+        fin.with_values({**values, f"{name}_periods": 1e6})
+
+
+def test_keys_of_a_moment() -> None:
+    fin = load_design("fin")
+    for key, value in (("load.gear_error", "0.1 N*m"), ("load.moment_damping", "0.01 N*m*s/rad")):
+        load = fin.with_values({key: value}).load
+        assert key in load.acting()
+        assert not load.bare().acting()
+    with pytest.raises(InputError, match=f"load.moment_damping{HELD}"):
+        fin.with_values({"load.moment_damping": "1e6 N*m*s/rad"})
     with pytest.raises(InputError, match=r"load\.gear_error_periods = .* limits\.speed; allowed"):
         load_design("emps").with_values({"load.gear_error": "1 N", "load.gear_error_periods": "600 rad/m"})
 
 
-def test_keys_of_the_cogging() -> None:
-    fin = load_design("fin")
-    values = {"motor.cogging": "5 mN*m", "motor.cogging_periods": 4, "motor.cogging_phase": "90 deg"}
-    design = fin.with_values(values)
-    assert design.motor.over_angle.at(0.01) == pytest.approx(5e-3 * cos(0.04), rel=1e-12)
-    assert read_design_text(write_design(design)).motor == design.motor
-    with pytest.raises(
-        InputError, match=r"motor\.cogging_periods = .*: held over a tick, .*; allowed: at most"
-    ):
-        fin.with_values({**values, "motor.cogging_periods": 1e6})
-    screw = load_design("ballscrew").with_values(
-        {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
-    )
+def test_cogging_of_a_screw_is_over_the_angle_of_its_motor() -> None:
+    cogging = {"motor.cogging": "5 mN*m", "motor.cogging_periods": "5 rad/rad"}
+    screw = load_design("ballscrew").with_values(cogging)
     travel = screw.screw.travel_m_rad
     assert screw.motor.over_angle.at(0.3 * travel) == pytest.approx(5e-3 / travel * sin(5 * 0.3), rel=1e-9)
 
@@ -307,9 +304,9 @@ def test_energy_of_the_moment_is_work_on_the_load() -> None:
 
 def test_the_plant_holds_the_sum() -> None:
     """Cv + D/N^2 over J, of which the second part comes through the moment."""
-    base = load_design("ilr33-amber")
-    load = replace(base.load, path="back-drivable", moment_damping_Nms_rad=30.0)
-    design = replace(base, load=load)
+    design = changed(
+        load_design("ilr33-amber"), load={"path": "back-drivable", "moment_damping_Nms_rad": 30.0}
+    )
     plant = wire(design).plant
     own = plant.A[1, 1] + plant.B_M[1] * plant.moment["load_speed"] * plant.rows["load_speed"]["w"]
     assert -own * design.inertia_kgm2 == pytest.approx(
@@ -320,9 +317,8 @@ def test_the_plant_holds_the_sum() -> None:
 @pytest.mark.parametrize("path", ["back-drivable", "self-locking"])
 def test_top_speed_is_that_of_the_run(path: str) -> None:
     """(kM U/R - C0) over kM kE/R + Cv + (1/N + CM) D/N, or CM D/N where the path locks itself."""
-    base = load_design("ilr33-amber")
-    load = replace(base.load, path=path, moment_damping_Nms_rad=20.0)
-    design = controlled(replace(base, load=load), position=None, velocity=None, current=None)
+    damped = changed(load_design("ilr33-amber"), load={"path": path, "moment_damping_Nms_rad": 20.0})
+    design = controlled(damped, position=None, velocity=None, current=None)
     motor, friction, N = design.effective_motor, design.friction, design.total_ratio
     per_volt = motor.torque_constant_Nm_A / motor.resistance_ohm
     passed = friction.load_coefficient + (1.0 / N if path == "back-drivable" else 0.0)
@@ -331,12 +327,3 @@ def test_top_speed_is_that_of_the_run(path: str) -> None:
     assert capability(design).output_rate_rad_s == pytest.approx(expected, rel=1e-12)
     run = simulate(design, commands.step(design.limits.voltage_V), 0.5)
     assert run.motor_speed_rad_s[-1] / N == pytest.approx(expected, rel=1e-9)
-
-
-def test_key_and_its_bound() -> None:
-    fin = load_design("fin")
-    damped = fin.with_values({"load.moment_damping": "0.01 N*m*s/rad"})
-    assert "load.moment_damping" in damped.load.acting()
-    assert not damped.load.bare().acting()
-    with pytest.raises(InputError, match=r"load\.moment_damping = .*: held over a tick .*; allowed: at most"):
-        fin.with_values({"load.moment_damping": "1e6 N*m*s/rad"})

@@ -17,25 +17,13 @@ from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import control
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
-from margin_families import (
-    FAMILIES,
-    PERIOD_S,
-    clusters_and_near_cancellations,
-    hardly_damped,
-    near_the_border,
-    nearly_ill_posed,
-    poly,
-    roots_of,
-    scaled,
-    signs,
-    uniform,
-    up_to_four_integrators,
-)
+from margin_families import FAMILIES, PERIOD_S, poly, roots_of, scaled, signs, uniform
 from margin_truth import DEG, RATIO, Facts, behind_delay, determined, facts, polynomials, truth_of, unlike
 
 from actuator_lti.errors import InputError, NumericalError
@@ -108,21 +96,10 @@ ALL: tuple[Family, ...] = (
 )  # fmt: skip
 
 
-ON_THE_BORDER = {  # poles, crossings or cancellations that 1e-6 to 1e-13 decide about, on purpose
-    family.__name__
-    for family in (
-        hardly_damped, clusters_and_near_cancellations, up_to_four_integrators, nearly_ill_posed,
-        near_the_border, nearly_lossless, nearly_tangent, cancelled_on_the_border,
-    )
-}  # fmt: skip
-
-
 def without_touches(f: Facts, m: StabilityMargins) -> Facts:
     """Without the pairs of crossings, closer than 1e-9 to the line between, that are listed as one touch."""
 
-    def rest(
-        part: list[tuple[float, float]], listed: Sequence[GainMargin | PhaseMargin]
-    ) -> list[tuple[float, float]]:
+    def rest(part: list[tuple[float, float]], listed: Sequence[GainMargin | PhaseMargin]) -> list[Any]:
         touches = [x.frequency_rad_s for x in listed if x.tangent]
         return [c for c in part if not any(math.isclose(c[0], w, rel_tol=1e-3) for w in touches)]
 
@@ -185,12 +162,8 @@ def delayed_forms(
         others["certified"] = partial(stability_margins, loop, delay_s=delay_s, certify=True)
     for name, margins in others.items():
         if not (m := margins()).withheld:
-            yield (
-                f"delay_s against {name}",
-                facts(one),
-                facts(m),
-                30.0 if leaves_out(one) or leaves_out(m) else 90.0,
-            )
+            far = 30.0 if leaves_out(one) or leaves_out(m) else 90.0
+            yield f"delay_s against {name}", facts(one), facts(m), far
 
 
 def behind_part_of_a_sample(family: Family, seed: int, k: int) -> tuple[str, str]:
@@ -240,9 +213,8 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
             return kind, f"against the truth: {what}"
         for name, other, unit in forms(loop, rng):
             theirs = facts(other)
-            theirs = Facts(
-                theirs.unstable, *([(w * unit, x) for w, x in part] for part in (theirs.gains, theirs.phases))
-            )
+            gains, phases = ([(w * unit, x) for w, x in part] for part in (theirs.gains, theirs.phases))
+            theirs = Facts(theirs.unstable, gains, phases)
             tight = (RATIO, DEG) if m.evidence == other.evidence == "checked" else (1e-6, 1e-3)
             if not other.withheld and (what := unlike(ours, theirs, *tight, far=30.0)):
                 return "wrong", f"{name}: {what}"
@@ -262,37 +234,24 @@ def main() -> int:
     parser.add_argument("--most", type=int, default=1 << 30)
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
-    counts, why, drawn, withheld, late = (Counter[str]() for _ in range(5))
+    counts, late, why = Counter[str](), Counter[str](), Counter[str]()
     stop, k = time.monotonic() + asked.seconds, 0
     while time.monotonic() < stop and k < asked.most:
         family = ALL[k % len(ALL)]
-        kind, what = tried(family, asked.seed, k)
-        counts[kind] += 1
-        drawn[family.__name__] += 1
-        if kind in ("withheld", "undetermined") and not what.startswith("against the truth"):
-            withheld[family.__name__] += 1
-        if kind in ("withheld", "refused", "undetermined"):
-            why[f"{kind}: {family.__name__}: {what[:60]}"] += 1
-        behind, late_what = behind_part_of_a_sample(family, asked.seed, k)
-        late[behind] += 1
-        if behind == "wrong":
-            kind, what = behind, late_what
-            counts[kind] += 1
-        if kind == "wrong":
-            print(f"WRONG {family.__name__} seed {asked.seed} loop {k}: {what[:400]}", flush=True)
+        for ask, of in ((tried, counts), (behind_part_of_a_sample, late)):
+            kind, what = ask(family, asked.seed, k)
+            of[kind] += 1
+            if kind == "wrong":
+                print(f"WRONG {family.__name__} seed {asked.seed} loop {k}: {what[:400]}", flush=True)
+            elif kind not in ("right", "none"):
+                why[f"{kind}: {family.__name__}: {what[:60]}"] += 1
         k += 1
         if k % 1000 == 0:
             print(k, dict(counts), flush=True)
-    print(f"seed {asked.seed}: {k} loops, {dict(counts)}")
-    for name, times in drawn.items():
-        print(f"  {100.0 * withheld[name] / times:6.2f} % withheld of {times} {name}")
-    for words, left_out in (("all", set()), ("all but those on the border on purpose", ON_THE_BORDER)):
-        of = [sum(c[name] for name in drawn if name not in left_out) for c in (withheld, drawn)]
-        print(f"  {100.0 * of[0] / max(of[1], 1):6.2f} % withheld of {of[1]} of {words}")
-    print(f"  behind part of a sample: {dict(late)}")
+    print(f"seed {asked.seed}: {k} loops, {dict(counts)}; behind part of a sample: {dict(late)}")
     for reason, times in why.most_common(25):
-        print(f"  {times:6d} {reason}")
-    return 1 if counts["wrong"] else 0
+        print(f"  {100.0 * times / k:6.3f} % {reason}")
+    return 1 if counts["wrong"] or late["wrong"] else 0
 
 
 if __name__ == "__main__":

@@ -25,14 +25,6 @@ class Facts:
     gains: list[tuple[float, float]]
     phases: list[tuple[float, float]]
 
-    @property
-    def gain_crossovers(self) -> list[float]:
-        return [w for w, _ in self.phases]
-
-    @property
-    def phase_margins_deg(self) -> list[float]:
-        return [deg for _, deg in self.phases]
-
 
 def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
     """Of a loop; behind part p/r of a sample in the r-th root of z, without the verdict and the ends."""
@@ -173,11 +165,10 @@ def unlike(a: Facts, b: Facts, ratio: float = RATIO, deg: float = DEG, far: floa
         if len(ours) != len(theirs):
             return f"{name} {ours[:6]}, not {theirs[:6]}"
         for (w, x), (u, y) in zip(ours, theirs, strict=True):
-            off = abs(x - y) if name == "phase margins" else abs(x / y - 1.0)
-            off = min(off, abs(off - 360.0)) if name == "phase margins" else off
-            if off > (deg if name == "phase margins" else ratio) or not math.isclose(
-                w, u, rel_tol=max(ratio, 1e-6), abs_tol=1e-300
-            ):
+            far_off = abs(math.remainder(x - y, 360.0)) > deg
+            if name == "gain margins":
+                far_off = abs(x / y - 1.0) > ratio
+            if far_off or not math.isclose(w, u, rel_tol=max(ratio, 1e-6), abs_tol=1e-300):
                 return f"{name}: {x} at {w}, not {y} at {u}"
     return None
 

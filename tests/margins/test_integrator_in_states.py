@@ -3,26 +3,19 @@
 The equations of the cascade in s, evaluated point by point, are the truth.
 """
 
-from dataclasses import replace
-
 import control
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.bandwidth import peaks
 from actuator_lti.design.model import Design
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.margins.poles import sorted_poles
+from tests.loops.loop_designs import sprung
 
 SLOPES = (-6000.0, -40.0, -1.0, -1e-3, 1e-3, 1.0)
-
-
-def sprung(slope_Nm_rad: float) -> Design:
-    design = load_design("ilr33-amber")
-    load = replace(design.load, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad)
-    return replace(design, load=load)
 
 
 def position_loop(design: Design, s: np.ndarray) -> np.ndarray:
@@ -52,7 +45,7 @@ def largest(values: object, low: float, high: float) -> float:
 
 @pytest.mark.parametrize("slope", SLOPES)
 def test_peaks_and_margins_of_the_ideal_position_loop(slope: float) -> None:
-    design = sprung(slope)
+    design = sprung("ilr33-amber", slope)
     system = assemble_loops(design, form="ideal").position.open_loop
     assert sorted_poles(rational_loop(system).A, False).at_dc == 1
     found = peaks(system)

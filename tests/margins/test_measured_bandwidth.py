@@ -78,12 +78,9 @@ def test_margin_ranges_hold_the_truth_at_one_percent_noise_nobody_stated(count: 
                 for margin in listed:
                     low, high = margin.bracket_rad_s
                     inside = [t for t in true if low * 0.9999 <= t.frequency_rad_s <= high * 1.0001]
-                    known = getattr(margin, field)
-                    told = all(
-                        known[0] <= getattr(t, value) + 1e-9 and getattr(t, value) - 1e-9 <= known[1]
-                        for t in inside
-                    )
-                    wrong += not (inside and told)
+                    least, most = getattr(margin, field)
+                    told = (least - 1e-9 <= getattr(t, value) <= most + 1e-9 for t in inside)
+                    wrong += not (inside and all(told))
                     total += 1
             wrong += not holds(m.modulus_range, smallest)
             total += 1

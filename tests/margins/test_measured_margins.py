@@ -109,11 +109,8 @@ def coverage(m: StabilityMargins, L: Response) -> tuple[int, int, int]:
     The dense grid of the truth leaves 1e-4 in frequency, 0.05 deg and 1e-3 in gain.
     """
     phase, gain = crossings(L)
-    spans = [
-        (float(a), float(b))
-        for text in m.notes
-        for a, b in re.findall(r"between (\S+) and (\S+) rad/s", text)
-    ]
+    said = (re.findall(r"between (\S+) and (\S+) rad/s", text) for text in m.notes)
+    spans = [(float(a), float(b)) for found in said for a, b in found]
     wrong = missed = 0
     for listed, true in ((m.phase_margins, phase), (m.gain_margins, gain)):
         brackets = [margin.bracket_rad_s or (0.0, 0.0) for margin in listed]
@@ -143,9 +140,8 @@ def quiet(rng: np.random.Generator, L: Response) -> MeasuredResponse | control.F
 
 def noisy(rng: np.random.Generator, L: Response) -> MeasuredResponse:
     y, sigma = L(OMEGA), 10.0 ** rng.uniform(-3, -1)
-    return MeasuredResponse.with_noise(
-        control.frd(y * (1 + sigma * circular(rng, y.shape)), OMEGA), sigma * np.abs(y)
-    )
+    data = control.frd(y * (1 + sigma * circular(rng, y.shape)), OMEGA)
+    return MeasuredResponse.with_noise(data, sigma * np.abs(y))
 
 
 def repeated(rng: np.random.Generator, L: Response) -> MeasuredResponse:

@@ -3,7 +3,6 @@
 Truth is mpmath on the exact values of the doubles of the single loop; what 8 ulp of them change is left out.
 """
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from margin_truth import determined, difference, truth_of
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
+from tests.changed import changed
 
 BASE = load_design("ilr33-amber-multirate")
 SEEDS = range(30)
@@ -23,19 +23,10 @@ def unstable_inside(seed: int) -> Any:
     control = BASE.controller
     factors = 10.0 ** rng.uniform((0.6, -3.0, -3.0), (2.0, 1.0, 1.0))
     every = int(rng.choice([4, 6, 8]))
-    return replace(
-        BASE,
-        controller=replace(
-            control,
-            current=replace(control.current, gain_V_A=control.current.gain_V_A * factors[0]),
-            velocity=replace(control.velocity, every=every, gain=control.velocity.gain * factors[1]),
-            position=replace(
-                control.position,
-                every=every * int(rng.choice([2, 3])),
-                gain=control.position.gain * factors[2],
-            ),
-        ),
-    )
+    position = {"every": every * int(rng.choice([2, 3])), "gain": control.position.gain * factors[2]}
+    velocity = {"every": every, "gain": control.velocity.gain * factors[1]}
+    current = {"gain_V_A": control.current.gain_V_A * factors[0]}
+    return changed(BASE, controller={"current": current, "velocity": velocity, "position": position})
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -60,11 +51,8 @@ def test_the_figures_are_the_truth_or_withheld(seed: int, capfd: pytest.CaptureF
             assert all(np.isnan(many.quantity(q, name)[0]) for q in ("gain_margin", "phase_margin"))
             continue
         assert many.stable(name)[0] == (truth.unstable == 0)
-        for quantity, value in (
-            ("gain_margin", m.gain_margin_db),
-            ("phase_margin", m.phase_margin_deg),
-            ("modulus_margin", m.modulus_margin),
-        ):
+        for figure in ("gain_margin_db", "phase_margin_deg", "modulus_margin"):
+            quantity, value = figure.removesuffix("_db").removesuffix("_deg"), getattr(m, figure)
             assert many.quantity(quantity, name)[0] == pytest.approx(value, rel=1e-6), (name, quantity)
     assert capfd.readouterr() == ("", "")
 
@@ -79,9 +67,7 @@ def test_entries_of_5e14_are_withheld_among_others_that_are_not() -> None:
     """One design of a population cannot be followed; its neighbours keep the bits they have alone."""
     gain = BASE.controller.current.gain_V_A
     gains = np.array([gain, 60.0 * gain, 0.7 * gain])
-    base = replace(
-        BASE, controller=replace(BASE.controller, position=replace(BASE.controller.position, every=20))
-    )
+    base = changed(BASE, controller={"position": {"every": 20}})
     figures = linear_figures(Population(base, {"control.current.gain": gains}, 3))
     assert figures.withheld("position").tolist() == [False, True, False]
     assert figures.stable("position").tolist() == [True, False, True]

@@ -1,16 +1,15 @@
 """What tests do with the sliders of a report's page: open, move, read, save, and ask the command line."""
 
-from __future__ import annotations
-
 import json
 import math
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 from typer.testing import CliRunner
 
+from actuator_lti import load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design
 from reports.build import design_report
@@ -18,9 +17,9 @@ from reports.cli.app import build
 from reports.document import dumps, loads
 from reports.html import page as page_of
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
-
+Browser = Locator = Page = Any  # of playwright, which is not on every machine
+AMBER = load_design("ilr33-amber")
+LIVE = "JSON.parse(document.getElementById('live-data').textContent)"
 FIGURES = {  # of the page: of `margins --json`
     "gain_margin": "gain_margin_db",
     "phase_margin": "phase_margin_deg",
@@ -46,17 +45,12 @@ def written(design: Design, folder: Path) -> Path:
     return path
 
 
-def opened(
-    browser: Browser,
-    path: Path,
-    trouble: list[str],
-    fragment: str = "",
-    *,
-    live: bool = True,
-    first: str = "",
-    **options: Any,
-) -> Page:
-    """Open a page from disk, offline, behind a script of one's own; complaints and requests are collected."""
+def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:
+    """Open a page from disk, offline; complaints and requests are collected.
+
+    ``live``: wait for its sliders; ``first``: a script that runs before its own; all else is the browser's.
+    """
+    live, first = options.pop("live", True), options.pop("first", "")
     chosen = {"viewport": {"width": 1400, "height": 1000}, **options}
     page = browser.new_context(offline=True, accept_downloads=True, **chosen).new_page()
     page.add_init_script(first)
@@ -85,14 +79,24 @@ def type_value(page: Page, key: str, value: float) -> None:
     settled(page, lambda: (page.fill(f"{row} .field", repr(value)), page.press(f"{row} .field", "Enter")))
 
 
+def done(page: Page, timeout_ms: float = 30_000.0) -> None:
+    """Wait until that has followed, too, that comes behind."""
+    page.wait_for_selector("#hands-on[data-behind=done]", timeout=timeout_ms)
+
+
 def read(page: Page) -> dict[str, dict[str, float]]:
-    """Read every figure of the page, to all digits, once those have followed that come behind."""
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    """Read every figure of the page, to all digits."""
+    done(page)
     told = "all => all.map(td => [td.dataset.loop, td.dataset.figure, td.dataset.value])"
     result: dict[str, dict[str, float]] = {}
     for loop, name, value in page.locator(".now td[data-figure]").evaluate_all(told):
         result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
     return result
+
+
+def field(page: Page, key: str) -> float:
+    """The value of a key in the unit of the page, as its slider says it."""
+    return float(page.input_value(f'.row[data-path="{key}"] .field'))
 
 
 def command_line(path: Path | str, part: str = "loops") -> Any:
@@ -103,20 +107,20 @@ def command_line(path: Path | str, part: str = "loops") -> Any:
 
 def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
     """Compare value and verdict of every requirement that the page judges."""
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     told = "all => all.map(({ dataset }) => [dataset.id, dataset.loop, dataset.value, dataset.met])"
     rows = page.locator("table.demands tbody tr").evaluate_all(told)
-    apart = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).apart")
+    apart = {each["id"] for each in page.evaluate(f"{LIVE}.apart")}
     ours = {(id, loop or None): (value, met) for id, loop, value, met in rows}
-    assert len(ours) + len(apart) == len(verdicts)
     for item in verdicts:
         id = item["id"].removesuffix(f"/{item['loop']}")
-        if id in [each["id"] for each in apart]:
+        if id in apart:
             continue
-        value, met = ours[id, item["loop"]]
+        value, met = ours.pop((id, item["loop"]))
         assert met == {"met": "true", "not met": "false", "not proven": "null"}[item["verdict"]], item
         if item["value"] is not None and math.isfinite(item["value"]):
             assert float(value) == pytest.approx(item["value"], rel=1e-9, abs=1e-9), item
+    assert not ours
 
 
 def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:

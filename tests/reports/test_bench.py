@@ -1,31 +1,22 @@
 """The run in the page is that of the simulator: every trace and command, under load, from a click."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from live_page import opened, read, settled, type_value, written
+from live_page import AMBER, Browser, Page, done, opened, read, settled, type_value, written
 
-from actuator_lti import load_design
 from actuator_lti.design import with_values
 from nonlinear import simulate
 from nonlinear.commands import Command, ramp, sampled, sine, step
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
-
-DESIGN = "ilr33-amber"
 
 
 @pytest.fixture(scope="module")
 def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     trouble: list[str] = []
-    made = opened(browser, written(load_design(DESIGN), tmp_path_factory.mktemp("bench")), trouble)
+    made = opened(browser, written(AMBER, tmp_path_factory.mktemp("bench")), trouble)
     yield made
     made.context.close()
     assert trouble == []
@@ -43,19 +34,19 @@ def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
 
 
 def last(page: Page) -> dict[str, float]:
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     found: dict[str, float] = json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
     return found
 
 
 def agree(found: dict[str, float], command: Command, load_Nm: float = 0.0, **changes: float) -> None:
     """Run the same command in the simulator as long, and compare the end of every trace."""
-    design = with_values(load_design(DESIGN), changes) if changes else load_design(DESIGN)
-    ticks = int(found["ticks"])
+    design, ticks = with_values(AMBER, changes), int(found["ticks"])
     run = simulate(design, command, load_Nm=load_Nm, duration_s=ticks * design.controller.period_s)
-    k = ticks - 1
-    assert found["output"] == pytest.approx(math.degrees(run.output_angle_rad[k]), rel=1e-9, abs=1e-12)
-    ends = {"speed": run.motor_speed_rad_s[k], "current": run.current_A[k], "voltage": run.voltage_V[k]}
+    output = math.degrees(run.output_angle_rad[ticks - 1])
+    assert found["output"] == pytest.approx(output, rel=1e-9, abs=1e-12)
+    traces = {"speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V}
+    ends = {name: trace[ticks - 1] for name, trace in traces.items()}
     assert {name: found[name] for name in ends} == pytest.approx(ends, rel=1e-7, abs=1e-9)
 
 
@@ -76,10 +67,10 @@ def test_the_load_and_the_changed_design_are_in_the_run(page: Page) -> None:
 def test_a_step_of_a_drive_that_moves_is_that_of_the_simulator(page: Page) -> None:
     """The motion goes on from rest until it is steady; then the step comes on top of it."""
     found = ask(page, "step", Size=1.0, Moving=12.0, Duration=0.05)
-    before, ticks, period = int(found["before"]), int(found["ticks"]), load_design(DESIGN).controller.period_s
+    before, ticks, period = int(found["before"]), int(found["ticks"]), AMBER.controller.period_s
     k = np.arange(before + ticks)
     command = sampled(k * period, np.radians(12.0 * k * period + (k >= before)))
-    run = simulate(load_design(DESIGN), command, duration_s=k.size * period)
+    run = simulate(AMBER, command, duration_s=k.size * period)
     output = math.degrees(run.output_angle_rad[k[-1]]) - 12.0 * before * period
     assert before > 100
     assert found["output"] == pytest.approx(output, rel=1e-7)
@@ -110,8 +101,8 @@ def test_the_drive_is_drawn_as_it_stands_at_a_time(page: Page) -> None:
 
 def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
     """A step of 8 deg runs at the speed limit: shaded in the panel of the speed, for as long as it acts."""
-    ticks, design = int(ask(page, "step", Size=8.0, Duration=0.6)["ticks"]), load_design(DESIGN)
-    run = simulate(design, step(math.radians(8.0)), duration_s=ticks * design.controller.period_s)
+    ticks = int(ask(page, "step", Size=8.0, Duration=0.6)["ticks"])
+    run = simulate(AMBER, step(math.radians(8.0)), duration_s=ticks * AMBER.controller.period_s)
     acting = run.limit_active("speed").mean()
     boxes = page.eval_on_selector_all(
         '[data-chart="run"] .panel:nth-of-type(2) .cells rect',
@@ -169,8 +160,7 @@ def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
     settled(page, lambda: page.click('[data-do="reset"]'))
     usual = ask(page, "step", Size=4.0, Duration=0.0)["ticks"]
     # so little beyond its limit that a run of usual length still decays
-    limit = read(page)["position"]["gain_margin"]
-    gain = 120.0 * 10.0 ** (limit / 20.0) * 1.002
+    gain = 120.0 * 10.0 ** (read(page)["position"]["gain_margin"] / 20.0) * 1.002
     type_value(page, "control.position.gain", gain)
     assert "unstable" in page.inner_text("table.now")
     assert last(page)["ticks"] > usual

@@ -3,27 +3,24 @@
 import cmath
 import json
 from dataclasses import fields, is_dataclass
-from functools import reduce
 
 import pytest
-import typer
 
 from actuator_lti.design import design_hash, load_design
 from analyses.request import flag, options
 from analyses.stiffness import Stiffness, stiffness
 from reports.analyses import ANALYSES, FURTHER, Analysis
 from reports.as_json import as_json
-from reports.cli.app import PANELS, build
+from reports.cli.app import PANELS
 from reports.document import load
+from tests.command_line import commands
 
-APP = typer.main.get_command(build())
-COMMANDS = APP.commands  # type: ignore[attr-defined]
+COMMANDS = commands()
 
 
 @pytest.mark.parametrize("one", ANALYSES, ids=lambda one: one.name)
 def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> None:
-    command = reduce(lambda group, word: group.commands[word], one.name.split(), APP)  # type: ignore[attr-defined]
-    given = {parameter.name: parameter for parameter in command.params}
+    given = {parameter.name: parameter for parameter in COMMANDS[one.name].params}
     common = {"as_json", *(["example"] if one.example else []), *(["quiet"] if one.doing else [])}
     common |= set() if one.alone else {"design", "changes"} | ({"out", "quiet"} if one.page else set())
     if one.request is None:

@@ -3,24 +3,15 @@
 The truth is the axis: what lies between two places on a scale in dB is a factor, in closed form.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING
 
 import pytest
-from live_page import read, settled
+from live_page import AMBER, LIVE, Page, field, read, settled
 
-from actuator_lti import load_design
 from actuator_lti.design import with_values
 from actuator_lti.design.control import Filter
 from tests.changed import changed
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
-
-VALUE = "JSON.parse(document.getElementById('live-data').textContent)"
-# a place on a curve where nothing lies above it, on the screen
 MIDDLE = """(node) => {
     for (const part of [0.5, 0.6, 0.7, 0.8, 0.9, 0.4, 0.3]) {
         const place = node.getPointAtLength(part * node.getTotalLength());
@@ -49,15 +40,10 @@ SCALE = """([chart, k]) => {
 def page(opens) -> Page:
     turn = 2.0 * math.pi
     notch = Filter(kind="notch", frequency_rad_s=turn * 200.0, width_rad_s=turn * 60.0, depth=0.3)
-    result = opens(changed(load_design("ilr33-amber"), controller={"velocity": {"filters": (notch,)}}))
+    result = opens(changed(AMBER, controller={"velocity": {"filters": (notch,)}}))
     settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
     result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
     return result
-
-
-def value(page: Page, key: str) -> float:
-    """Give a key's value in its unit, as its slider says it."""
-    return float(page.input_value(f'.row[data-path="{key}"] .field'))
 
 
 def drag(page: Page, at: tuple[float, float], dx: float, dy: float) -> None:
@@ -81,12 +67,12 @@ def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page)
     drag(page, tuple(grab.evaluate(MIDDLE)), 0.0, -8.0)
     by = decibels(page, -8.0)
     assert by > 3.0
-    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
+    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
     after = read(page)["velocity"]
     assert after["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
     page.click('[data-do="undo"]')
     page.wait_for_function("() => document.querySelector('[data-do=\"undo\"]').disabled")
-    assert value(page, "control.velocity.gain") == pytest.approx(0.12)
+    assert field(page, "control.velocity.gain") == pytest.approx(0.12)
     assert read(page)["velocity"] == before
 
 
@@ -126,7 +112,7 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
     )
     away = (x - origin[0], y - origin[1])
     drag(page, (x, y), 0.4 * away[0], 0.4 * away[1])
-    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
+    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
 
 
 def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
@@ -137,18 +123,19 @@ def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None
     low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
     ratio = (high / low) ** (15.0 / apart)
     drag(page, middle("corner of velocity"), 15.0, 0.0)
-    assert value(page, "control.velocity.integral_time") == pytest.approx(15.0 / ratio, rel=5e-3)
-    name = next(key["path"] for key in page.evaluate(VALUE)["keys"] if key["path"].endswith(".frequency"))
+    assert field(page, "control.velocity.integral_time") == pytest.approx(15.0 / ratio, rel=5e-3)
+    paths = (key["path"] for key in page.evaluate(f"{LIVE}.keys"))
+    name = next(path for path in paths if path.endswith(".frequency"))
     notch, width = name.removesuffix(".frequency"), name.replace(".frequency", ".width")
-    first, wide = value(page, name), value(page, width)
+    first, wide = field(page, name), field(page, width)
     drag(page, middle(notch), 15.0, 0.0)
-    moved = value(page, name)
+    moved = field(page, name)
     assert moved == pytest.approx(first * ratio, rel=5e-3)
     page.keyboard.down("Shift")
     drag(page, middle(notch), 15.0, 0.0)
     page.keyboard.up("Shift")
-    assert value(page, width) == pytest.approx(wide * ratio, rel=5e-3)
-    assert value(page, name) == moved
+    assert field(page, width) == pytest.approx(wide * ratio, rel=5e-3)
+    assert field(page, name) == moved
 
 
 def test_marks_stand_where_the_margins_are(page: Page) -> None:
@@ -156,7 +143,7 @@ def test_marks_stand_where_the_margins_are(page: Page) -> None:
     page.locator('[data-chart="bode"] .plots').focus()
     for _ in range(3):
         settled(page, lambda: page.keyboard.press("PageUp"))
-    assert value(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (1.5 / 20.0), rel=1e-3)
+    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (1.5 / 20.0), rel=1e-3)
     own = read(page)["velocity"]
     for panel, name in ((0, "gain_margin"), (1, "phase_margin")):
         low, high, apart = page.evaluate(SCALE, ["bode", panel])[1]
@@ -171,8 +158,7 @@ def test_marks_stand_where_the_margins_are(page: Page) -> None:
 
 
 def test_a_design_with_a_limit_that_fails_marks_only_that(opens) -> None:
-    late = with_values(load_design("ilr33-amber"), {"control.velocity.gain": 0.75})
-    page = opens(late)
+    page = opens(with_values(AMBER, {"control.velocity.gain": 0.75}))
     settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
     stems, demands = '[data-chart="bode"] .live-marks .stem', "table.demands tr[data-loop=velocity]"
     colours = page.locator(stems).evaluate_all("all => all.map(n => n.style.stroke)")

@@ -64,11 +64,10 @@ def held_phase_margin_deg(design: Design) -> float:
 def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     design = pushed(controller={"computing_delay_s": 0.0})
     figures = all_loop_figures(assemble_loops(design))
-    current = figures["current"]
-    assert current.margins.stable is False  # J s^2 + Cv s - k has a root on the right
-    assert current.sound is True
+    current, expected = figures["current"], held_phase_margin_deg(design)
+    assert (current.margins.stable, current.sound) == (False, True)  # J s^2 + Cv s - k: a root on the right
     assert figures["position"].stable
-    expected = held_phase_margin_deg(design)
+    assert held_loop(assemble_loops(design), "position") is None
     assert current.judged.margins.phase_margin_deg == pytest.approx(expected, abs=1e-6)
     asked = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
     verdicts = evaluate_requirements(replace(design, requirements=(asked,)), figures)
@@ -77,6 +76,11 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert found["current"].value == pytest.approx(expected, abs=1e-6)
     assert "with the rotor locked" in found["current"].reason
     assert "held" not in found["velocity"].reason
+
+
+def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
+    """Without a load that pushes, an unstable current loop inside a stable drive stays what it is."""
+    assert held_loop(assemble_loops(pushed(-1.0)), "current") is None
 
 
 def test_a_p_velocity_loop_is_judged_under_a_constant_load() -> None:
@@ -117,14 +121,6 @@ def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[st
     assert (found.verdict, checked.verdict) == (verdict, verdict)
     assert ("the current loop is unstable, rotor free" in checked.words) is (verdict == "not met")
     assert bool(checked.settlings) is bool(held)
-
-
-def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
-    """Without a load that pushes, an unstable current loop inside a stable drive stays what it is."""
-    loops = assemble_loops(pushed(-1.0))
-    assert held_loop(loops, "current") is None
-    assert held_loop(assemble_loops(pushed(1.0)), "current") is not None
-    assert held_loop(assemble_loops(pushed(1.0)), "position") is None
 
 
 def test_many_designs_at_once_are_judged_alike() -> None:

@@ -3,16 +3,15 @@
 The curves are closed forms: an integrator with delay, and a parabola.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
 from built_report import HOSTILE, SEEN
+from live_page import Browser, Locator, Page
 
 from analyses.linear.responses import Curve
 from reports import document as doc
@@ -20,9 +19,6 @@ from reports.charts import style
 from reports.charts.chart import Chart
 from reports.html import page as page_of
 from reports.sections.loop_charts import both
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Locator, Page
 
 GAIN, DELAY_S = 100.0, 0.002
 CROSSOVER_HZ = GAIN / (2.0 * math.pi)  # of 100 exp(-0.002 s)/s, exactly
@@ -182,15 +178,12 @@ def test_a_click_keeps_the_read_out_until_the_next(page: Page) -> None:
     assert read(figure) != kept
 
 
-@pytest.mark.parametrize("how", ["mouse", "keyboard"])
-def test_the_legend_switches_curves(page: Page, how: str) -> None:
+@pytest.mark.parametrize("act", [lambda item: item.click(), lambda item: item.press("Enter")])
+def test_the_legend_switches_curves(page: Page, act: Any) -> None:
     figure = chart(page, 2)
     item = figure.get_by_role("button", name="parabola")
     for shown in (False, True):
-        if how == "mouse":
-            item.click()
-        else:
-            item.press("Enter")
+        act(item)
         assert item.get_attribute("aria-pressed") == ("true" if shown else "false")
         assert figure.locator(".curve[data-k='0']").is_visible() is shown
         page.mouse.move(*spot(figure, 0.5, 0.5))

@@ -1,14 +1,25 @@
 """Every shipped design has sliders that act on its loops: elastic, with play, multirate, friction map."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from live_page import agree, command_line, read, same_figures, saved, settled, type_value, verdicts_agree
+from live_page import (
+    AMBER,
+    LIVE,
+    Page,
+    agree,
+    command_line,
+    done,
+    field,
+    read,
+    same_figures,
+    saved,
+    settled,
+    type_value,
+    verdicts_agree,
+)
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
@@ -19,9 +30,6 @@ from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
 from reports.live import live_model
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
 
 CHANGES = {  # in the units of the page; the last restores no design
     "ilr33-amber": {"control.position.gain": 140.0, "control.computing_delay": 137.5,
@@ -68,13 +76,12 @@ def test_figures_are_those_of_margins_on_the_saved_file(shown: tuple[str, Page],
 
 def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
     """Their fundamental has the margins of the command line's; while a value moves the row says so."""
-    design = load_design("ilr33-amber-multirate")
+    design, key = load_design("ilr33-amber-multirate"), "control.current.gain"
     page = opens(design)
-    type_value(page, "control.current.gain", 2e-2)
-    page.wait_for_selector("#hands-on[data-behind=done]")
-    value = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).keys")
-    factor = next(key["factor"] for key in value if key["path"] == "control.current.gain")
-    changed = with_values(design, {"control.current.gain": 2e-2 * factor}, check=False)
+    type_value(page, key, 2e-2)
+    done(page)
+    factor = next(each["factor"] for each in page.evaluate(f"{LIVE}.keys") if each["path"] == key)
+    changed = with_values(design, {key: 2e-2 * factor}, check=False)
     wanted = stability_margins(assemble_loops(changed).break_points["i_ref"].open_loop)
     ours = read(page)["at i_ref"]
     assert ours["gain_margin"] == pytest.approx(wanted.gain_margin_db, rel=1e-9)
@@ -85,10 +92,8 @@ def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
 
 def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
     """An unstable current loop between slow updates: the command line withholds, so does the page."""
-    design = load_design("ilr33-amber-multirate")
-    page = opens(design)
-    key = "control.current.gain"
-    type_value(page, key, 60.0 * float(page.input_value(f'.row[data-path="{key}"] .field')))
+    page, key = opens(load_design("ilr33-amber-multirate")), "control.current.gain"
+    type_value(page, key, 60.0 * field(page, key))
     type_value(page, "control.position.every", 20)
     file = saved(page, tmp_path / "hot.toml")
     assert linear_figures(Population(load_design(file), {}, 1)).withheld("position")[0]
@@ -99,8 +104,7 @@ def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
 
 
 def test_whole_numbers_stay_whole_and_multiples(opens, tmp_path) -> None:
-    design = load_design("ilr33-amber-multirate")
-    page = opens(design)
+    page = opens(load_design("ilr33-amber-multirate"))
     row = '.row[data-path="control.velocity.every"]'
     before = read(page)
     type_value(page, "control.velocity.every", 3)  # 10 is no multiple of 3
@@ -121,10 +125,8 @@ def test_a_friction_map_has_sliders(opens, tmp_path) -> None:
     """The loops have the slope of the map's first piece, as the linear form has at rest."""
     map_Nm = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
     points = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in map_Nm)
-    design = replace(load_design("ilr33-amber"), name="mapped", friction=Friction(points=points))
-    page = opens(design)
-    key = "control.velocity.gain"
-    type_value(page, key, 1.3 * float(page.input_value(f'.row[data-path="{key}"] .field')))
+    page = opens(replace(AMBER, name="mapped", friction=Friction(points=points)))
+    type_value(page, "control.velocity.gain", 1.3 * field(page, "control.velocity.gain"))
     file = saved(page, tmp_path / "mapped.toml")
     same_figures(page, load_design(file))
     assert "first piece" in page.inner_text("#hands-on")
@@ -138,7 +140,7 @@ def test_cells_of_the_map_are_named_as_the_command_line_names_them(opens, tmp_pa
     page.locator('[data-chart="border"]').scroll_into_view_if_needed()
     drawn = "() => JSON.parse(document.querySelector('#hands-on').dataset.cells || '[]').length"
     page.wait_for_function(drawn)
-    page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
+    done(page, 60_000)
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert len(cells) == 18 * 12
     every = design.controller.position_loop.every
@@ -165,28 +167,25 @@ ASKED = (
 
 def test_requirements_on_the_whole_drive_follow(opens, tmp_path) -> None:
     """Rate, current, acceleration, torque margin and lost motion of a loaded drive as `margins` has them."""
-    limits = [
-        Requirement(id=f"r{k}", quantity=name, unit=unit, minimum=low, maximum=9.0 if low is None else None,
-                    load_Nm=load)
+    limits = tuple(
+        Requirement(id=f"r{k}", quantity=name, unit=unit, load_Nm=load, minimum=low,
+                    maximum=9.0 if low is None else None)
         for k, (name, unit, low, load) in enumerate(ASKED)
-    ]  # fmt: skip
-    design = replace(load_design("fin"), requirements=tuple(limits))
-    page = opens(design)
+    )  # fmt: skip
+    page = opens(replace(load_design("fin"), requirements=limits))
     verdicts_agree(page, command_line(saved(page, tmp_path / "a.toml"), "requirements"))
     values = ("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
     first = page.eval_on_selector_all(*values)
     changes = {"limits.peak_current": 0.6, "motor.resistance": 1.7, "load.inertia": 1.5, "coupling.play": 2.0,
                "friction.load_coefficient": 3.0, "limits.voltage": 0.8}  # fmt: skip
     for key, factor in changes.items():
-        field = f'.row[data-path="{key}"] .field'
-        if page.locator(field).count():
-            type_value(page, key, factor * float(page.input_value(field)))
+        if page.locator(f'.row[data-path="{key}"] .field').count():
+            type_value(page, key, factor * field(page, key))
     verdicts_agree(page, command_line(saved(page, tmp_path / "b.toml"), "requirements"))
     assert all(a != b for a, b in zip(first, page.eval_on_selector_all(*values), strict=True))
 
 
 def test_a_requirement_that_needs_a_simulation_of_its_own_is_named() -> None:
     limits = (Requirement(id="swing", quantity="limit_cycle", unit="deg", maximum=0.1),)
-    model = live_model(replace(load_design("ilr33-amber"), requirements=limits))
-    assert model["apart"] == [{"id": "swing", "words": "swing after a step"}]
-    assert model["requirements"] == []
+    model = live_model(replace(AMBER, requirements=limits))
+    assert (model["apart"], model["requirements"]) == ([{"id": "swing", "words": "swing after a step"}], [])

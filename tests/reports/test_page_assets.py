@@ -27,16 +27,10 @@ PAIRS = [
 
 def schemes() -> dict[str, dict[str, str]]:
     """The variables of each scheme, as they stand in the style sheet; light where it leaves one out."""
-    blocks = re.findall(
-        r"(@media \([^)]*dark\) \{\s*|@media print \{\s*)?:root \{(.*?)\}", asset("style.css"), re.S
-    )
-    light = dict(re.findall(r"--([\w-]+): (#\w+);", blocks[0][1]))
-    return {
-        "dark" if "dark" in head else "print" if "print" in head else "light": {
-            **light, **dict(re.findall(r"--([\w-]+): (#\w+);", body))
-        }
-        for head, body in blocks
-    }  # fmt: skip
+    place = r"(?:@media (?:\([^)]*)?(dark|print)\)? \{\s*)?:root \{(.*?)\}"
+    blocks = re.findall(place, asset("style.css"), re.S)
+    colours = {name or "light": dict(re.findall(r"--([\w-]+): (#\w+);", body)) for name, body in blocks}
+    return {name: colours["light"] | own for name, own in colours.items()}
 
 
 def luminance(colour: str) -> float:

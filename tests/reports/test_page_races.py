@@ -1,18 +1,12 @@
 """What moves while the page still works: every test makes two things meet that a busy machine lets meet."""
 
-from __future__ import annotations
-
 import json
 import math
-from typing import TYPE_CHECKING
 
 import pytest
-from live_page import read, settled, type_value
+from live_page import AMBER, LIVE, Page, done, field, read, settled, type_value
 
 from actuator_lti import load_design
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
 
 GAIN = "control.position.gain"
 HANDS = """
@@ -35,13 +29,10 @@ EARLY = """window.watched = () => new MutationObserver(() => seen(true)).observe
 SLOW = "const now = performance.now.bind(performance); performance.now = () => 1000 * now();"
 
 
-AMBER = load_design("ilr33-amber")
-
-
 @pytest.fixture
 def page(opens) -> Page:
     result = opens(AMBER)
-    result.wait_for_selector("#hands-on[data-behind=done]")
+    done(result)
     return result
 
 
@@ -66,7 +57,7 @@ def test_done_is_said_of_the_values_that_are_asked_for(page: Page) -> None:
         return [first, then];""",
     )
     assert told == ["waits", "waits"]
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
 
 
 def test_a_value_that_is_refused_is_not_pinned_before_that_is_said(page: Page) -> None:
@@ -123,12 +114,11 @@ def test_a_slider_let_go_after_an_undo_holds_where_it_stands(page: Page) -> None
     settled(page, lambda: page.mouse.move(x + 0.8 * box["width"], y))
     settled(page, lambda: page.keyboard.press("Control+z"))
     page.mouse.up()
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     place = float(slider.input_value())
-    data = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).keys")
-    low, high = next((key["low"], key["high"]) for key in data if key["path"] == GAIN)
-    there = float(page.input_value(f'.row[data-path="{GAIN}"] .field'))
-    assert there == pytest.approx(low * (high / low) ** (place / 1000.0), rel=1e-3)
+    own = next(key for key in page.evaluate(f"{LIVE}.keys") if key["path"] == GAIN)
+    low, high = own["low"], own["high"]
+    assert field(page, GAIN) == pytest.approx(low * (high / low) ** (place / 1000.0), rel=1e-3)
     assert place > 600.0
 
 
@@ -140,14 +130,14 @@ def test_the_map_is_drawn_though_it_is_seen_before_the_page_is_ready(opens) -> N
 
 def test_of_several_sights_told_at_once_the_last_counts(opens) -> None:
     page = opens(AMBER, first=WATCHED)
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     assert at_once(page, "seen(false, true); return root.dataset.behind;") == "waits"
 
 
 def test_the_map_waits_as_long_as_a_step_settles_though_that_follows_later(opens) -> None:
     page = opens(AMBER, first=WATCHED + SLOW)
     at_once(page, "seen(true);")
-    page.wait_for_selector("#hands-on[data-behind=done]", timeout=60_000)
+    done(page, 60_000)
     type_value(page, GAIN, 140.0)
     settling_s = read(page)["position"]["settling_time"]
     period_s, every = AMBER.controller.period_s, AMBER.controller.position.every
@@ -223,21 +213,21 @@ def test_a_curve_that_is_held_moves_from_where_it_was_taken(page: Page, between:
     page.mouse.move(x, y - 9)
     settled(page, lambda: page.mouse.move(x, y))
     page.mouse.up()
-    page.wait_for_selector("#hands-on[data-behind=done]")
-    assert page.input_value(f'.row[data-path="{GAIN}"] .field') == "120.0"
+    done(page)
+    assert field(page, GAIN) == 120.0
 
 
 def test_rows_of_one_drive_are_not_named_by_another(opens) -> None:
     """Break points of the drive as written follow later than the values of the link, which update at once."""
     link = "#hands-on?control.velocity.every=1&control.position.every=1"
     page = opens(load_design("ilr33-amber-multirate"), link)
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     assert "fundamental" not in page.inner_text("table.now")
 
 
 def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None:
     page = opens(AMBER, first=SLOW)
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     words = at_once(
         page,
         f"""press("pin"); await frame();
@@ -246,5 +236,5 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
         return [...cells].map((one) => one.textContent);""",
     )
     assert "…" in words
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
     assert "…" not in page.inner_text("table.variants")

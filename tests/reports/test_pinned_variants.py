@@ -1,17 +1,11 @@
 """Pinned variants beside the drive as it is now, and one cursor through all figures of a loop."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 import pytest
-from live_page import FIGURES, command_line, saved, settled, type_value
+from live_page import AMBER, FIGURES, LIVE, Page, command_line, done, saved, settled, type_value
 
 from actuator_lti import load_design
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
 
 CURSOR = """(name) => { const svg = document.querySelector(`[data-chart=${name}] .plot`);
     const [, x, top] = svg.querySelector(".over .cursor").getAttribute("d").match(/M([-\\d.]+) ([-\\d.]+)/);
@@ -22,7 +16,7 @@ CURSOR = """(name) => { const svg = document.querySelector(`[data-chart=${name}]
 def press(page: Page, does: str, letter: str = "") -> None:
     of = f'[data-letter="{letter}"]' if letter else ""
     settled(page, lambda: page.click(f'[data-do="{does}"]{of}'))
-    page.wait_for_selector("#hands-on[data-behind=done]")
+    done(page)
 
 
 def column(page: Page, heading: str) -> list[str]:
@@ -40,14 +34,14 @@ def curves(page: Page, label: str) -> list[str]:
 
 
 def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
-    page = opens(load_design("ilr33-amber"))
+    page = opens(AMBER)
     wanted = {}
     for letter, gain in (("A", 80.0), ("B", 140.0)):
         type_value(page, "control.position.gain", gain)
         press(page, "pin")
         wanted[letter] = command_line(saved(page, tmp_path / f"{letter}.toml"))["position"]
     press(page, "reset")
-    followed = page.evaluate("JSON.parse(document.getElementById('live-data').textContent).figures")
+    followed = page.evaluate(f"{LIVE}.figures")
     for letter, figures in wanted.items():
         for cell, figure in zip(column(page, letter), followed, strict=False):
             own = figures.get("to_reference", figures)[FIGURES[figure["name"]]]

@@ -1,17 +1,12 @@
 """Ten questions of a new user on every shipped drive: answered within two clicks, in words and figures."""
 
-from __future__ import annotations
-
 import re
-from typing import TYPE_CHECKING
 
 import pytest
+from live_page import done
 
 from actuator_lti import load_design
 from actuator_lti.design.loader import shipped_designs
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
 
 HANDS, SIZE = '.toc a[href="#hands-on"]', ".run-keys label:has-text('Size') input"
 EACH, LOOPS = "#answer details.fold > summary", "table.loops"
@@ -33,7 +28,7 @@ QUESTIONS = {
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_ten_questions_are_answered_within_two_clicks(opens, name: str) -> None:
-    page: Page = opens(load_design(name))
+    page = opens(load_design(name))
     page.set_viewport_size({"width": 1400, "height": 900})
     for question, (clicks, place, pattern) in QUESTIONS.items():
         assert len(clicks) <= 2
@@ -43,7 +38,7 @@ def test_ten_questions_are_answered_within_two_clicks(opens, name: str) -> None:
         if SIZE in clicks:
             page.fill(SIZE, "20")
             page.press(SIZE, "Enter")
-            page.wait_for_selector("#hands-on[data-behind=done]")
+            done(page)
         answer = page.locator(place).first
         assert answer.is_visible(), question
         assert re.search(pattern, answer.inner_text()), (question, answer.inner_text())

@@ -91,24 +91,7 @@ def test_what_is_not_known_is_refused_by_name(amber: Design) -> None:
         judged(amber, quantity="bandwidth", unit="Hz", minimum=1.0, loop="outer")
 
 
-# -- the drive's own figures, against the paper's equations by hand ------------------------------------
-
-
-def test_rate_and_current_at_8_Nm_follow_from_the_friction_of_table_1(amber: Design) -> None:
-    result = drive_figures(amber, 8.0)
-    torque = 2.25e-3 + 1.34e-3 * 8.0 + 5.25e-6 * 942.5
-    assert result.motor_current_A == pytest.approx(torque / 5.9e-3, rel=1e-12)
-    assert math.degrees(result.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)  # paper: 22.7 deg/s
-    assert result.rate_limit == "speed limit"
-
-
-def test_a_low_supply_limits_the_speed(amber: Design) -> None:
-    low = replace(amber, limits=replace(amber.limits, voltage_V=4.0))
-    result = drive_figures(low, 0.0)
-    speed = result.output_rate_rad_s * 2376.0
-    current = (2.25e-3 + 5.25e-6 * speed) / 5.9e-3
-    assert result.rate_limit == "voltage"
-    assert 0.055 * current + 5.9e-3 * speed == pytest.approx(4.0, rel=1e-12)
+# -- the drive's own figures: those of the paper's equations are in tests/validation ----------------------
 
 
 def test_a_drive_that_friction_holds_does_not_move_and_a_load_is_a_number(amber: Design) -> None:

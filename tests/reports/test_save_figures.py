@@ -1,22 +1,17 @@
 """Every figure of a page as SVG, PNG and CSV: what is saved is what the document holds and the page shows."""
 
-from __future__ import annotations
-
 import csv
 import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
 from built_report import Built
+from live_page import Browser, Page
 from matplotlib.image import imread
 
 from reports import document as doc
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
 
 SIZE = 1e-4  # of a panel's range: a hundredth of a point of some hundred
 

@@ -1,13 +1,12 @@
 """Met, not met, not proven: the same words, counts and exit status wherever a requirement is judged."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
 import analyses.linear.loop_survey
 from actuator_lti import assemble_loops, stability_margins
@@ -20,11 +19,11 @@ from analyses.isolation import drain
 from analyses.linear import loop_figures
 from analyses.margins import run
 from analyses.validation import CHECKS, validate
-from reports.cli.app import build
-from reports.cli.main import main
 from reports.sections.corners import summary as corners_summary
 from reports.sections.validation import section
 from reports.verdict_summary import verdict_of
+from tests.changed import changed
+from tests.command_line import Command, Ran
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
@@ -35,47 +34,53 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
     return replace(load_design("ilr33-amber"), requirements=requirements, waivers=waivers)
 
 
-def status(path: Path, design: Design, capsys, *call: str) -> tuple[int, str]:
-    path.write_text(write_design(design), encoding="utf-8")
-    code = main([call[0], str(path), *call[1:]])
-    return code, capsys.readouterr().out
+@pytest.fixture
+def written(tmp_path) -> Callable[[Design], Path]:
+    """Write a design; the path of its file."""
+
+    def call(design: Design) -> Path:
+        (tmp_path / "d.toml").write_text(write_design(design), encoding="utf-8")
+        return tmp_path / "d.toml"
+
+    return call
 
 
-@pytest.mark.parametrize("waivers", [(), (WAIVED,)])
-def test_margins_and_report_say_the_same(waivers: tuple[Waiver, ...], tmp_path, capsys) -> None:
-    code, head, word = (0, "PASS", "met") if waivers else (1, "NOT PROVEN", "not proven")
-    design, path = asking(*waivers), tmp_path / "d.toml"
-    made = status(path, design, capsys, "margins")
-    assert (made[0], made[1].startswith(f"{head}  ")) == (code, True)
-    assert f"0 of 1 requirements met, 1 {'waived' if waivers else 'not proven'}" in made[1]
-    made = status(path, design, capsys, "margins", "--json")
-    data = json.loads(made[1])
-    assert (made[0], data["verdict"], data["passed"]) == (code, word, code == 0)
+CASES = pytest.mark.parametrize(
+    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
+)
+
+
+@CASES
+def test_margins_and_report_say_the_same(
+    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
+) -> None:
+    path = written(asking(*waivers))
+    said = cli.text("margins", path, status=status)
+    assert said.startswith(f"{head}  ")
+    assert f"0 of 1 requirements met, 1 {'waived' if waivers else 'not proven'}" in said
+    data = cli.data("margins", path, status=status)
+    assert (data["verdict"], data["passed"]) == ("met" if waivers else "not proven", status == 0)
     (item,) = data["requirements"]
     assert item["verdict"] == "not proven"
     assert (item["waiver"] or {}).get("reason") == ("the motor is outside" if waivers else None)
-    folder = tmp_path / "out"
-    call = ("report", "--no-validation", "--quiet", "--out", str(folder))
-    made = status(path, design, capsys, *call)
-    assert (made[0], made[1].startswith(f"{head}  ")) == (code, True)
-    document = json.loads((folder / "report.json").read_text())
+    call = ("report", path, "--no-validation", "--quiet", "--out", tmp_path)
+    assert cli.text(*call, status=status).startswith(f"{head}  ")
+    document = json.loads((tmp_path / "report.json").read_text())
     counts = {"met": 0, "not_met": 0, "not_proven": 0 if waivers else 1, "waived": len(waivers)}
     assert document["verdict"]["parts"]["requirements"] == counts
-    page = (folder / "report.html").read_text()
+    page = (tmp_path / "report.html").read_text()
     assert f'<p class="overall {"info" if waivers else "warn"}">' in page
     assert ("the motor is outside" in page) is bool(waivers)
 
 
-@pytest.mark.parametrize("waivers", [(), (WAIVED,)])
+@CASES
 def test_what_corners_and_samples_leave_out_is_not_proven(
-    waivers: tuple[Waiver, ...], tmp_path, capsys
+    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
 ) -> None:
-    design, out = asking(*waivers), str(tmp_path / "out")
-    drawn = ("montecarlo", "--samples", "4", "--no-worst", "--quiet", "--out", out)
-    for call in (("corners", "--quiet"), drawn):
-        code, said = status(tmp_path / "d.toml", design, capsys, *call)
-        assert (code, said.startswith("PASS")) == ((0, True) if waivers else (1, False))
-        assert said.startswith("NOT PROVEN") is not bool(waivers)
+    design = asking(*waivers)
+    drawn = ("--samples", "4", "--no-worst", "--quiet", "--out", tmp_path)
+    for name, *more in (("corners", "--quiet"), ("montecarlo", *drawn)):
+        assert cli.text(name, written(design), *more, status=status).startswith(head)
     made = corners(design)
     assert made.verdict == ("met" if waivers else "not proven")
     assert ("Not judged at corners: hot." in corners_summary(made)) is not bool(waivers)
@@ -141,21 +146,20 @@ def test_a_row_of_a_validation_not_proven_can_be_waived(waived: str, passes: boo
     assert wrong.verdict == "not met"  # a waiver lets go what is not proven, never what is contradicted
 
 
-def reported(folder: Path, *changes: str) -> tuple[int, str, Any]:
-    call = ["report", "ilr33-amber", "--no-validation", "--quiet", "--out", str(folder), *changes]
-    done = CliRunner().invoke(build(), call)
-    return done.exit_code, done.output, json.loads((folder / "report.json").read_text())
+def reported(folder: Path, cli: Command, *changes: str) -> tuple[Ran, Any]:
+    call = ["report", "ilr33-amber", "--no-validation", "--quiet", "--out", folder, *changes]
+    return cli(*call), json.loads((folder / "report.json").read_text())
 
 
 @pytest.mark.parametrize(
     ("slope", "status", "word"), [("-1", 0, "PASS"), ("1", 0, "PASS"), ("1e9", 1, "FAIL")]
 )
-def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path) -> None:
+def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str, tmp_path, cli) -> None:
     """Held by the load, pushed by it, driven away by it."""
     changes = ("--set", "load.path=back-drivable", "--set", f"load.moment_slope={slope} N*m/rad")
-    code, output, document = reported(tmp_path, *changes)
-    assert (code, document["verdict"]["passed"]) == (status, status == 0)
-    assert output.lstrip().startswith(word)
+    ran, document = reported(tmp_path, cli, *changes)
+    assert (ran.status, document["verdict"]["passed"]) == (status, status == 0)
+    assert ran.out.startswith(word)
     assert "could not be computed" not in json.dumps(document)
     if slope == "1":
         assert "unstable by itself, outer loops open and rotor free" in json.dumps(document)
@@ -164,34 +168,30 @@ def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str,
         assert "phase margin, current loop held" in [item["words"] for item in live["apart"]]
 
 
-def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch) -> None:
+def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch, cli) -> None:
     def fails(*_: Any) -> None:
         raise ZeroDivisionError("made up")
 
     monkeypatch.setattr(analyses.linear.loop_survey, "_other_form", fails)
-    code, output, document = reported(tmp_path)
+    ran, document = reported(tmp_path, cli)
     drain()
-    assert code != 0
+    assert ran.status != 0
     assert document["verdict"]["passed"] is False
     assert document["verdict"]["failed_sections"] == ["Missing parts"]
-    assert "FAIL" in output
-    assert "failed: Missing parts" in output
+    assert ran.out.startswith("FAIL")
+    assert "failed: Missing parts" in ran.out
     assert "failed: Missing parts" in (tmp_path / "report.html").read_text()
     titles = [part["title"] for part in document["sections"]]
     assert "Sampled, continuous, ideal" in titles  # of the sampled form alone
 
 
-def test_without_requirements_margins_below_custom_are_named(tmp_path, capsys) -> None:
+def test_without_requirements_margins_below_custom_are_named(written, cli) -> None:
     """Times 10^((m - 3)/20) of its gain, a loop keeps 3 dB of its gain margin m."""
     design = asking(requirements=())
-    text = status(tmp_path / "d.toml", design, capsys, "margins")[1]
+    text = cli.text("margins", written(design))
     assert "The design states no requirements." in text
     assert "customary" not in text
-    position = design.controller.position_loop
     room_db = stability_margins(assemble_loops(design)["position"].open_loop).gain_margin_db
-    assert room_db is not None
-    nearer = replace(position, gain=position.gain * 10.0 ** ((room_db - 3.0) / 20.0))
-    design = replace(design, controller=replace(design.controller, position=nearer))
-    code, text = status(tmp_path / "d.toml", design, capsys, "margins")
-    assert code == 0
+    gain = design.controller.position_loop.gain * 10.0 ** ((room_db - 3.0) / 20.0)
+    text = cli.text("margins", written(changed(design, controller={"position": {"gain": gain}})))
     assert "position loop, gain margin 3 dB (of 6 dB)" in " ".join(text.split())

@@ -418,8 +418,7 @@ def main(first: int, count: int, everything: bool, until_s: float = inf) -> Coun
     for design in stable_drives(first, count):
         if time.monotonic() - began > until_s:
             break
-        tried.update(drives=1)
-        tried.update(validated(design, Settings() if everything else CHECKS))
+        tried.update(drives=1, **validated(design, Settings() if everything else CHECKS))
         print(f"TABLE {dict(tried)}, last {design.name}", flush=True)
     return tried
 
@@ -432,12 +431,10 @@ def validated(design: model.Design, settings: Settings) -> dict[str, int]:
     try:
         with isolated() as missing:
             found = validate(design, settings)
-    except InputError as error:
-        print(f"{design.name}  refused: {error}", flush=True)
-        return {"refused": 1}
-    except Exception:
-        print(f"{design.name}  TRACEBACK {traceback.format_exc()}", flush=True)
-        return {"tracebacks": 1}
+    except Exception as error:
+        kind = "refused" if isinstance(error, InputError) else "tracebacks"
+        print(f"{design.name}  {kind}: {error if kind == 'refused' else traceback.format_exc()}", flush=True)
+        return {kind: 1}
     print(f"{found}; {time.process_time() - started:.1f} s", flush=True)
     for item in missing:
         print(f"    MISSING {item.part}: {item.why} | {' / '.join(item.traceback.splitlines()[-5:])}")

@@ -28,15 +28,19 @@ from tests.validation.random_drives import full_drive
 DESIGN = load_design(Path(__file__).with_name("conditional.toml"))
 
 
-def looked(design: model.Design) -> tuple[Conditional, int]:
+def looked(design: model.Design) -> Conditional:
+    """What is found within the time that a step of it takes to settle."""
+    return conditional_stability(design, assemble_loops(design), settling_ticks(design))
+
+
+def settling_ticks(design: model.Design) -> int:
     loops, every = assemble_loops(design), design.controller.position_loop.every
-    settle = settling_ticks_of(loops.present["position"].closed_loop, every, design.name, 400_000)
-    return conditional_stability(design, loops, settle), settle
+    return settling_ticks_of(loops.present["position"].closed_loop, every, design.name, 400_000)
 
 
 @pytest.fixture(scope="module")
 def conditional() -> Conditional:
-    return looked(DESIGN)[0]
+    return looked(DESIGN)
 
 
 def test_the_margins_are_healthy_and_it_is_found(conditional: Conditional) -> None:
@@ -83,10 +87,12 @@ def test_the_describing_function_predicts_the_limit_cycle(conditional: Condition
 
 def test_it_goes_away_with_the_limit_or_with_knowledge_of_it() -> None:
     """More voltage: the border moves away. The current limited where the velocity controller knows: none."""
-    assert not looked(changed(DESIGN, limits={"voltage_V": 48.0}))[0].diverges
-    kept, _ = looked(changed(DESIGN, limits={"peak_current_A": 12.0, "voltage_V": 200.0}))
+    assert not looked(changed(DESIGN, limits={"voltage_V": 48.0})).diverges
+    kept = looked(changed(DESIGN, limits={"peak_current_A": 12.0, "voltage_V": 200.0}))
     assert not kept.diverges
     assert all(one.antiwindup for one in kept.predictions)
+    free = changed(DESIGN, limits={"voltage_V": 1e9, "peak_current_A": inf})
+    assert step_threshold(free, 1822) == (None, None)
 
 
 def test_the_threshold_grows_with_the_limit(conditional: Conditional) -> None:
@@ -99,7 +105,7 @@ def test_the_threshold_grows_with_the_limit(conditional: Conditional) -> None:
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps"])
 def test_shipped_designs_settle_from_every_step(name: str) -> None:
-    result, _ = looked(load_design(name))
+    result = looked(load_design(name))
     assert not result.diverges
     assert result.next_rad is None
 
@@ -126,11 +132,6 @@ def test_saturation_gain() -> None:
         assert saturation_gain(saturation_ratio(gain)) == pytest.approx(gain, rel=1e-10)
 
 
-def test_without_limits_there_is_nothing_to_find() -> None:
-    free = changed(DESIGN, limits={"voltage_V": 1e9, "peak_current_A": inf})
-    assert step_threshold(free, 1822) == (None, None)
-
-
 @pytest.mark.parametrize(
     ("seed", "ending", "limiter"),
     [
@@ -144,34 +145,28 @@ def test_a_finding_on_a_random_drive_is_that_of_plain_integration(
 ) -> None:
     """2 % below the threshold the error dies out, 2 % above it grows beyond the step itself."""
     design = changed(full_drive(seed), encoder={"counts_per_rev": None}, supply=None)
-    found, settle = looked(design)
+    found, settle = looked(design), settling_ticks(design)
     assert (found.ending, found.limiter) == (ending, limiter)
     assert found.limiter_share > 0.9
     for factor, settles in ((0.98, True), (1.02, False)):
         size = factor * found.threshold_rad
         ticks = int(step_rows(design, np.array([size]), settle).value("ticks"))
-        error = np.abs(output_of_step(design, size, ticks) / size - 1.0)
-        left = error[-ticks // 8 :].max()
+        left = np.abs(output_of_step(design, size, ticks) / size - 1.0)[-ticks // 8 :].max()
         assert left < 1e-3 if settles else left > 2.0
 
 
 def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) -> model.Design:
     """A torque source with P controllers on a load that pushes away from the middle."""
+    velocity = model.VelocityLoop(gain=1.6, integral_time_s=None)
+    loops = {"position": model.PositionLoop(gain=30.0), "velocity": velocity}
     return model.Design(
         name="inverted",
-        title="A load that pushes away",
         motor=model.Motor(rotor_inertia_kgm2=1e-3, source_gain_Nm_V=0.5),
         gears=(model.Gear(name="g", ratio=10.0),),
         load=model.Load(inertia_kgm2=0.1, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad),
-        controller=model.Controller(
-            period_s=2e-4,
-            computing_delay_s=0.0,
-            position=model.PositionLoop(gain=30.0),
-            velocity=model.VelocityLoop(gain=1.6, integral_time_s=None),
-        ),
+        controller=model.Controller(period_s=2e-4, computing_delay_s=0.0, **loops),
         limits=model.Limits(voltage_V=volts),
         command=model.Command(rate_rad_s=0.2),
-        friction=model.Friction(),
         validation=model.Validation(full_deflection_rad=full_rad),
     )
 
@@ -182,32 +177,28 @@ def test_largest_deflection_that_an_unstable_load_lets_come_back(slope: float) -
 
     The command creeps there by its profile; P controllers of stiffness K end at r K/(K - c).
     """
-    found, _ = looked(unstable(slope))
+    found = looked(unstable(slope))
     N, k, J = 10.0, 0.5, 2e-3
-    stiffness = k * 1.6 * 30.0 * N**2
-    largest = k * 10.0 * N / slope * (1.0 - slope / stiffness)
+    largest = k * 10.0 * N / slope * (1.0 - slope / (k * 1.6 * 30.0 * N**2))
     creeping = 0.2 / sqrt(slope / N**2 / J)
-    assert found.ending == "diverges"
-    assert found.limiter == "voltage"
+    assert (found.ending, found.limiter) == ("diverges", "voltage")
     assert largest - creeping < found.threshold_rad < largest * (1.0 + 1e-3)
 
 
 def test_a_load_that_pushes_back_holds_the_drive_and_nothing_diverges() -> None:
     """A spring: P controllers end at r K/(K + c), no divergence; the limit holds beyond tau_max/c."""
     damped = model.Friction(viscous_Nms_rad=0.02)
-    settled, _ = looked(changed(unstable(-40.0, full_rad=1.2), friction=damped))
-    assert not settled.diverges
-    found, _ = looked(changed(unstable(-40.0), friction=damped))
+    assert not looked(changed(unstable(-40.0, full_rad=1.2), friction=damped)).diverges
+    found = looked(changed(unstable(-40.0), friction=damped))
     stiffness = 0.5 * 1.6 * 30.0 * 10.0**2
-    assert found.ending == "is held by a limit"
-    assert found.limiter == "voltage"
+    assert (found.ending, found.limiter) == ("is held by a limit", "voltage")
     assert found.threshold_rad == pytest.approx(0.5 * 10.0 * 10.0 / 40.0 * (1.0 + 40.0 / stiffness), rel=2e-3)
 
 
 @pytest.mark.parametrize("seed", [361, 372])
 def test_standing_beside_the_target_is_no_divergence(seed: int) -> None:
     """A spring against P controllers (361); a step below one count of the output's encoder (372)."""
-    assert not looked(full_drive(seed))[0].diverges
+    assert not looked(full_drive(seed)).diverges
 
 
 def test_hunting_is_no_conditional_stability() -> None:

@@ -12,6 +12,7 @@ from actuator_lti.design.model import Requirement
 from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
+from analyses.specification.capability import drive_figures
 from analyses.specification.sensitivity import population_figures
 from reports.sections.corners import chart, section
 
@@ -33,6 +34,7 @@ def test_a_low_supply_lowers_the_rate_and_no_margin() -> None:
     rate = Requirement(id="rate", quantity="output_rate", unit="deg/s", minimum=1.0, load_Nm=0.0)
     design = replace(design, requirements=(rate,))
     nominal, _, _, low, *_ = corners(design, Asked.of(design, supply_V=4.0)).corners
+    assert drive_figures(low.design, 0.0).rate_limit == "voltage"
     w = np.radians(low.verdicts[0].value) * design.total_ratio
     i = (2.25e-3 + 5.25e-6 * w) / 5.9e-3
     assert 0.055 * i + 5.9e-3 * w == pytest.approx(4.0, rel=1e-9)

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, reduce
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,41 +80,32 @@ def larger(design: Design, path: str) -> Design:
     return changed(design, **reduce(lambda inner, name: {name: inner}, reversed(path.split(".")), more))
 
 
-def always(design: Design) -> bool:
-    return True
-
-
-def no_map(design: Design) -> bool:
-    return not design.friction.points
-
-
 def has_velocity(design: Design) -> bool:
     return design.controller.velocity is not None
 
 
+def always(_: Design) -> bool:
+    return True
+
+
+STEADY, BUS, LOAD = {"steady_torque"}, {"bus_voltage"}, {"coupling_torque", "load_breakaway_moment"}
 # what is changed, rows that are red, and where it has a part in a run and is not faint beside what has
-CHANGES: dict[str, tuple[set[str], Callable[[Design], bool]]] = {
-    "friction.dry_torque_Nm": ({"steady_torque"}, no_map),
-    "friction.dry_torque_reverse_Nm": ({"steady_torque"}, no_map),
-    "friction.load_coefficient": ({"steady_torque"}, always),
-    "friction.offset_torque_Nm": ({"steady_torque"}, always),
-    "friction.points": ({"steady_torque"}, always),
-    "load.friction.dry_torque_Nm": (
-        {"coupling_torque", "load_breakaway_moment"},
-        lambda design: design.coupling is not None,
-    ),
+CHANGES: dict[str, tuple[set[str], Callable[[Design], Any]]] = {
+    "friction.dry_torque_Nm": (STEADY, lambda design: not design.friction.points),
+    "friction.dry_torque_reverse_Nm": (STEADY, lambda design: not design.friction.points),
+    "friction.load_coefficient": (STEADY, always),
+    "friction.offset_torque_Nm": (STEADY, always),
+    "friction.points": (STEADY, always),
+    "load.friction.dry_torque_Nm": (LOAD, lambda design: design.coupling),
     "coupling.play_rad": ({"half_play"}, always),
     "motor.rotor_inertia_kgm2": (set(), always),
     "limits.voltage_V": ({"voltage_limit"}, always),
     "limits.speed_rad_s": ({"speed_limit"}, has_velocity),
-    "limits.peak_current_A": ({"current_limit"}, lambda design: design.controller.current is not None),
+    "limits.peak_current_A": ({"current_limit"}, lambda design: design.controller.current),
     "limits.acceleration_rad_s2": ({"acceleration_limit"}, has_velocity),
-    "command.rate_rad_s": (
-        {"command_rate"},
-        lambda design: design.controller.outermost in ("position", "velocity"),
-    ),
-    "supply.resistance_ohm": ({"bus_voltage"}, always),
-    "supply.capacitance_F": ({"bus_voltage"}, always),
+    "command.rate_rad_s": ({"command_rate"}, has_velocity),
+    "supply.resistance_ohm": (BUS, always),
+    "supply.capacitance_F": (BUS, always),
     "supply.brake_voltage_V": ({"brake_voltage"}, always),
 }
 
@@ -154,20 +146,17 @@ def test_thirds_of_a_map_and_directions_are_told_apart() -> None:
 def test_closed_forms_of_the_rows() -> None:
     """By hand from the equations: what the simulator shows, not what the code predicts."""
     by_load = 1.34e-3 * 8.0
-    assert found(AMBER, "breakaway_torque", "under 8 N*m, forward") == pytest.approx(
-        2.25e-3 + by_load, rel=1e-9
-    )
-    assert found(AMBER, "steady_torque", "at -377 rad/s under 8") == pytest.approx(
-        -(2.25e-3 + by_load + 5.25e-6 * 377.0), rel=1e-9
-    )
+    breakaway = found(AMBER, "breakaway_torque", "under 8 N*m, forward")
+    assert breakaway == pytest.approx(2.25e-3 + by_load, rel=1e-9)
+    steady = -(2.25e-3 + by_load + 5.25e-6 * 377.0)
+    assert found(AMBER, "steady_torque", "at -377 rad/s under 8") == pytest.approx(steady, rel=1e-9)
     planetary = 1.0e-7 + (5e-7 + 5e-7) / 66.0**2
     assert found(AMBER, "inertia") == pytest.approx(9.2e-7 + planetary + 2e-4 / (66.0 * 36.0) ** 2, rel=1e-12)
     fin = load_design("fin")
     T_s = 0.05 + 0.02 * 240.0 / 60.0 + 8.0  # friction of the fin and the moment that turns it back
     assert found(fin, "coupling_torque", "at 240 rad/s under -8") == pytest.approx(T_s, rel=1e-9)
-    assert found(fin, "steady_torque", "at 240 rad/s under -8") == pytest.approx(
-        T_s / 60.0 + 1.7e-3 * T_s + 8e-3 + 1e-5 * 240.0, rel=1e-9
-    )
+    steady = T_s / 60.0 + 1.7e-3 * T_s + 8e-3 + 1e-5 * 240.0
+    assert found(fin, "steady_torque", "at 240 rad/s under -8") == pytest.approx(steady, rel=1e-9)
     assert found(fin, "half_play", "forward") == pytest.approx(0.75e-3, rel=1e-9)
     joint = load_design("joint")
     assert found(joint, "breakaway_torque", "under 0 N*m, forward") == pytest.approx(1.2 * 0.06, rel=1e-9)

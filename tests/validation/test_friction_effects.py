@@ -6,11 +6,12 @@ from collections.abc import Callable
 
 import pytest
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.design import model, with_values
 from analyses.friction_effects import friction_effects
 from analyses.friction_effects.breakaway import Hysteresis, hysteresis, static_threshold, threshold
 from analyses.friction_effects.result import limit_cycles
+from analyses.limit_cycles.stick_slip import _slip
 from analyses.motion.settling import SMALL, settle, settlings_of
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import quiet
@@ -175,6 +176,15 @@ def test_stick_slip_needs_breakaway_above_friction_and_an_integral() -> None:
     assert friction_effects(emps).points[0].cycles.stick_slip is None
 
 
+def test_a_stick_slip_cycle_is_not_foreseen_where_a_filter_holds_what_is_not_known() -> None:
+    """A torque filter holds the breakaway torque before the slip, not zero, as it was taken."""
+    assert _slip(AMBER, 1.0, assemble_loops(AMBER)) is not None
+    low_pass = model.Filter(on="torque", kind="lowpass", frequency_rad_s=2000.0)
+    loops = assemble_loops(filtered := changed(AMBER, controller={"velocity": {"filters": (low_pass,)}}))
+    assert any(name.startswith("torque1") for name in loops.tick_system.states)
+    assert _slip(filtered, 1.0, loops) is None
+
+
 def test_a_smoothed_law_is_not_said_to_have_a_threshold() -> None:
     result = friction_effects(load_design("ilr33-amber-tanh"))
     (threshold,) = [b for b in section(result)["blocks"] if b.get("caption", "").startswith("Threshold")]
@@ -191,21 +201,18 @@ def test_not_applicable_without_dry_friction() -> None:
 
 def extruder(position_s: float | None = None, velocity_s: float | None = None) -> model.Design:
     """A voltage drive whose friction is a map, with integral times of its loops."""
-    control = model.Controller(
-        period_s=2e-4,
-        computing_delay_s=1e-4,
-        velocity=model.VelocityLoop(gain=0.25, integral_time_s=velocity_s),
-        position=model.PositionLoop(gain=25.0, integral_time_s=position_s),
-    )
+    loops = {
+        "velocity": model.VelocityLoop(gain=0.25, integral_time_s=velocity_s),
+        "position": model.PositionLoop(gain=25.0, integral_time_s=position_s),
+    }
     return model.Design(
         name="map",
-        title="",
         motor=changed(MOTOR, resistance_ohm=2.0, inductance_H=3e-4),
         gears=(model.Gear(name="g", ratio=20.0),),
         load=model.Load(inertia_kgm2=0.002, path="self-locking"),
         friction=model.Friction(points=stribeck((0.0, 30e-3), (8.0, 36e-3), (300.0, 60e-3))),
         limits=model.Limits(voltage_V=36.0),
-        controller=control,
+        controller=model.Controller(period_s=2e-4, computing_delay_s=1e-4, **loops),
         validation=model.Validation(full_deflection_rad=math.pi / 4.0, loads_Nm=(0.0,)),
     )
 

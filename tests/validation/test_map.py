@@ -1,25 +1,30 @@
 """The map of large signals: its border against A_k(w), what acts, what the output looks like."""
 
 import math
+from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
-from actuator_lti.design import with_values
+from actuator_lti.design import shipped_designs, with_values
 from actuator_lti.design.model import Command, Design, Friction
+from actuator_lti.errors import NumericalError
 from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.result import ROUNDS, limit_shift
 from analyses.large_signal.tones import (
     LEAST_UPDATES,
+    LEFT_AT_REST,
     PLACES,
     amplitudes,
     linear_steady_state,
     run_tones,
     tone,
+    without_value,
     work_ticks,
 )
 from tests.changed import changed
@@ -142,14 +147,24 @@ def test_a_drive_without_limits_has_no_border_and_an_unstable_loop_has_a_map() -
     assert np.isfinite(mapped(unstable, (6, 4)).response).all()
 
 
+@pytest.mark.parametrize("name", shipped_designs())
+def test_every_state_of_a_shipped_drive_is_known(name: str) -> None:
+    assert not without_value(assemble_loops(name).tick_system.states, PLACES, LEFT_AT_REST)
+
+
 def test_every_start_has_a_state_of_the_linear_drive() -> None:
     """A name that no drive has would be passed over, and the run would begin at rest."""
-    names = {
-        state
-        for name in ("ilr33-amber", "ilr33-amber-multirate")
-        for state in assemble_loops(load_design(name)).tick_system.states
-    }
-    assert set(PLACES) <= names
+    multirate = ("ilr33-amber", "ilr33-amber-multirate")
+    assert set(PLACES) <= {state for name in multirate for state in assemble_loops(name).tick_system.states}
+
+
+def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
+    loops = assemble_loops("ilr33-amber")
+    system = loops.tick_system
+    kept = {name: getattr(system, name) for name in ("outputs", "ticks", "matrices")}
+    strange = SimpleNamespace(states=("flux", *system.states[1:]), **kept)
+    with pytest.raises(NumericalError, match="state flux of the linear drive"):
+        linear_steady_state(replace(loops, tick_system=strange), np.array([10.0]))
 
 
 def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(amber_map, monkeypatch) -> None:

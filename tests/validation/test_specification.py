@@ -40,12 +40,15 @@ def test_the_simulated_rate_is_that_of_the_closed_form(name: str) -> None:
             assert one.simulated_current_A == pytest.approx(one.figures.motor_current_A, rel=1e-6)
 
 
-def test_current_at_top_speed_and_8_Nm(amber: Specification) -> None:
-    """(C0 + CM 8 + Cv 942.5)/kM = 3.037 A, three quarters of the continuous current."""
+def test_current_and_rate_at_8_Nm(amber: Specification) -> None:
+    """(C0 + CM 8 + Cv 942.5)/kM = 3.037 A, three quarters of the continuous current; paper: 22.7 deg/s."""
     loaded = amber.capabilities[1]
-    assert loaded.figures.load_Nm == 8.0
-    assert loaded.simulated_current_A == pytest.approx((2.25e-3 + 8 * 1.34e-3 + 942.5 * 5.25e-6) / 5.9e-3)
+    current = (2.25e-3 + 8 * 1.34e-3 + 942.5 * 5.25e-6) / 5.9e-3
+    assert (loaded.figures.load_Nm, loaded.figures.rate_limit) == (8.0, "speed limit")
+    assert loaded.figures.motor_current_A == pytest.approx(current, rel=1e-12)
+    assert loaded.simulated_current_A == pytest.approx(current)
     assert loaded.current_ratio == pytest.approx(loaded.simulated_current_A / 4.0)
+    assert math.degrees(loaded.figures.output_rate_rad_s) == pytest.approx(22.7, abs=0.05)
     assert loaded.duty == 1.0
 
 
@@ -67,14 +70,12 @@ def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Speci
 def test_step_times(amber: Specification) -> None:
     """A small step takes the linear time; a large one the rate limit: 0.8 A/R from 10 to 90 %."""
     for load in (0.0, 8.0):
-        steps = [one for one in amber.steps if one.load_Nm == load]
+        small, *_, large = steps = [one for one in amber.steps if one.load_Nm == load]
         rises = [one.rise_time_s or 0.0 for one in steps]
         assert rises == sorted(rises)
-        large = steps[-1]
         assert large.fraction == 1.0
         assert large.rise_time_s == pytest.approx(0.8 * large.amplitude_rad / (942.5 / 2376.0), rel=2e-3)
-        assert "speed" in large.limits
-        assert "speed" not in steps[0].limits
+        assert ("speed" in small.limits, "speed" in large.limits) == (False, True)
         assert all(one.settling_time_s is not None for one in steps)
 
 
