@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import inf, isfinite, pi
+from math import inf, isfinite, pi, sqrt
 
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
@@ -42,6 +42,12 @@ def _sampling(design: Design) -> Iterator[str]:
         integral = getattr(design.controller, name).integral_time_s
         if integral is not None and integral < period:
             yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
+    current, resistance = design.controller.current, design.effective_motor.resistance_ohm
+    if current is not None and current.integral_time_s is None and current.law is None and resistance:
+        error = 1.0 / (1.0 + current.gain_V_A / resistance)
+        if error >= 0.1:
+            given = f"gain/R is {1.0 / error - 1.0:.3g}: the current is {100.0 * error:.3g} % short at rest"
+            yield f"control.current.integral_time: not given, and {given}"
     ticks = design.controller.computing_delay_s / design.controller.period_s
     if ticks > 2:
         yield f"control.computing_delay: {ticks:.3g} ticks is unusually long (1 to 2 are common)"
@@ -115,21 +121,15 @@ def _loads(design: Design) -> Iterator[str]:
     if losses is not None and losses.source.startswith(FROM) and design.load.path == "self-locking":
         lost = losses.value * design.total_ratio
         if 0.0 < lost < 2.0:
-            yield (
-                f"load.path: self-locking, which gears of {100 / lost:.3g} % are not (only below 50 %); "
-                'load.path = "back-drivable"?'
-            )
+            gears = f"gears of {100 / lost:.3g} % are not (only below 50 %)"
+            yield f'load.path: self-locking, which {gears}; load.path = "back-drivable"?'
     if design.load.path == "back-drivable" and largest > holding:
-        yield (
-            f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
-            "at its peak current without losses"
-        )
+        most = f"{holding:.3g} {unit} at its peak current without losses"
+        yield f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {most}"
     needed = max(design.friction.dry_Nm(largest, direction) for direction in (1, -1))
     if design.load.path != "back-drivable" and needed > given:
-        yield (
-            f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
-            f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
-        )
+        more = f"its friction at the motor, {needed:.3g} {unit}, is more than the motor gives"
+        yield f"load.moment_max: {largest:g} {unit} holds the drive fast: {more}, {given:.3g} {unit}"
     asked = [("validation.loads", load) for load in design.validation.loads_Nm]
     asked += [(f"requirement.{item.id}.load", item.load_Nm or 0.0) for item in design.requirements]
     for key, load in asked:
@@ -139,20 +139,25 @@ def _loads(design: Design) -> Iterator[str]:
 
 def elastic_warnings(design: Design) -> Iterator[str]:
     """A rigid self-locking drive that cannot lock its load, and a spring that nothing damps."""
-    behind, load = design.load.friction, design.load
-    free = behind is None or not (behind.viscous_Nms_rad or behind.dry_torque_Nm)
-    damped = load.moment_damping_Nms_rad > 0.0
-    if free and design.coupling is not None and design.coupling.damping_Nms_rad == 0.0:
-        yield "coupling.damping: 0, and no load.friction: with the motor at rest the load keeps ringing"
-    elif free and design.coupling is not None and design.coupling.play_rad > 0.0 and not damped:
+    behind, load, coupling = design.load.friction, design.load, design.coupling
+    rubs = behind is not None and behind.dry_torque_Nm > 0.0
+    viscous = behind is not None and behind.viscous_Nms_rad > 0.0
+    free, damped = not (rubs or viscous), load.moment_damping_Nms_rad > 0.0
+    if coupling is not None and not (viscous or damped) and coupling.damping_Nms_rad == 0.0:
+        least = 0.02 * sqrt(coupling.stiffness_Nm_rad * design.load_side_inertia_kgm2)  # 2 zeta sqrt(k J)
+        but = " (its dry friction is in no linear loop)" if rubs else ""
+        yield (
+            "coupling.damping: 0, and no load.friction.viscous: with the motor at rest the load keeps ringing"
+            f"{but}; {least:.3g} in SI units damps it by 1 %"
+        )
+    elif free and coupling is not None and coupling.play_rad > 0.0 and not damped:
         yield "coupling.play: in the gap nothing stops a load without load.friction, it may never rest"
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"
     if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):
-        yield (
-            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
-            'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
-        )
+        held = 'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
+        less = f"{coefficient:g} is less than 1/N = {least:g}"
+        yield f"friction.load_coefficient: {less}: the friction of a {held}"
 
 
 def _pedigree(design: Design) -> Iterator[str]:

@@ -66,30 +66,14 @@ def command_of(design: Design, record: Record, signal: str | None = None) -> Dri
     With ``"voltage"`` the motor is driven by its measured voltage. None where the record holds no command.
     """
     design = record.drive(design)
-    names = command_names(design)
-    if signal is not None:
-        allowed = names | {"voltage": "voltage"}
-        if signal not in allowed:
-            raise InputError(f'command "{signal}": one of {", ".join(allowed)}', where=design.name)
-        return _driven(design, record, signal, allowed[signal])
-    result = next((name for name in names if name in record.signals), None)
-    return None if result is None else _driven(design, record, result, names[result])
-
-
-def needed_command(design: Design, record: Record, signal: str | None = None) -> Driven:
-    """As `command_of`, refused where there is none."""
-    driven = command_of(design, record, signal)
-    if driven is None:
-        first, *others = command_names(design)
-        more = f" (or {', '.join(others)})" if others else ""
-        message = f'no command: the signal "{first}" is needed for a {design.axis} axis{more}'
-        raise InputError(message, where=record.name)
-    return driven
-
-
-def _driven(design: Design, record: Record, signal: str, stage: str) -> Driven:
-    outermost = design.controller.outermost
-    values, notes = record[signal], []
+    names, outermost = command_names(design), design.controller.outermost
+    if signal is None:
+        signal = next((name for name in names if name in record.signals), None)
+        if signal is None:
+            return None
+    elif signal not in (names := names | {"voltage": "voltage"}):
+        raise InputError(f'command "{signal}": one of {", ".join(names)}', where=design.name)
+    values, stage, notes = record[signal], names[signal], []
     if signal == "speed_reference":
         values = values / design.total_ratio
     elif signal in ("torque_reference", "force_reference"):
@@ -105,6 +89,17 @@ def _driven(design: Design, record: Record, signal: str, stage: str) -> Driven:
         design = replace(design, controller=cascade, command=CommandShape())
     values = np.asarray(values, float)
     return Driven(signal=signal, stage=stage, values=values, design=design, notes=tuple(notes))
+
+
+def needed_command(design: Design, record: Record, signal: str | None = None) -> Driven:
+    """As `command_of`, refused where there is none."""
+    driven = command_of(design, record, signal)
+    if driven is None:
+        first, *others = command_names(design)
+        more = f" (or {', '.join(others)})" if others else ""
+        message = f'no command: the signal "{first}" is needed for a {design.axis} axis{more}'
+        raise InputError(message, where=record.name)
+    return driven
 
 
 def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
@@ -128,26 +123,20 @@ def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[Flo
 
 
 def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
-    """A smooth curve through samples; before the first and after the last it stands still.
-
-    A cubic spline or a modified Akima curve: the one which, through every other sample, comes nearer to those
-    between.
-    """
+    """A spline or Akima's curve, which misses every other sample less; beyond the ends it stands still."""
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
     inside = np.clip(at_s, time_s[0], time_s[-1])
     if len(values) < 3 or np.ptp(values) == 0.0:
         return np.interp(inside, time_s, values)
-
-    curves = (partial(Akima1DInterpolator, method="makima"), CubicSpline)
-    if len(values) < LEAST_FOR_A_SPLINE:
-        return np.asarray(curves[0](time_s, values)(inside), dtype=np.float64)
+    akima = partial(Akima1DInterpolator, method="makima")
+    between = slice(1, len(values) - 1 + len(values) % 2, 2)
 
     def missed(curve: Callable[..., Callable[[FloatArray], FloatArray]]) -> float:
-        between = slice(1, len(values) - 1 + len(values) % 2, 2)
         return float(np.linalg.norm(curve(time_s[::2], values[::2])(time_s[between]) - values[between]))
 
-    return np.asarray(min(curves, key=missed)(time_s, values)(inside), dtype=np.float64)
+    curve = akima if len(values) < LEAST_FOR_A_SPLINE else min((akima, CubicSpline), key=missed)
+    return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
 def steps_of(values: FloatArray) -> BoolArray:

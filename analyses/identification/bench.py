@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
-from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
@@ -32,7 +32,6 @@ from analyses.identification.to_design import (
     INERTIAS,
     design_with_fit,
     joint_values,
-    with_fixed,
     with_structure,
 )
 from analyses.records.consistency import Finding, check_record
@@ -88,7 +87,7 @@ def identify_bench(
     settings = Settings() if settings is None else settings
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
     names = ", ".join(record.name for record in records)
-    start, electrical = with_fixed(design, fixed_values(design, settings.fix)), None
+    start, electrical = with_values(design, fixed_values(design, settings.fix)), None
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     usual = cutoff is None and decimation is None
     recipe = None if usual else recipe_for(used[0], cutoff, decimation)

@@ -20,7 +20,6 @@ from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, default_value
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, electrical_parts
-from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
 NO_CHANCE = 1e-3
@@ -153,12 +152,6 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     level, _, factor, error = max(fitting)
     alike = " or ".join(words for other, words, *_ in fitting if other > level - 1e-9)
     return alike, exp(factor), error * exp(factor)
-
-
-def told(words: str, factor: float, error: float) -> str:
-    """A cause in words."""
-    found = f"a factor {factor:.3g} (standard error {error:.1g})"
-    return with_factor(f"identified values are off as by {found} in {words}", factor)
 
 
 STEP = 0.1

@@ -137,12 +137,7 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
 
 
 def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], FloatArray]:
-    """Whether all torques change their scale along a record, and what that adds to the covariance.
-
-    The noise (what the simulated record leaves is taken off) over the modelled torque times the time (-1 at
-    the begin, 1 at the end) and over that time alone, beside the model's own columns. A value that drifts by
-    +-d about its mean is uniform in that.
-    """
+    """Whether scale or offset of all torques drifts (-1 to 1) along a record, and adds to the covariance."""
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
     table = np.column_stack([w, time * (w @ model.values), time])

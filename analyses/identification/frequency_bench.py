@@ -14,24 +14,13 @@ from actuator_lti.errors import InputError, NumericalError
 from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
+from analyses.identification import two_mass
 from analyses.identification.asked import held_by_name
 from analyses.identification.play import Play, play_of
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import design_with_fit
-from analyses.identification.two_mass import (
-    FLOORS,
-    NAMES,
-    Lines,
-    TwoMass,
-    angle_responses,
-    excited_lines,
-    fit_two_mass,
-    other_starts,
-    period_of_excitation,
-    response,
-    start_of,
-)
+from analyses.identification.two_mass import Lines, TwoMass
 from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, inputs_item, simulated_item
 from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
@@ -94,7 +83,7 @@ def identify_frequency(
     if back_emf:
         raise InputError("a frequency response needs the current, not the voltage", where=record.name)
     command = next((name for name in COMMANDS if name in record.signals), "current")
-    period = period_of_excitation(record, command) if period_s is None else period_s
+    period = two_mass.period_of_excitation(record, command) if period_s is None else period_s
     signals, used = {**record.signals, "torque_at_motor": torque}, {source: f"drive: {told}"}
     names = ["torque_at_motor", "angle"]
     if "output_angle" in record.signals:
@@ -102,7 +91,7 @@ def identify_frequency(
         signals["load_angle"] = design.ratio_behind_coupling * record["output_angle"]
         used["output_angle"] = "load's angle"
     used |= {"angle": "motor angle", command: used.get(command, "its period")}
-    lines = excited_lines(replace(record, signals=signals), tuple(names), period)
+    lines = two_mass.excited_lines(replace(record, signals=signals), tuple(names), period)
     lines = _between_ticks(design, record, lines)
     reaction = _reaction(design, torque, record["angle"])
     fit = _fitted(lines, design.ratio_to_coupling, _held(design, dict(fixed or {})), reaction)
@@ -151,10 +140,7 @@ def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
 
 
 def _reaction(design: Design, torque: FloatArray, angle: FloatArray) -> float:
-    """Torque on the motor by that in the coupling: 1/N_c, and the friction that grows with it.
-
-    ``CM N_r`` with the sign of the power to the load: by mean speed and current, the flank of the record.
-    """
+    """Torque on the motor by that in the coupling: 1/N_c, and CM N_r by the sign of the power to the load."""
     turned = float(angle[-1] - angle[0])
     side = np.sign(float(np.mean(torque)) * turned) if abs(turned) > 1.0 else 0.0
     own = design.friction.load_coefficient * design.ratio_behind_coupling
@@ -162,25 +148,21 @@ def _reaction(design: Design, torque: FloatArray, angle: FloatArray) -> float:
 
 
 def _fitted(lines: Lines, reduction: float, held: Mapping[str, float], reaction: float) -> TwoMass:
-    """The fit; a damping or friction that comes out negative is held at zero, the errors stay those without.
-
-    One that is merely small against its error stays: held at zero, its part would go into the others, beyond
-    their errors.
-    """
-    start = {**start_of(lines, reduction), **held}
-    fit = fit_two_mass(lines, start, reduction, fixed=held, reaction=reaction)
-    for other in other_starts(start, lines, reduction):
+    """The fit; a damping or friction that comes out negative (not merely small) is held at zero."""
+    start = {**two_mass.start_of(lines, reduction), **held}
+    fit = two_mass.fit_two_mass(lines, start, reduction, fixed=held, reaction=reaction)
+    for other in two_mass.other_starts(start, lines, reduction):
         if fit.misfit <= MISFIT_DOUBTED:
             break
         with suppress(NumericalError, np.linalg.LinAlgError):
-            tried = fit_two_mass(lines, {**other, **held}, reduction, fixed=held, reaction=reaction)
+            tried = two_mass.fit_two_mass(lines, {**other, **held}, reduction, fixed=held, reaction=reaction)
             fit = min(fit, tried, key=lambda one: one.misfit)
     return _held_at_zero(fit)
 
 
 def _held_at_zero(fit: TwoMass) -> TwoMass:
     """The fit where what came out negative is zero: the rest moves as its covariance with that has it."""
-    below = [name for name in FLOORS if name in fit.names and fit[name] < 0.0]
+    below = [name for name in two_mass.FLOORS if name in fit.names and fit[name] < 0.0]
     if not below:
         return fit
     gone = [fit.names.index(name) for name in below]
@@ -195,7 +177,7 @@ def _held_at_zero(fit: TwoMass) -> TwoMass:
 
 def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
     """Values of the design's keys by the names of the fit, at the motor and at the coupling."""
-    held = held_by_name(fixed, NAMES)
+    held = held_by_name(fixed, two_mass.NAMES)
     if "motor_inertia" in held:
         held["motor_inertia"] += design.motor_side_inertia_kgm2 - design.motor.rotor_inertia_kgm2
     if "load_inertia" in held:
@@ -211,9 +193,9 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
     inertias = written.motor_side_inertia_kgm2, written.load_side_inertia_kgm2
     own = (*inertias, coupling.stiffness_Nm_rad, coupling.damping_Nms_rad)
     values = (*own, written.friction.viscous_Nms_rad, friction.viscous_Nms_rad)
-    named = dict(zip(NAMES, values, strict=True))
-    model, _ = angle_responses(lines.omega_rad_s, named, written.ratio_to_coupling, reaction)
-    measured, relative = response(lines)
+    named = dict(zip(two_mass.NAMES, values, strict=True))
+    model, _ = two_mass.angle_responses(lines.omega_rad_s, named, written.ratio_to_coupling, reaction)
+    measured, relative = two_mass.response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)
     error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))
     return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")

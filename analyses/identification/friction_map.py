@@ -42,37 +42,33 @@ def fit_map(
     plain = fitted(None)
     clear = [_away_from_reversals(part) for part in plain.records]
     speed, rest = (np.concatenate(parts) for parts in zip(*clear, strict=True))
-    top = float(np.max(np.abs(speed)))
-    n = len(rest) / correlation_time(plain.residual)
+    top, n = float(np.max(np.abs(speed))), len(rest) / correlation_time(plain.residual)
     breaks: tuple[float, ...] = ()
-    models, laws = [plain], [_law((), plain, 0.0)]
+    models, laws = [plain], [_law((), plain, n)]
     for count in range(1, MOST_BREAKS + 1):
         breaks = _one_more(speed, rest, top, breaks)
         if len(breaks) < count:
             break
         models.append(fitted((0.0, *breaks, top)))
-        laws.append(_law(breaks, models[-1], _bic(models[-1], n) - _bic(plain, n)))
+        laws.append(_law(breaks, models[-1], n))
+    laws = [replace(law, criterion=law.criterion - laws[0].criterion) for law in laws]
     best = min(range(len(laws)), key=lambda k: laws[k].criterion + (CLEARLY_BETTER if k else 0.0))
     laws[best] = replace(laws[best], taken=True)
     return replace(models[best], laws=tuple(laws))
 
 
-def _law(breaks: tuple[float, ...], model: JointModel, gain: float) -> LawChoice:
+def _law(breaks: tuple[float, ...], model: JointModel, independent: float) -> LawChoice:
+    """A law and its Bayesian criterion; break points count as parameters."""
+    square, count = float(np.mean(model.residual**2)), len(model.names)
+    counted = count + max(sum(name.startswith("map_") for name in model.names) - 2, 0)
     return LawChoice(
         name=f"map, {len(breaks)} break points" if breaks else "plain, C0 + Cv |w|",
         breaks_rad_s=breaks,
-        parameters=len(model.names) + len(breaks),
+        parameters=count + len(breaks),
         relative_residual=model.relative_residual,
-        criterion=gain,
+        criterion=independent * float(np.log(square)) + counted * float(np.log(independent)),
         taken=False,
     )
-
-
-def _bic(model: JointModel, independent: float) -> float:
-    """The Bayesian criterion; break points count as parameters."""
-    breaks = max(sum(name.startswith("map_") for name in model.names) - 2, 0)
-    square = float(np.mean(model.residual**2))
-    return independent * float(np.log(square)) + (len(model.names) + breaks) * float(np.log(independent))
 
 
 def _away_from_reversals(part: RecordFit) -> tuple[FloatArray, FloatArray]:

@@ -72,17 +72,14 @@ def _of_load(design: Design, load: Motion) -> FloatArray:
 def _measured(
     design: Design, record: Record, followed: Motion, moment: FloatArray, recipe: Recipe
 ) -> Motion | None:
-    """The load's motion by the output's encoder; None without one, or where its noise is too large.
-
-    White noise of rms s over the Nyquist band leaves ``s (2 pi f)^2 sqrt(2 f T/5)`` on the acceleration below
-    the cut-off f.
-    """
+    """The load's motion by the output's encoder; None without one, or where its noise is too large."""
     if "output_angle" not in record.signals:
         return None
     behind, cutoff = design.ratio_behind_coupling, recipe.cutoff_hz
     angle = behind * record["output_angle"]
     made = recipe.motion(angle, record.period_s)
     noise = float(np.std(angle - made.position))
+    # white noise of rms s over the Nyquist band leaves s (2 pi f)^2 sqrt(2 f T/5) of acceleration below f
     rough = noise * (2.0 * np.pi * cutoff) ** 2 * np.sqrt(0.4 * cutoff * record.period_s)
     carried = float(np.std(_of_load(design, followed) - moment / behind))
     return made if design.load_side_inertia_kgm2 * rough < NOISE_SHARE * carried else None

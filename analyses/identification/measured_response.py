@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
-from actuator_lti.design import parameter_value, paths_of, read_design_text, write_design
+from actuator_lti.design import parameter_value, paths_of, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
@@ -22,7 +22,7 @@ from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.asked import Of
 from analyses.identification.output_error import fit_output
-from analyses.identification.to_design import design_with_fit, with_fixed
+from analyses.identification.to_design import design_with_fit
 from analyses.identification.verdict import Identified, Item, simulated_item
 
 KEYS = (
@@ -96,7 +96,7 @@ def identify_response(
         If the response cannot be read, the design has no such loop, or nothing is determined.
     """
     measured = read_response(source)
-    start = with_fixed(design, dict(fixed or {}))
+    start = with_values(design, dict(fixed or {}))
     model = _model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)

@@ -133,7 +133,7 @@ def plan_motions(
         segments=tuple(chosen),
         expected=Fit(names=names, values=values, covariance=covariance),
         half_widths=dict(zip(names, (within * np.sqrt(np.diag(covariance)) / size).tolist(), strict=True)),
-        time_s=_times(len(command)),
+        time_s=PERIOD_S * np.arange(len(command), dtype=np.float64),
         command=command,
     )
 
@@ -156,7 +156,7 @@ def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: Flo
 
 def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Record]:
     """The motion as large as deflection, speed and every other limit allow, and its simulated record."""
-    time = _times(round(SEGMENT_S / PERIOD_S))
+    time = PERIOD_S * np.arange(round(SEGMENT_S / PERIOD_S), dtype=np.float64)
     edge = np.minimum(np.minimum(time, time[-1] - time) / RISE_S, 1.0)
     turn = 2.0 * np.pi * cycles / SEGMENT_S * time
     wave = sum(size * np.sin(k * turn) for k, size in SHAPES[shape]) * np.sin(0.5 * np.pi * edge) ** 2
@@ -167,13 +167,8 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Recor
     wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
     blank = dict.fromkeys((place, name), np.zeros(len(time)))
     for _ in range(24):
-        bare = Record(
-            name="plan",
-            time_s=time,
-            signals={wanted: amplitude * wave, **blank},
-            units={},
-            counts=RowCounts(),
-        )
+        asked = {wanted: amplitude * wave, **blank}
+        bare = Record(name="plan", time_s=time, signals=asked, units={}, counts=RowCounts())
         signals, limits = model_signals(design, bare, blank)
         drive = signals[name]
         cool = float(np.sqrt(np.mean(drive**2))) <= USED * own.continuous_current_A
@@ -182,10 +177,6 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Recor
             return amplitude * wave, replace(bare, signals={**bare.signals, **signals})
         amplitude *= USED
     raise InputError(f"no motion of {cycles / SEGMENT_S:g} Hz stays off the drive's limits", design.name)
-
-
-def _times(count: int) -> FloatArray:
-    return np.asarray(PERIOD_S * np.arange(count), dtype=np.float64)
 
 
 def _drive(design: Design) -> str:

@@ -70,12 +70,7 @@ def play_of(design: Design, record: Record, fit: TwoMass) -> Play:
 
 
 def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str, float]) -> Play:
-    """Fit ``twist = middle + b sgn(T) + T/k`` to the rows in contact, with ``T = inertial + friction``.
-
-    ``inertial`` is what the load's inertia (less its outer load and the coupling's damping) needs. The load's
-    friction, ``Cv_l W + C0_l sgn(W)``, is found along with the play where the rows tell it; which rows are
-    in contact follows from the torque so found, in rounds.
-    """
+    """Fit ``twist = middle + b sgn(T) + T/k`` in contact, ``T`` by the load's inertia and friction."""
     behind, period, k = design.ratio_behind_coupling, record.period_s, values["stiffness"]
     cutoff = min(0.05 / period, 4.0 * fit.resonance_rad_s[0] / (2.0 * np.pi))
     motor = filtered_motion(record["angle"], period, cutoff_hz=cutoff, order=4)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from actuator_lti.design import read_design_text, write_design
+from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
@@ -22,7 +22,7 @@ from analyses.identification.frequency_bench import FrequencyResult, identify_fr
 from analyses.identification.measured_response import ResponseResult, identify_response
 from analyses.identification.plan import Plan, plan_motions
 from analyses.identification.surface import NAMES, Contribution, contributions
-from analyses.identification.to_design import design_with_fit, with_fixed
+from analyses.identification.to_design import design_with_fit
 from analyses.identification.verdict import Identified
 from analyses.records.campaign_file import load_campaign
 from analyses.records.campaign_import import import_campaign
@@ -78,19 +78,20 @@ def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
 
 
 def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:
-    listed = load_campaign(asked.files[0])
-    fixed = fixed_values(design, asked.fix)
-    held = held_by_name(fixed, NAMES)
-    imported = import_campaign(listed, progress=progress)
+    listed, fixed = load_campaign(asked.files[0]), fixed_values(design, asked.fix)
+    held, imported = held_by_name(fixed, NAMES), import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)
     fit, count = result.fit, asked.suggest
     source = f"identified from {len(fit.points)} runs, {listed.name}"
-    made = design_with_fit(with_fixed(design, fixed), fit.by_key(), source)
+    made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
     simulated = steady_current_error(written, fit.points, progress=progress)
     load, speed = design.load.moment_max_Nm, design.limits.speed_rad_s
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
+    suggestion = None
+    if count and not fit.fixed:
+        suggestion = suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
     return CampaignAnswer(
         design=made,
         items=campaign_items(design, result, simulated, asked.residual_limit / 100.0),
@@ -98,7 +99,5 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
         shares=contributions(fit.values, fit.covariance, load_Nm=load, speed_rad_s=speed),
         load_Nm=load,
         speed_rad_s=speed,
-        suggestion=suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
-        if count and not fit.fixed
-        else None,
+        suggestion=suggestion,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -97,11 +97,6 @@ def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, f
             where=design.origin or design.name,
         )
     return left, scale
-
-
-def with_fixed(design: Design, asked: Mapping[str, float]) -> Design:
-    """The design with the values that were asked to be held, by key."""
-    return with_values(design, dict(asked)) if asked else design
 
 
 def design_with_fit(design: Design, fit: Fit, source: str) -> Design:

@@ -13,7 +13,7 @@ from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
-from analyses.identification.design_values import NO_CHANCE, DesignValue, cause, told
+from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
 from analyses.identification.diagnosis import Followed
 from analyses.records.consistency import RATE_TOLERANCE, Finding
 from analyses.records.factors import with_factor
@@ -112,8 +112,11 @@ def size_item(design: Design, values: Sequence[DesignValue], *, kept_constants: 
     ``kept_constants``: torques are the current times the design's own constant; ``loaded``: a record holds
     the load.
     """
-    explained = cause(values)
-    reasons = [told(*explained)] if explained else []
+    reasons = []
+    if explained := cause(values):
+        words, factor, error = explained
+        told = f"a factor {factor:.3g} (standard error {error:.1g}) in {words}"
+        reasons.append(with_factor(f"identified values are off as by {told}", factor))
     feels = design.friction.load_coefficient > 0.0 and not loaded
     for one in values:
         kind = one.name.partition("_")[0]

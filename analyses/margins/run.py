@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
@@ -25,19 +25,20 @@ from analyses.specification.weakest import Spread, spread
 
 @dataclass(frozen=True, kw_only=True)
 class Measured:
-    """A measured open loop and the model's at the same frequencies."""
+    """A measured response of a loop and the model's at the same frequencies: L, T or S as it was measured."""
 
     # The file; which loop; L, T or S that was measured
     name: str
     loop: str
     of: str
     frequency_hz: FloatArray
-    # Open loops
     measured: np.ndarray
     model: np.ndarray
     radius: FloatArray  # of the circle about each measured value that holds the true one in 99 % of all cases
     source: str  # where the radius comes from
-    # Of the measured loop, each with its range; None where the points are too coarse, see ``note``
+    open_loop: MeasuredResponse  # the measured L: itself, T/(1 - T) or 1/S - 1
+    open_model: np.ndarray
+    # Of the measured open loop, each with its range; None where the points are too coarse, see ``note``
     margins: StabilityMargins | None
     note: str
     beyond: int  # points above half the sampling frequency, left out
@@ -77,15 +78,13 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
 
     Raises `InputError`: for a file that is no response, or a loop that is not there.
     """
-    import control
-
     every = {**loops.break_points, **loops.present}
     name, _, of = place.partition(":")
     name, of = name or list(loops.present)[-1], of or "L"
     if name not in every or of not in ("L", "T", "S"):
         allowed = f"{', '.join(every)}, each with :T (closed loop) or :S (sensitivity) behind it, or without"
         raise InputError(f"--response-of {place}: allowed: {allowed}")
-    loop, read = every[name], read_response(source, averages).as_loop(cast("Kind", of))
+    loop, read = every[name], read_response(source, averages)
     below = np.full(read.frequency_hz.size, True)
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
@@ -93,25 +92,37 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         raise InputError(
             f"{read.name}: no two frequencies below half that of the sampling of the {name} loop"
         )
-    omega, L = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
+    omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
-    data = MeasuredResponse(omega, L, np.zeros(omega.size), loop.period_s, "")
-    sigma, known = np.abs(L) * read.deviation[below], np.isfinite(read.deviation[below]).all()
-    if known:
-        data = MeasuredResponse.with_noise(data, sigma)
-    else:  # with the noise that the scatter of the points about their neighbours tells
-        data = measured_response(control.FrequencyResponseData(data.frdata, data.omega, dt=data.dt))
+    found = _with_spread(omega, values, read.deviation[below], loop.period_s)
+    spread_of = np.divide(found.radius, np.abs(values), out=np.zeros(omega.size), where=values != 0.0)
+    opened = replace(read, response=values, deviation=spread_of).as_loop(cast("Kind", of))
+    radius = np.abs(opened.response) * opened.deviation
+    data = MeasuredResponse(omega, opened.response, radius, loop.period_s, found.source)
+    L = np.asarray(loop.plain_open(points)).reshape(-1)
     margins, note = None, ""
     try:
         margins = stability_margins(data)
     except InputError as error:
         note = error.message
     return Measured(
-        name=read.name, loop=name, of=of, frequency_hz=omega / (2.0 * np.pi), measured=L,
-        model=np.asarray(loop.plain_open(points)).reshape(-1),
-        radius=np.asarray(data.radius, dtype=np.float64), source=data.source,
+        name=read.name, loop=name, of=of, frequency_hz=omega / (2.0 * np.pi), measured=values,
+        model={"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[of], open_loop=data, open_model=L,
+        radius=np.asarray(found.radius, dtype=np.float64), source=found.source,
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,
     )  # fmt: skip
+
+
+def _with_spread(
+    omega: FloatArray, values: np.ndarray, deviation: FloatArray, period_s: float | None
+) -> MeasuredResponse:
+    """What was measured with its noise: as it is known, else as the points scatter about their neighbours."""
+    data = MeasuredResponse(omega, values, np.zeros(omega.size), period_s, "")
+    if np.isfinite(deviation).all():
+        return MeasuredResponse.with_noise(data, np.abs(values) * deviation)
+    from control import FrequencyResponseData
+
+    return measured_response(FrequencyResponseData(data.frdata, data.omega, dt=data.dt))
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,20 +24,8 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
 from analyses.finite import finite
-from analyses.monte_carlo.judging import (
-    BLOCK,
-    Reducing,
-    Reduction,
-    Tally,
-    by_loop,
-    in_populations,
-    judge,
-    judged,
-    label,
-    reduced,
-    source_columns,
-    unpacked,
-)
+from analyses.monte_carlo import judging
+from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
 from analyses.monte_carlo.result import (
     MOST,
     Driver,
@@ -135,16 +123,17 @@ def monte_carlo(
     if settings.samples <= KEPT:
         engine.map(task, store.missing(settings.samples), store.write, progress, SIZE)
         blocks = store.blocks(settings.samples)
-        whole = functools.reduce(Reduction.merged, (reduced(task, block) for block in blocks), Reduction())
+        parts = (judging.reduced(task, block) for block in blocks)
+        whole = functools.reduce(Reduction.merged, parts, Reduction())
     else:
         whole = _reduced(task, store, settings.samples, engine, progress)
     nominal = task.figures(sampler.nominal[None, :])
-    tallies = list(zip(judged(design), whole.tallies, strict=True))
+    tallies = list(zip(judging.judged(design), whole.tallies, strict=True))
     odds = [
         _odds(
-            r.id, label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
-            nominal=float(judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
-            worst_sample=tally.worst[0][1], columns=source_columns(r, design),
+            r.id, judging.label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
+            nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
+            worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),
         )
         for r, tally in tallies
     ]  # fmt: skip
@@ -185,7 +174,7 @@ def _reduced(
 ) -> Reduction:
     """Reduce the samples where they are computed; what is done is noted every `NOTED_S` and at the end."""
     path = store.folder / f"reduced-{samples}.json.zlib"
-    whole, done = unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
+    whole, done = judging.unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
     noted = time.monotonic()
 
     def take(chunk: Chunk, part: Reduction) -> None:
@@ -200,7 +189,7 @@ def _reduced(
     parts = [(first, min(part, samples - first)) for first in range(0, samples, part)]
     known = set(done)
     try:
-        engine.map(Reducing(task), [one for one in parts if one not in known], take, progress, SIZE)
+        engine.map(judging.Reducing(task), [one for one in parts if one not in known], take, progress, SIZE)
     finally:
         if done:
             store.put(path, whole.packed(done))
@@ -245,6 +234,6 @@ def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
             id=r.id, requirement=r, loop=r.loop, verdict=Verdict.NOT_PROVEN, waiver=design.waiver_of(r.id),
             reason="not sampled, it takes a computation of one design",
         )
-        for r in by_loop(design)
-        if not in_populations(r, design)
+        for r in judging.by_loop(design)
+        if not judging.in_populations(r, design)
     )  # fmt: skip

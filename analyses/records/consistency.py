@@ -45,7 +45,7 @@ FOLLOWED = (
 )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Finding:
     """One thing that was looked at: what, whether it agrees (None: not determined), and in words."""
 
@@ -111,14 +111,15 @@ def _ratio(y: FloatArray, x: FloatArray) -> tuple[float, float]:
     return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class RateRatio:
     """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves.
 
-    ``found`` is the ratio, ``alike`` the cosine; ``low`` and ``high`` hold it with noise in either (Frisch's
-    bounds: regressed one on the other and the other on the one, each with its error).
+    ``place`` is the position's signal, ``found`` the ratio, ``alike`` the cosine; ``low`` and ``high`` hold
+    it with noise in either (Frisch's bounds: regressed each on the other, with the error of each).
     """
 
+    place: str
     found: float
     alike: float
     low: float
@@ -153,7 +154,7 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
         between = sum(abs(_ratio(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
         low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
         low, high = low - between, high + between
-    return RateRatio(found=found, alike=alike, low=low, high=high, rate=rate, moves=moves)
+    return RateRatio(place[0], found, alike, low, high, rate, moves)
 
 
 def _thinned(record: Record, values: FloatArray) -> FloatArray:
@@ -182,30 +183,27 @@ def _bounds(y: FloatArray, x: FloatArray, beside_x: FloatArray, beside_y: FloatA
 
 
 def _rate(design: Design, record: Record) -> Finding | None:
-    ratio, place = rate_ratio(design, record), place_of(design, record)
-    if ratio is None or place is None:
+    ratio, name = rate_ratio(design, record), _rate_name(design)
+    if ratio is None:
         return None
-    name = _rate_name(design)
-    subject = f"{name} against the rate of the {place[0]}"
+    subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
     if abs(ratio.alike) < ALIKE:
         other = _other(record, name, ratio.rate, ratio.moves)
-        told = f"they are not alike (cosine {ratio.alike:.2f}){other}"
-        return Finding(subject=subject, passed=False, text=told)
-    said = f"the {name} is {ratio.found:.4g} times the rate of the {place[0]}"
-    if not ratio.doubt and abs(ratio.found - 1.0) <= 0.5:
-        return Finding(subject=subject, passed=True, text=f"{said}: one clock, one scale")
-    clock = f"{said}: a clock {100.0 * (ratio.found - 1.0):+.2g} % off, or the scale of one of them"
-    if abs(ratio.found - 1.0) <= RATE_TOLERANCE:
-        told = f"{clock}, beyond their noise ({ratio.low:.4f} to {ratio.high:.4f}): the intervals hold it"
-        return Finding(subject=subject, passed=None, text=told)
+        return Finding(subject, False, f"they are not alike (cosine {ratio.alike:.2f}){other}")
+    said = f"the {name} is {ratio.found:.4g} times the rate of the {ratio.place}"
+    if not ratio.doubt and abs(off) <= 0.5:
+        return Finding(subject, True, f"{said}: one clock, one scale")
+    clock = f"{said}: a clock {100.0 * off:+.2g} % off, or the scale of one of them"
+    if abs(off) <= RATE_TOLERANCE:
+        noise = f"beyond their noise ({ratio.low:.4f} to {ratio.high:.4f})"
+        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it")
     named = with_factor(said, ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-    return Finding(subject=subject, passed=False, text=clock if named == said else named)
+    return Finding(subject, False, clock if named == said else named)
 
 
 def clock_doubt(design: Design, record: Record) -> float:
     """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
-    rate = rate_ratio(design, record)
-    if rate is not None:
+    if (rate := rate_ratio(design, record)) is not None:
         return rate.doubt
     ticks = record.period_s / design.controller.period_s
     off = ticks / max(round(ticks), 1) - 1.0
@@ -223,10 +221,9 @@ def _clock(design: Design, record: Record) -> Finding | None:
     subject = "sampling period against the drive's tick"
     if off <= TICK_TOLERANCE * ticks:
         whole = f"{round(ticks)} ticks; a clock that is off by a whole number of them is not seen here"
-        return Finding(subject=subject, passed=True, text=whole)
+        return Finding(subject, True, whole)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
-    text += ": the intervals hold it" if clock_doubt(design, record) else ""
-    return Finding(subject=subject, passed=None, text=text)
+    return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
 
 
 def _steps(design: Design, record: Record) -> Finding | None:
@@ -249,9 +246,8 @@ def _steps(design: Design, record: Record) -> Finding | None:
         alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
         noise = 1.4826 * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
         alike &= (STEADY * size > count) & (0.5 * size > SURE * noise)
-        return np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike), int(
-            np.count_nonzero(alike)
-        )
+        share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike)
+        return share, int(np.count_nonzero(alike))
 
     missing, places = times_its_neighbours(2, [0, 1, 3, 4])
     filled, _ = times_its_neighbours(3, [0, 1, 4, 5])
@@ -263,7 +259,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
     told += [f"{copied} rows repeat the one before"] if copied else []
     words = f"{' and '.join(told) or 'none is of two rows'}, of {places} places where the motion tells"
     words += ": take the record again, or give the times at which rows were taken" if told else ""
-    return Finding(subject=f"steps of the {place[0]} from row to row", passed=not told, text=words)
+    return Finding(f"steps of the {place[0]} from row to row", not told, words)
 
 
 def _other(record: Record, name: str, rate: FloatArray, moves: BoolArray) -> str:
@@ -285,12 +281,12 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     ratio, alike = _ratio(a, design.total_ratio * b)
     subject = "angle against output angle"
     if abs(alike) < ALIKE:
-        return Finding(subject=subject, passed=False, text="they are not alike")
+        return Finding(subject, False, "they are not alike")
     passed = abs(ratio - 1.0) <= RATE_TOLERANCE + _twist_share(design, record)
     text = f"the motor angle is {ratio:.4g} times the output angle and the reduction"
     if not passed:
         text = with_factor(text, ratio, {design.total_ratio: "the reduction, counted twice"})
-    return Finding(subject=subject, passed=passed, text=text)
+    return Finding(subject, passed, text)
 
 
 def _twist_share(design: Design, record: Record) -> float:
@@ -317,13 +313,10 @@ def electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, f
     """
     motor = design.effective_motor
     ohm, back = motor.resistance_ohm, motor.back_emf_constant_Vs_rad
-    place = place_of(design, record)
-    if ohm is None or back is None or not {"voltage", "current"} <= set(record.signals):
-        return {}
-    speed = record.signals.get("speed")
+    speed, place = record.signals.get("speed"), place_of(design, record)
     if speed is None and place is not None:
         speed = np.gradient(place[1], record.time_s)
-    if speed is None:
+    if ohm is None or back is None or speed is None or not {"voltage", "current"} <= record.signals.keys():
         return {}
     u, i, w = (_smooth(record, values) for values in (record["voltage"], record["current"], speed))
     if motor.inductance_H is not None:  # of a direct drive as large as the rest
@@ -346,7 +339,7 @@ def _electrical(design: Design, record: Record) -> Finding | None:
         return None
     each, words = zip(*told, strict=True)
     passed = False if False in each else None if None in each else True
-    return Finding(subject="voltage against R i + kE w", passed=passed, text="; ".join(words))
+    return Finding("voltage against R i + kE w", passed, "; ".join(words))
 
 
 def resistance_doubt(design: Design, record: Record) -> float:
@@ -394,11 +387,11 @@ def _command(design: Design, record: Record) -> Finding | None:
         ratio, alike = _ratio(a, b)
         subject = f"{answer} against its command"
         if abs(alike) < 0.7:
-            return Finding(subject=subject, passed=None, text=f"cosine {alike:.2f}: not followed")
+            return Finding(subject, None, f"cosine {alike:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
         wrong = factor is not None and not 0.5 < ratio < 1.5
-        text = f"{answer} is {ratio:.4g} times {command}" + (f": factor {factor}" if wrong else "")
-        return Finding(subject=subject, passed=not wrong, text=text)
+        text = f"{answer} is {ratio:.4g} times {command}" + f": factor {factor}" * wrong
+        return Finding(subject, not wrong, text)
     return None
 
 
@@ -412,7 +405,7 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     if not passed:
         factor = explaining(result / limit, unit)
         text += f", {result / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
-    return Finding(subject=subject, passed=passed, text=text)
+    return Finding(subject, passed, text)
 
 
 def _supply(design: Design, record: Record) -> Finding | None:
@@ -421,7 +414,7 @@ def _supply(design: Design, record: Record) -> Finding | None:
     level, nominal = float(np.median(record["supply"])), design.limits.voltage_V
     ratio = level / nominal if isfinite(nominal) else 1.0
     passed, text = 0.4 < ratio < 1.6, f"supply {level:.4g} V, the design's {nominal:.4g} V"
-    return Finding(subject="supply", passed=passed, text=text if passed else with_factor(text, ratio))
+    return Finding("supply", passed, text if passed else with_factor(text, ratio))
 
 
 def _limits(design: Design, record: Record) -> Iterator[Finding | None]:

@@ -42,7 +42,7 @@ BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the ci
 DB = 20.0 / np.log(10.0)  # of a relative change
 ROUNDING = 1e-12  # of the norm of A, that an eigenvalue is computed with
 NEWTON_STEPS = 25
-NEAR, LEAST_ANGLE = 1e-6, 1e-12  # of an angle: a step beside it; that of z = 1
+LEAST_ANGLE = 1e-12  # that of z = 1
 MOST_LOG = 70.0  # of a gain
 
 
@@ -184,18 +184,25 @@ class _Crossing:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
     """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
+    from scipy.linalg import eig
+
     if angle < LEAST_ANGLE:
         return _crossing_at_rest(t, gain)
 
-    def at(turned: float) -> complex:
-        values = np.linalg.eigvals(t.lifted(np.exp(1j * turned)))
-        gains = 1.0 - 1.0 / values[values != 0.0]
-        return complex(gains[int(np.argmin(np.abs(gains - gain)))]) if gains.size else complex(np.nan)
+    def at(turned: float) -> tuple[complex, complex]:
+        """The gain nearest to the one asked, and its slope over the angle."""
+        z = complex(np.exp(1j * turned))
+        whole, slope = t.lifted(z)
+        values, left, right = eig(whole, left=True)
+        gains = 1.0 - 1.0 / np.where(values == 0.0, np.nan, values)
+        if np.isnan(gains).all():
+            return complex(np.nan), complex(np.nan)
+        k = int(np.nanargmin(np.abs(gains - gain)))
+        x, y = right[:, k], left[:, k].conj()
+        return complex(gains[k]), complex(1j * z * (y @ slope @ x) / (y @ x) / values[k] ** 2)
 
-    step = NEAR * min(angle, 1.0)
     for _ in range(NEWTON_STEPS):
-        now = at(angle)
-        slope = (now - at(angle - step)) / step
+        now, slope = at(angle)
         if abs(angle - pi) < LEAST_ANGLE or slope.imag == 0.0 or not np.isfinite(slope):
             break
         move = -now.imag / slope.imag

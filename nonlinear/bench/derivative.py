@@ -112,9 +112,12 @@ class Tangent:
         closed = self.closed(points)
         return np.asarray(closed / (1.0 - closed))
 
-    def lifted(self, point: complex) -> Complexes:
-        """The transfer matrix over a base period, shape (M, M), at a point z = exp(j w period_s)."""
-        return lifted(*self._even, self.D, np.array([point], complex))[0]
+    def lifted(self, point: complex) -> tuple[Complexes, Complexes]:
+        """The transfer matrix over a base period, shape (M, M), at z = exp(j w period_s), and its slope."""
+        A, B, C = self._even
+        turned = point * np.eye(len(A)) - A
+        slope = -C @ np.linalg.solve(turned, np.linalg.solve(turned, B))  # -C (z - A)^-2 B
+        return lifted(A, B, C, self.D, np.array([point], complex))[0], slope
 
     @cached_property
     def _even(self) -> tuple[Floats, Floats, Floats]:

@@ -7,12 +7,10 @@ from itertools import combinations
 import numpy as np
 
 from analyses.identification.campaign import CampaignResult
-from analyses.identification.surface import SurfaceFit
+from analyses.identification.surface import NAMES, SurfaceFit
 from analyses.records.record import Record
 from reports import document as doc
 from reports.charts import style
-
-NAMES = ("C0", "Cv", "CM")
 
 
 def surface_figure(fit: SurfaceFit) -> doc.Block:

@@ -11,15 +11,9 @@ from analyses.identification.campaign import CampaignResult
 from analyses.identification.campaign_design import CampaignSuggestion
 from analyses.identification.richer import LawScore, RicherLaws
 from analyses.identification.run import CampaignAnswer
-from analyses.identification.surface import SurfaceFit
+from analyses.identification.surface import NAMES, SurfaceFit
 from reports import document as doc
-from reports.sections.campaign_figures import (
-    NAMES,
-    region_figure,
-    residual_figure,
-    surface_figure,
-    window_figures,
-)
+from reports.sections.campaign_figures import region_figure, residual_figure, surface_figure, window_figures
 from reports.sections.identified import input_table, judged, parameter_table, value_words
 
 

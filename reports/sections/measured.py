@@ -27,8 +27,11 @@ def words(one: Measured) -> str:
     return f"{one.name} over the {_place(one)}. {told}.{beyond}{left} {one.note}".strip()
 
 
+WHAT = {"L": "open {}", "T": "closed {}", "S": "sensitivity of the {}"}
+
+
 def _place(one: Measured) -> str:
-    return LOOPS.get(one.loop, f"loop at {one.loop}").lower()
+    return WHAT[one.of].format(LOOPS.get(one.loop, f"loop at {one.loop}").lower())
 
 
 def section(one: Measured) -> doc.Section:
@@ -74,7 +77,7 @@ def _margins(of: StabilityMargins) -> doc.Block:
         doc.of(lambda one: one[3], "unit", "Unit"),
         doc.of(lambda one: hertz(one[4]), "hz", "at", "Hz", format="sig:4"),
     ]
-    return doc.listing("Margins of the measured loop", found, columns)
+    return doc.listing("Margins of the measured open loop", found, columns)
 
 
 def _bode(one: Measured) -> doc.Block:
@@ -90,8 +93,8 @@ def _bode(one: Measured) -> doc.Block:
         ring = np.concatenate([f, f[::-1]]), np.concatenate([y + low, (y + high)[::-1]])
         panel.shape([ring], "99 % of the measurement", colour=style.BLUE, opacity=0.15)
         panel.curve(f, fitted, "model", **style.series(1))
-    caption = f"{one.name}: measured {_place(one)} with its spread, and the model"
-    return doc.figure("measured", chart, caption, alt="Measured and modelled open loop over frequency")
+    caption = f"{one.name}: {_place(one)}, measured with its spread, and the model"
+    return doc.figure("measured", chart, caption, alt=f"Measured and modelled {_place(one)} over frequency")
 
 
 def decibels_and_degrees(
@@ -104,14 +107,14 @@ def decibels_and_degrees(
 
 
 def _nyquist(one: Measured) -> doc.Block:
-    chart, L = style.Chart(width=style.HALF, height=430.0), one.measured
+    chart, L, model = style.Chart(width=style.HALF, height=430.0), one.open_loop.frdata, one.open_model
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
-    near = [(z, r) for z, r in zip(L, one.radius, strict=True) if abs(z + 1.0) < 4.0 and r > 0.0]
+    near = [(z, r) for z, r in zip(L, one.open_loop.radius, strict=True) if abs(z + 1.0) < 4.0 and r > 0.0]
     if rings := [z + r * style.TURN[::3] for z, r in near]:
         panel.shape([(ring.real, ring.imag) for ring in rings], "spread", colour=style.BLUE, opacity=0.15)
     panel.points(L.real, L.imag, "measured", colour=style.BLUE, parameter=one.frequency_hz)
-    panel.curve(one.model.real, one.model.imag, "model", parameter=one.frequency_hz, **style.series(1))
+    panel.curve(model.real, model.imag, "model", parameter=one.frequency_hz, **style.series(1))
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.x.limits(-3.0, 1.65)
     panel.y.limits(-2.0, 2.0)

@@ -96,8 +96,7 @@ def test_local_clusters_open_no_door_and_do_not_ask_for_the_same_port() -> None:
 def test_items_come_back_whole_and_an_error_goes_its_way() -> None:
     got: dict[int, int] = {}
     steps: list[tuple[int, int]] = []
-    both = (Engine(threads=2), Engine(workers=1))
-    for one in both:
+    for one in (Engine(threads=2), Engine(workers=1)):
         got.clear()
         one.map(doubled, range(9), got.__setitem__, lambda *step: steps.append(step))
         assert got == {k: 2 * k for k in range(9)}
@@ -123,11 +122,16 @@ def test_the_version_covers_the_package_of_the_task(monkeypatch, tmp_path) -> No
 
 
 @pytest.fixture
-def bare(tmp_path, monkeypatch) -> Iterator[Cluster]:
-    """A scheduler alone, which can be killed, and to which workers can be added."""
+def paths(monkeypatch) -> None:
+    """Workers find the tasks of these tests."""
     tests = Path(__file__).parents[1]
-    paths = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
-    monkeypatch.setenv("PYTHONPATH", paths)
+    found = os.pathsep.join(map(str, (tests / "hardness", tests / "nightly", tests.parent)))
+    monkeypatch.setenv("PYTHONPATH", found)
+
+
+@pytest.fixture
+def bare(tmp_path, paths) -> Iterator[Cluster]:
+    """A scheduler alone, which can be killed, and to which workers can be added."""
     cluster = Cluster(tmp_path)
     try:
         cluster.start(workers=0)
@@ -240,10 +244,14 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_pa
     assert study.returncode == 3, said
     assert said.count("\n") == 1
     assert "the same command goes on" in said
-    kept = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+
+    def times() -> dict[Path, int]:
+        return {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+
+    kept = times()
     main(words)
     capsys.readouterr()
-    after = {path: path.stat().st_mtime_ns for path in out.rglob("*.parquet")}
+    after = times()
     assert len(after) == 10 > len(kept) >= 2
     assert kept.items() <= after.items()
 
@@ -341,13 +349,11 @@ LEAN = 1_000  # MB
 
 
 @pytest.fixture
-def cluster(tmp_path, monkeypatch):
+def cluster(tmp_path, paths):
     """A scheduler with TLS and two workers, known by its address and a folder of certificates."""
     import distributed
     from distributed.security import Security
 
-    tests = Path(__file__).parents[1]
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(map(str, (tests / "nightly", tests.parent))))
     made = Security.temporary()
     tls = tmp_path / "tls"
     tls.mkdir()
@@ -362,29 +368,19 @@ def cluster(tmp_path, monkeypatch):
 
 def test_a_night_on_a_cluster_ends_like_one_here(cluster, tmp_path) -> None:
     _, remote = cluster
-    jobs = [
-        job("good"),
-        job("fails", 5.0),
-        job("raises", mode="raise"),
-        job("never ends", mode="hang"),
-        job("is killed", mode="die"),
-        job("eats", mode="eat", bytes=HUNGRY),
-    ]
+    modes = {"raise": "error", "hang": "timeout", "die": "crash", "eat": "error"}
+    jobs = [job("good"), job("fails", 5.0), *(job(mode, mode=mode, bytes=HUNGRY) for mode in modes)]
+    bounds = {"time_limit_s": 8.0, "memory_limit": LEAN}
     here, there = (
-        run_night(
-            study(*jobs), tmp_path / place, Fakes(time_limit_s=8.0, memory_limit=LEAN, **where), code=CODE
-        )
+        run_night(study(*jobs), tmp_path / place, Fakes(**bounds, **where), code=CODE)
         for place, where in (("here", {}), ("there", remote))
     )
-    ends = {d.name: d.result.status for d in there.designs}
-    assert ends == {d.name: d.result.status for d in here.designs}
-    assert ends == {
-        "good": "pass", "fails": "fail", "raises": "error", "never ends": "timeout", "is killed": "crash",
-        "eats": "error",
-    }  # fmt: skip
+    for night in (here, there):
+        ends = {d.name: d.result.status for d in night.designs}
+        assert ends == {"good": "pass", "fails": "fail", **modes}
     messages = {d.name: d.result.message for d in there.designs}
-    assert "--memory-limit" in messages["eats"]
-    assert "signal 9" in messages["is killed"]
+    assert "--memory-limit" in messages["eat"]
+    assert "signal 9" in messages["die"]
     stores = [Cache(tmp_path / f"{name}.state" / "cache") for name in ("there", "here")]
     (good,) = (d for d in there.designs if d.name == "good")
     entries = [store.read(good.result.key) for store in stores]

@@ -2,6 +2,8 @@
 
 import json
 import re
+import subprocess
+import sys
 from importlib import import_module
 from pathlib import Path
 
@@ -117,16 +119,12 @@ def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, 
         traceback_of(line)
 
 
-def test_the_hard_limit_ends_what_the_soft_one_cannot(tmp_path) -> None:
-    import subprocess
-    import sys
-
+def test_the_hard_limit_ends_what_the_soft_one_cannot() -> None:
     script = (
         "import signal, time\nfrom reports.cli import time_limit\ntime_limit.HARD_EXTRA_S = 0.0\n"
         "signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})\ntime_limit.start(0.2)\ntime.sleep(60)\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", script], capture_output=True, text=True, timeout=50, check=False
-    )
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=50, check=False)
     assert done.returncode == 3
     assert "not finished within 0.2 s" in done.stderr

@@ -87,16 +87,14 @@ def test_a_lost_history_closes_the_gate_until_somebody_says_so(site, lost: str) 
     assert (site / "index.html").read_bytes() == index
     night(site, 12.0, AGAIN)
     night(site, 12.0)  # from here on it is known again
-    history = open_history(state(site))
-    assert remembered(site) == history.memory()
+    assert remembered(site) == open_history(state(site)).memory()
 
 
 def test_a_site_of_an_older_version_or_a_damaged_summary_remembers_one_night(site) -> None:
     summary = site / "summary.json"
     for text in ("{}", "[]", "{", '{"history": {"nights": "many", "approvals": true}}', ""):
         summary.write_text(text)
-        result = remembered(site)
-        assert result == Memory("", 1, 0), text
+        assert remembered(site) == Memory("", 1, 0), text
     summary.write_text('{"history": {"id": 3, "nights": 7, "approvals": "many"}}')
     assert remembered(site) == Memory("", 7, 0)  # one wrong field takes none of the others along
     summary.unlink()

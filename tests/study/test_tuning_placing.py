@@ -62,8 +62,7 @@ def test_a_requirement_that_only_a_notch_meets():
     assert not refused.feasible
     assert "Cannot be met together" in refused.notes[0]
     tuned = tune(design, replace(QUICK, place=("notch",)))
-    assert tuned.feasible
-    assert tuned.placed == ("notch",)
+    assert (tuned.feasible, tuned.placed) == (True, ("notch",))
     gain, phase, width = seen(tuned.design)
     assert (gain >= 6.0, phase >= 30.0, width >= 60.0) == (True, True, True)
     notch = tuned.design.controller.velocity.filters[-1]
@@ -111,16 +110,13 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
     away = (np.log(grid / [0.03, 0.01]) ** 2).sum(axis=1)
     assert change <= away[met].min() * (1 + 1e-9)
     _, phase, width = seen(tuned.design)
-    assert phase >= 62.0
-    assert width >= 50.0
+    assert (phase >= 62.0, width >= 50.0) == (True, True)
 
 
 def test_a_design_that_meets_all_is_left_as_it_is():
     design = servo(need("phase_margin", 30.0))
     tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
-    assert tuned.feasible
-    assert tuned.placed == ()
-    assert tuned.design.controller == design.controller
+    assert (tuned.feasible, tuned.placed, tuned.design.controller) == (True, (), design.controller)
 
 
 def test_neutral_elements_change_nothing():
@@ -130,10 +126,9 @@ def test_neutral_elements_change_nothing():
     starts = {v.path: v.start for v in variables}
     assert starts["control.position.feedforward"] == 0.4
     for name in ("velocity", "position"):
-        before = stability_margins(getattr(assemble_loops(design), name).open_loop)
-        after = stability_margins(getattr(assemble_loops(placed), name).open_loop)
-        assert after.gain_margin_db == pytest.approx(before.gain_margin_db, rel=1e-9)
-        assert after.phase_margin_deg == pytest.approx(before.phase_margin_deg, rel=1e-9)
+        loops = (getattr(assemble_loops(one), name).open_loop for one in (design, placed))
+        before, after = ((m.gain_margin_db, m.phase_margin_deg) for m in map(stability_margins, loops))
+        assert after == pytest.approx(before, rel=1e-9)
 
 
 def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
@@ -143,8 +138,7 @@ def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
     design = servo(*asked, gain=0.1, position=PositionLoop(gain=20.0))
     assert not tune(design, QUICK).feasible
     tuned = tune(design, replace(QUICK, place=("feedforward",)))
-    assert tuned.feasible
-    assert tuned.placed == ("feedforward",)
+    assert (tuned.feasible, tuned.placed) == (True, ("feedforward",))
     position = tuned.design.controller.position
     assert position.feedforward > 0.0 or position.acceleration_feedforward > 0.0
 

@@ -14,6 +14,7 @@ from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import is_study, load_study, study_of
 from reports.sections.compare import batches, brief, ledger, section
 from reports.sections.compare_best import section as best_section
+from tests.refusals import refused
 
 HEAD = '[study]\nname = "s"\nbase = "ilr33-amber"\n'
 
@@ -66,8 +67,7 @@ def test_requirements_of_the_study_replace_those_with_the_same_id(tmp_path):
     harder = 'id = "gain-margin"\nquantity = "gain_margin"\nloop = "every"\nminimum = "10 dB"\n'
     result = load_study(study(tmp_path, f"[[requirement]]\n{harder}"))
     limits = {r.id: r.minimum for r in result.base.design.requirements}
-    assert limits["gain-margin"] == 10.0
-    assert limits["phase-margin"] == 45.0
+    assert (limits["gain-margin"], limits["phase-margin"]) == (10.0, 45.0)
 
 
 @pytest.mark.parametrize(("text", "message"), [
@@ -84,10 +84,7 @@ def test_requirements_of_the_study_replace_those_with_the_same_id(tmp_path):
 def test_bad_studies_are_refused_in_one_line(tmp_path, text, message):
     path = tmp_path / "s.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=message) as caught:
-        load_study(path)
-    assert "\n" not in str(caught.value)
-    assert "s.toml" in str(caught.value)
+    refused(load_study, path, words=("s.toml", message))
 
 
 def test_a_refused_variant_is_kept_where_others_shall_go_on(tmp_path):
@@ -121,8 +118,7 @@ override = { "gear.worm.ratio" = 50 }
 
 def test_a_variant_equal_to_its_base_differs_in_nothing(compared):
     same = compared.variants[0]
-    assert same.differences == {}
-    assert same.figures == compared.base.figures
+    assert (same.differences, same.figures) == ({}, compared.base.figures)
 
 
 def test_half_the_gain_is_six_decibels_and_says_so(compared):
@@ -148,12 +144,11 @@ def test_of_two_changes_each_has_its_share(compared):
 
 
 def test_best_and_worst_are_marked_in_the_right_direction(compared):
-    names = {name.key: name for name in compared.names}
-    best, worst = compared.ends(names["velocity.gain_margin"])
+    ends = {name.key: compared.ends(name) for name in compared.names}
+    best, worst = ends["velocity.gain_margin"]
     assert best > worst
-    best, worst = compared.ends(names["velocity.sensitivity_peak"])
+    best, worst = ends["velocity.sensitivity_peak"]
     assert best < worst
-    assert compared.ends(names["drive.motor_current@0"]) is None or best != worst
 
 
 def test_a_slower_gear_fails_the_rate_and_nothing_else(compared):
@@ -236,8 +231,7 @@ def test_the_page_escapes_names_and_has_every_figure(cli, tmp_path):
     path = study(tmp_path, f'[[variant]]\nname = "<script>alert(1)</script>"\n{gain}\n')
     cli.text("compare", path, "--out", tmp_path / "o", "--quiet")
     page = (tmp_path / "o" / "compare.html").read_text()
-    assert "<script>alert" not in page
-    assert "&lt;script&gt;alert" in page
+    assert (page.count("<script>alert"), "&lt;script&gt;alert" in page) == (0, True)
     made = json.loads((tmp_path / "o" / "compare.json").read_text())
     there = {p.name for p in (tmp_path / "o").iterdir()}
     assert there == {"compare.html", "compare.json", "compare.csv", "designs"}
