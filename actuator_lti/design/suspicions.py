@@ -121,21 +121,15 @@ def _loads(design: Design) -> Iterator[str]:
     if losses is not None and losses.source.startswith(FROM) and design.load.path == "self-locking":
         lost = losses.value * design.total_ratio
         if 0.0 < lost < 2.0:
-            yield (
-                f"load.path: self-locking, which gears of {100 / lost:.3g} % are not (only below 50 %); "
-                'load.path = "back-drivable"?'
-            )
+            gears = f"gears of {100 / lost:.3g} % are not (only below 50 %)"
+            yield f'load.path: self-locking, which {gears}; load.path = "back-drivable"?'
     if design.load.path == "back-drivable" and largest > holding:
-        yield (
-            f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
-            "at its peak current without losses"
-        )
+        most = f"{holding:.3g} {unit} at its peak current without losses"
+        yield f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {most}"
     needed = max(design.friction.dry_Nm(largest, direction) for direction in (1, -1))
     if design.load.path != "back-drivable" and needed > given:
-        yield (
-            f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
-            f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
-        )
+        more = f"its friction at the motor, {needed:.3g} {unit}, is more than the motor gives"
+        yield f"load.moment_max: {largest:g} {unit} holds the drive fast: {more}, {given:.3g} {unit}"
     asked = [("validation.loads", load) for load in design.validation.loads_Nm]
     asked += [(f"requirement.{item.id}.load", item.load_Nm or 0.0) for item in design.requirements]
     for key, load in asked:
@@ -161,10 +155,9 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"
     if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):
-        yield (
-            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
-            'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
-        )
+        held = 'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
+        less = f"{coefficient:g} is less than 1/N = {least:g}"
+        yield f"friction.load_coefficient: {less}: the friction of a {held}"
 
 
 def _pedigree(design: Design) -> Iterator[str]:
