@@ -19,16 +19,16 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
+from actuator_lti.design.hint_numbers import with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
 from actuator_lti.design.sections import BY_PATH, HEAD, RECORDS, Section, children, part_at, with_part
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
-from actuator_lti.design.spellings import split_quantity
-from actuator_lti.design.stated import CONVENTION, Frame
+from actuator_lti.design.stated import Frame
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import ampere_unit, parse_limit, parse_quantity, si_text
+from actuator_lti.design.units import ampere_unit, parse_limit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -38,6 +38,8 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
+_TICKS = re.compile(r"every, .*; here ([0-9]+)\Z")
+_ASIDE = re.compile(r", (?:which takes|in|with) ")  # what a hint says beside the one key that it names
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
 
@@ -80,7 +82,9 @@ class Reader:
     """Reads one tree; what it cannot read it notes, and has `UNREAD` for it."""
 
     def __init__(self, tree: Tree, findings: Findings) -> None:
-        self.findings = findings
+        self.findings, self.tree = findings, tree
+        self.guessed: set[str] = set()
+        self.ticks: dict[str, int] = {}
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
         self.gains: dict[str, tuple[Field, Tree, float, Per]] = {}
@@ -120,15 +124,21 @@ class Reader:
         meant: dict[str, str] = {}
         for key in (key for key in table if key not in known):
             word = key_for(path, key, known)
-            word += _time_said(word, table, key)
+            word = with_numbers(word, path, key, table, self.tree)
             said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
             hint = said if word else nearest(key, known)
             where = f"{path}.{key}" if path else key
             self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
+            if ticks := _TICKS.match(word):
+                self.ticks[f"{path}.every"] = int(ticks[1])
+            only = _ASIDE.split(word)[0] if word else meant_of(key, known)
+            if only in known:
+                meant[only] = meant.get(only) or key
+                self.guessed |= set() if word else {f"{path}.{only}"}
+                continue
             for one in () if word.startswith("not needed") else known:  # that stands for no key
-                if re.search(rf"(?<![\[.])\b{one}\b(?! of)", hint):
-                    renamed = key if word.partition(", which takes")[0] == one else ""
-                    meant[one] = meant.get(one) or renamed
+                if re.search(rf"(?<![\[.])(?<!over )\b{one}\b(?! of)", hint):
+                    meant.setdefault(one, "")
         return meant
 
     def values(
@@ -136,7 +146,8 @@ class Reader:
     ) -> tuple[Tree, Collection[str]]:
         """Attributes and values of the keys of one table, and the keys that unknown ones are near to.
 
-        What stands under another name is read as well, so that all that is wrong with it is told at once.
+        What stands under another name is read as well, so that all that is wrong with it is told at once; the
+        value of a word that is only near to a key is unread all the same.
         """
         if not isinstance(table, dict):
             word = key_for(path.rpartition(".")[0], path.rpartition(".")[2])
@@ -159,8 +170,12 @@ class Reader:
             elif meant.get(field.key):
                 self.findings.alias(where, f"{path}.{meant[field.key]}")
                 values[field.attribute] = self.value(field, {field.key: table[meant[field.key]]}, where)
+                if where in self.guessed:
+                    self.gains.pop(where, None)
+                    values[field.attribute] = self.parameters[where] = UNREAD
             elif field.key in meant:
-                values[field.attribute] = self.parameters[where] = UNREAD
+                self.parameters[where] = UNREAD
+                values[field.attribute] = self.ticks.get(where, UNREAD)
             elif field.required and not (field.key == "gain" and "law" in table):
                 values[field.attribute] = self.unread(where, f"missing{_example(field)}")
         return values, meant
@@ -408,23 +423,6 @@ def _fits(field: Field, raw: Any) -> bool:
             return bool(date.fromisoformat(raw))
         return False
     return bool(raw.strip()) if field.kind == "label" else not field.choices or raw in field.choices
-
-
-def _time_said(word: str, table: Tree, key: str) -> str:
-    """The time that an integral or derivative gain is beside the gain of its table, for its hint."""
-    if not word.startswith(("integral_time =", "derivative_time =")):
-        return ""
-    named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
-    texts = [f"{table.get(one)}" for one in (named, key)]
-    if CONVENTION.findall(texts[0]) != CONVENTION.findall(texts[1]):  # amperes of two kinds
-        return ""
-    gain, own = (CONVENTION.sub("", text) for text in texts)
-    for quotient in [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]:
-        with suppress(ValueError, ZeroDivisionError):
-            (a, of), (b, per) = map(split_quantity, quotient)
-            time_s = parse_quantity(f"{a / b!r} ({of or 1})/({per})", "s/rad")
-            return f"; here {time_s:.4g} s" if time_s > 0.0 else ""
-    return ""
 
 
 def _example(field: Field) -> str:

@@ -42,6 +42,12 @@ def _sampling(design: Design) -> Iterator[str]:
         integral = getattr(design.controller, name).integral_time_s
         if integral is not None and integral < period:
             yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
+    current, resistance = design.controller.current, design.effective_motor.resistance_ohm
+    if current is not None and current.integral_time_s is None and current.law is None and resistance:
+        error = 1.0 / (1.0 + current.gain_V_A / resistance)
+        if error >= 0.1:
+            given = f"gain/R is {1.0 / error - 1.0:.3g}: the current is {100.0 * error:.3g} % short at rest"
+            yield f"control.current.integral_time: not given, and {given}"
     ticks = design.controller.computing_delay_s / design.controller.period_s
     if ticks > 2:
         yield f"control.computing_delay: {ticks:.3g} ticks is unusually long (1 to 2 are common)"
@@ -115,21 +121,15 @@ def _loads(design: Design) -> Iterator[str]:
     if losses is not None and losses.source.startswith(FROM) and design.load.path == "self-locking":
         lost = losses.value * design.total_ratio
         if 0.0 < lost < 2.0:
-            yield (
-                f"load.path: self-locking, which gears of {100 / lost:.3g} % are not (only below 50 %); "
-                'load.path = "back-drivable"?'
-            )
+            gears = f"gears of {100 / lost:.3g} % are not (only below 50 %)"
+            yield f'load.path: self-locking, which {gears}; load.path = "back-drivable"?'
     if design.load.path == "back-drivable" and largest > holding:
-        yield (
-            f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {holding:.3g} {unit} "
-            "at its peak current without losses"
-        )
+        most = f"{holding:.3g} {unit} at its peak current without losses"
+        yield f"load.moment_max: {largest:g} {unit} is more than the drive can hold, {most}"
     needed = max(design.friction.dry_Nm(largest, direction) for direction in (1, -1))
     if design.load.path != "back-drivable" and needed > given:
-        yield (
-            f"load.moment_max: {largest:g} {unit} holds the drive fast: its friction at the motor, "
-            f"{needed:.3g} {unit}, is more than the motor gives, {given:.3g} {unit}"
-        )
+        more = f"its friction at the motor, {needed:.3g} {unit}, is more than the motor gives"
+        yield f"load.moment_max: {largest:g} {unit} holds the drive fast: {more}, {given:.3g} {unit}"
     asked = [("validation.loads", load) for load in design.validation.loads_Nm]
     asked += [(f"requirement.{item.id}.load", item.load_Nm or 0.0) for item in design.requirements]
     for key, load in asked:
@@ -155,10 +155,9 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
     rigid = design.coupling is None and load.path == "self-locking"
     if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):
-        yield (
-            f"friction.load_coefficient: {coefficient:g} is less than 1/N = {least:g}: the friction of a "
-            'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
-        )
+        held = 'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
+        less = f"{coefficient:g} is less than 1/N = {least:g}"
+        yield f"friction.load_coefficient: {less}: the friction of a {held}"
 
 
 def _pedigree(design: Design) -> Iterator[str]:

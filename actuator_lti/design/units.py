@@ -323,20 +323,9 @@ def _as_meant(written: str, wanted: UnitValue) -> UnitValue:
 
 
 def parse_quantity(text: str | float | int, unit: str) -> float:
-    """The SI value of a written quantity whose dimension must be that of ``unit``.
+    """The SI value of a written quantity such as ``"6 uH"``, whose dimension must be that of ``unit``.
 
-    Parameters
-    ----------
-    text : str or number
-        ``"6 uH"``; a bare number only where ``unit`` is dimensionless.
-    unit : str
-        The SI unit wanted, such as ``"H"``.
-
-    Returns
-    -------
-    float
-        In ``unit`` (which is to be an SI unit without prefix).
-
+    A bare number stands for itself only where ``unit``, an SI unit without prefix, is dimensionless.
     An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
     Examples

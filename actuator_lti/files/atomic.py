@@ -48,13 +48,9 @@ def write_stream(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]
 
 
 def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -> None:
-    """Write several files: none is moved into place before all are on disk.
+    """Write several files: none is moved into place before all are on disk; missing folders are made.
 
-    Parameters
-    ----------
-    files : mapping of path to bytes, or pairs of them
-        Missing folders are made. Pairs are taken one by one: many files need not be in memory together.
-
+    Pairs are taken one by one: many files need not be in memory together.
     An InputError if a folder cannot be made or written; nothing is left behind then.
     """
     pairs = files.items() if isinstance(files, Mapping) else files

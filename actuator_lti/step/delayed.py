@@ -95,20 +95,15 @@ def collocated(form: DelayForm, points: int) -> Real:
     x = 1. Eigenvalues with |s| tau well below the number of points are those of the exact delay to near
     machine precision (Breda, Maset, Vermiglio 2005).
     """
-    n, q, N, delays = form.states, form.delays_s.size, points, form.delays_s
+    n, q = form.states, form.delays_s.size
     inner = form.whole[:-1, :-1]
-    x = 0.5 * (1.0 - np.cos(np.pi * np.arange(N + 1) / N))
-    D = BarycentricInterpolator(x, np.eye(N + 1)).derivative(x)
-    M = np.zeros((n + q * N, n + q * N))
-    M[:n, :n] = inner[:n, :n]
-    ends = n + N * np.arange(1, q + 1) - 1
-    M[:n, ends] = inner[:n, n:]
-    for k in range(q):
-        rows = slice(n + k * N, n + (k + 1) * N)
-        M[rows, rows] = -D[1:, 1:] / delays[k]
-        M[rows, :n] -= np.outer(D[1:, 0], inner[n + k, :n]) / delays[k]
-        M[rows, ends] -= np.outer(D[1:, 0], inner[n + k, n:]) / delays[k]
-    return M
+    x = 0.5 * (1.0 - np.cos(np.pi * np.arange(points + 1) / points))
+    D = BarycentricInterpolator(x, np.eye(points + 1)).derivative(x)[1:]
+    ends = np.kron(np.eye(q), np.eye(points)[-1:])
+    rates = np.diag(-1.0 / form.delays_s)
+    begins = np.kron(rates, D[:, :1])
+    lines = np.kron(rates, D[:, 1:]) + begins @ inner[n:, n:] @ ends
+    return np.block([[inner[:n, :n], inner[:n, n:] @ ends], [begins @ inner[n:, :n], lines]])
 
 
 def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]:

@@ -68,8 +68,8 @@ class DelayStepper:
         norm = float(np.linalg.norm(balanced(self._A)[0], 2)) if len(self._A) else 0.0
         self._unit = self._shortest / max(1.0, self._shortest * norm)
         self._jumps = self._passed_on()
-        self._t, self._state, self._h = start_s, state.copy(), self._shortest
-        self._last, self._u, self._slope = start_s, u.copy(), np.zeros_like(u)
+        self._t, self._state, self._h = 0.0, state.copy(), self._shortest  # times from the start on
+        self._last, self._u, self._slope = 0.0, u.copy(), np.zeros_like(u)
         self._due: list[tuple[float, int, int, Real]] = []  # (time, number, delay, its jumps)
         self._number = count()
         self._next: tuple[float, Real] | None = None
@@ -86,9 +86,9 @@ class DelayStepper:
 
     def at(self, t: float, u: Real) -> tuple[Real, Real]:
         """State and output at an instant not before the last one, the input straight since then."""
+        t -= self.start_s
         if t > self._last:
-            slope = (u - self._u) / (t - self._last)
-            self._turned(slope)
+            self._turned((u - self._u) / (t - self._last))
             self._walk(t)
             self._last, self._u = t, u.copy()
         z = self._delayed(np.array([t]), np.array([t + self._near]))[0]
@@ -146,11 +146,12 @@ class DelayStepper:
             states, values = self._collocated(h)
             largest = np.maximum(self._largest, np.abs(values).max(axis=0))
             rough = np.abs(_LAST @ values) * _HIGHEST
-            if h <= 0.25 * self._unit or (rough <= _SMOOTH * largest).all():
+            if h <= 0.25 * self._unit or not (rough > _SMOOTH * largest).any():  # or not numbers
                 break
             h *= 0.5
         self._keep(h, _SERIES @ values)
-        self._h = max(2.0 * h, self._h if h == whole else 0.0)
+        longer = 1.0 if (rough > 0.01 * _SMOOTH * largest).any() else 2.0
+        self._h = max(longer * h, self._h if h == whole else 0.0)
         self._t, self._state, self._largest = self._t + h if h < whole else until, states[-1], largest
 
     def _collocated(self, h: float) -> tuple[Real, Real]:
@@ -177,7 +178,7 @@ class DelayStepper:
         k = self._count
         if k > _MOST:
             raise InputError(
-                f"{self._t - self.start_s:g} s take {k - 1} pieces between the instants at which jumps "
+                f"{self._t:g} s take {k - 1} pieces between the instants at which jumps "
                 f"return (sums of the delays, the shortest {self._shortest:g} s): ask for fewer seconds"
             )
         if k == len(self._begins):

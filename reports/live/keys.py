@@ -13,7 +13,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 
 from actuator_lti.design.access import located, parameter_value, paths_of
-from actuator_lti.design.field import Structure
+from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
 from actuator_lti.files.tree import Tree
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
@@ -90,13 +90,9 @@ def named(design: Design, path: str) -> Tree:
     field, value = located(design, path)[0], parameter_value(design, path)
     unit = field.unit(Structure.of(design))
     shown, factor = _written(design.parameters.get(path), value, unit)
+    shown, whole = "" if shown == "1" else shown, field.kind == "integer"
     about = {"path": path, "about": field.description, "value": value}
-    return {
-        **about,
-        "unit": "" if shown == "1" else shown,
-        "factor": factor,
-        "whole": field.kind == "integer",
-    }
+    return {**about, "unit": shown, "factor": factor, "whole": whole}
 
 
 def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, float]:
@@ -111,7 +107,7 @@ def _written(known: Parameter | None, value: float, unit: str) -> tuple[str, flo
 def _slider(design: Design, path: str) -> Tree:
     """Give a key with the range of its slider and the band of its tolerance."""
     field, value = located(design, path)[0], parameter_value(design, path)
-    low, high = _range(design, path, value)
+    low, high = _range(field, value, _top(design, path))
     known = design.parameters.get(path)
     return {
         **named(design, path),
@@ -124,13 +120,12 @@ def _slider(design: Design, path: str) -> Tree:
     }
 
 
-def _range(design: Design, path: str, value: float) -> tuple[float, float]:
+def _range(field: Field, value: float, top: float) -> tuple[float, float]:
     """Give the ends of a slider: both signs of a value below 0, whole numbers from 1."""
-    field, _ = located(design, path)
     if field.kind == "integer":
         return max(1.0, math.ceil(value / SLIDER_FACTOR)), max(COUNTED, value * SLIDER_FACTOR)
     if value == 0.0:
-        return 0.0, _top(design, path)
+        return 0.0, top
     if value < 0.0:
         return value * SLIDER_FACTOR, -value * SLIDER_FACTOR
     return value / SLIDER_FACTOR, value * SLIDER_FACTOR

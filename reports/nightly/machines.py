@@ -22,19 +22,16 @@ _OF_CHANGE = ("figure", "unit", "before", "after", "tolerance", "worse", "flappi
 
 
 def summary(night: Overview) -> Tree:
+    run = night.run
     return {
         "schema": SCHEMA,
         "version": VERSION,
         "study": night.study.name,
-        "run": night.run.id,
-        "started": night.run.started,
-        "finished": night.run.finished,
-        "code": {
-            "hash": night.run.code,
-            "commit": night.run.code_commit,
-            "libraries": dict(night.run.libraries),
-        },
-        "study_commit": night.run.study_commit,
+        "run": run.id,
+        "started": run.started,
+        "finished": run.finished,
+        "code": {"hash": run.code, "commit": run.code_commit, "libraries": dict(run.libraries)},
+        "study_commit": run.study_commit,
         "history": asdict(night.memory),
         "exit_status": int(not night.passed),
         "counts": {state: night.count(state) for state in STATES},

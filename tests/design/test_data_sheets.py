@@ -396,6 +396,8 @@ def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, 
         ("[limits]", "[friction]\nload_coefficient = 0.1\n[limits]", "beside friction.load_coefficient"),
         ('torque_constant = "30.2 mN*m/A"\n', "", "no_load_current = 137 mA: needs motor.torque_constant"),
         # a word of data sheets, answered with its key
+        ("back_emf_constant =", "speed_constant =", 'which takes "317 rpm/V" too'),
+        ('back_emf_constant = "317', 'speed_constant = "107', 'which takes "107 rpm/V" too'),
         ('back_emf_constant = "317', 'speed_constant = "317', 'back_emf_constant, which takes "317 rpm/V"'),
         ('torque_constant = "30', 'Kt = "30', r"motor.Kt = .* \(it is torque_constant\)\Z"),
         ("[limits]", '[limits]\nrated_current = "3 A"', r"\(it is continuous_current\)"),
@@ -429,6 +431,29 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
     [
         ("ratio = ", "reduction_ratio = ", ('reduction_ratio = "43:1": unknown key (it is ratio)',)),
         ("resistance", "terminal_resistance", ("(it is resistance)",)),
+        ("resistance", "resistence", ('(nearest known: "resistance")',)),
+        ('resistance = "0.299', 'resistence = "3 k', ('known: "resistance")', "motor.resistance = ")),
+        ('inertia = "1e-3 kg*m^2', 'mass = "150 V', ("(it is inertia, in kg on", "load.inertia = ")),
+        (
+            'resistance = "0.299 ohm"\n',
+            'resistance = "0.3 ohm/phase"\nholding_torque = "2 Nm"\n',
+            ('"phase" is no unit', "it is torque_constant, over"),
+        ),
+        # 0.082 mH/0.299 ohm; 2 ms in ticks of 0.1 ms
+        (
+            "[control]",
+            CURRENT.replace('gain = "1 V/A', 'bandwidth = "9 Hz')
+            + 'gain = "1 Hz"\nperiod = "2 ms"\n[control]',
+            ("integral_time = L/R, here 0.0002742 s", "so many ticks of control.period; here 20)"),
+        ),
+        # 7 pole pairs of 4.1 mV s: kE of a phase, kM 1.5 times that
+        (
+            "no_load_current",
+            'flux_linkage = "4.1 mWb"\npoles = 14\nno_load_current',
+            ("0.0287 V*s/rad and 0.04305 N*m/A", "not needed"),
+        ),
+        ("no_load_current", 'detent_torque = "1 Nm"\nno_load_current', ('cogging_phase = "180 deg"',)),
+        ("efficiency = 0.9", 'starting_torque = "1 Nm"', ("dry_torque of [friction]",)),
         ('inductance = "0.082', 'rotor_L = "0.082 V', ("(it is inductance)", "line 6: motor.inductance = ")),
         ("[load]", '[load]\nmax_torque = "2 Nms"', ("(it is moment_max)", "load.moment_max = ")),
         ("[control]", f'{CURRENT}vel_gain = "40 Hz"\n[control]', ("(it is gain)",)),

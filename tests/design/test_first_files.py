@@ -143,6 +143,22 @@ def test_constants_that_disagree_are_told_as_they_are_written(written: str, want
     assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
 
 
+@pytest.mark.parametrize(
+    ("constants", "kM", "kE", "words"),
+    [  # kM over kE: 0.889 of sqrt(3), 0.889 of one, 0.866 at 8.27/KV of peak amperes
+        ("rms-line", "1.47 Nm/A", "100 V/1000 min-1", "here 0.889): take one and write the other"),
+        ("dc", "89.4 mNm/A", "95 rpm/V", "here 0.889): take one and write the other"),
+        ("dc", "82.7 mNm/A", "100 KV", 'motor.constants = "peak-phase"'),
+    ],
+)
+def test_a_warm_torque_constant_is_told_from_a_convention(
+    constants: str, kM: str, kE: str, words: str
+) -> None:
+    text = told(motor(constants, torque_constant=kM, back_emf_constant=kE))
+    assert words in text
+    assert ("the ratio is that" in text) is ("motor.constants" in words)
+
+
 @pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
 @pytest.mark.parametrize(
     ("ampere", "volt", "constants", "units"),
@@ -163,12 +179,20 @@ def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
     kM, kE = 0.03 * ampere, 0.02 * volt
     if stated != constants or any(units):
         text = told(motor(stated, torque_constant=f"{kM} Nm/A", back_emf_constant=f"{kE} V*s/rad"))
-        assert f'the ratio is that of motor.constants = "{constants}"' in text
+        assert (f'the ratio is that of motor.constants = "{constants}"' in text) is (stated != constants)
+        assert "the ratio is that of " in text
         assert ("A peak" in text) is any(units)
     kM_text, kE_text = f"{kM} Nm/A{units[0]}", f"{kE} V{units[1]}/(rad/s)"
     drive = read_design_text(motor(constants, torque_constant=kM_text, back_emf_constant=kE_text))
     assert drive.effective_motor.back_emf_constant_Vs_rad == pytest.approx(3**0.5 * 0.02, rel=1e-12)
     assert drive.effective_motor.torque_constant_Nm_A == pytest.approx(3**0.5 * 0.02, rel=1e-12)
+
+
+@pytest.mark.parametrize(("gain", "short"), [("2 V/A", "74.7"), ("53 V/A", ""), ("54 V/A", "")])
+def test_a_current_loop_that_is_short_at_rest_is_warned_of(gain: str, short: str) -> None:
+    """1/(1 + gain/R), R 5.9 ohm, from a tenth on."""
+    lines = warnings_of(read_design_text(f'{DRIVE}[control.current]\ngain = "{gain}"\n'))
+    assert any(f"{short} % short at rest" in line for line in lines) is (gain != "54 V/A")
 
 
 def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:

@@ -19,6 +19,7 @@ from actuator_lti import load_design
 from actuator_lti.design.access import with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
 from nonlinear.rows import Rows
+from tests.changed import changed
 
 pytestmark = needs_compiler
 FINE = 10  # parts of a tick, of which every host step below is a multiple
@@ -29,15 +30,13 @@ TICKS, MOMENT = 120, 0.05
 
 
 def delayed(design: Design, ticks: float) -> Design:
-    c = design.controller
-    return replace(design, controller=replace(c, computing_delay_s=ticks * c.period_s))
+    return changed(design, controller={"computing_delay_s": ticks * design.controller.period_s})
 
 
 def even(design: Design) -> Design:
     """Without torques over the angle: those are looked up once a tick, so a finer tick has others."""
     none = dict.fromkeys(("moment_slope_Nm_rad", "moment_damping_Nms_rad", "gear_error_Nm"), 0.0)
-    load, motor = replace(design.load, gravity=None, **none), replace(design.motor, cogging_Nm=0.0)
-    return replace(design, load=load, motor=motor)
+    return changed(design, load={"gravity": None, **none}, motor={"cogging_Nm": 0.0})
 
 
 def random_one(seed: int, elastic: bool) -> Design:

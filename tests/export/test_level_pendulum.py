@@ -1,6 +1,5 @@
 """The page's linear drive has no slope where the pendulum stands out level, as the linear loops have none."""
 
-from dataclasses import replace
 from math import cos, radians
 
 import numpy as np
@@ -11,6 +10,7 @@ from actuator_lti.design.model import Gravity
 from nonlinear._kernels import layout
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.linear_row import linear_row
+from tests.changed import changed
 
 
 @pytest.mark.parametrize("degrees", [0.0, 90.0, 90.01, 180.0, 270.0, -90.0])
@@ -18,8 +18,7 @@ from nonlinear.export.linear_row import linear_row
 def test_slope_of_the_linear_row(degrees: float, spring: float) -> None:
     """k + m g l cos(angle), with cos of a quarter turn 0."""
     gravity = Gravity(mass_kg=3.5, arm_m=0.28, offset_rad=radians(degrees))
-    design = load_design("joint")
-    design = replace(design, load=replace(design.load, gravity=gravity, moment_slope_Nm_rad=spring))
+    design = changed(load_design("joint"), load={"gravity": gravity, "moment_slope_Nm_rad": spring})
     row = exported_row(design)
     linear = np.zeros_like(row)
     linear_row(row, linear)

@@ -3,7 +3,6 @@
 import os
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
+from tests.changed import changed
 
 
 def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
@@ -69,14 +69,14 @@ def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
 ) -> None:
     """Through stick, slip and limits; the last form that fits, which is taken, is this drive's own."""
     design = load_design(name)
-    control = replace(design.controller, computing_delay_s=delay_ticks * design.controller.period_s)
-    design = replace(design, controller=control)
+    period_s = design.controller.period_s
+    design = changed(design, controller={"computing_delay_s": delay_ticks * period_s})
     p, _ = native.parameters(design_row(design))
     fits = [each.name for each in forms() if all(p[place] == value for place, value in each.known.items())]
     assert fits[-1] == form
 
     def work() -> Trajectory:
-        return simulate(design, commands.triangle(2e-3, 40.0), 600 * control.period_s, loads.constant(3.0))
+        return simulate(design, commands.triangle(2e-3, 40.0), 600 * period_s, loads.constant(3.0))
 
     ours = same_as_written(work)
     assert form.startswith("tanh") or ours.events > 3
@@ -87,7 +87,7 @@ def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
 def test_batches_have_the_bits_of_the_kernels_as_written() -> None:
     rng = np.random.default_rng(5)
     runs = [
-        Run(design=replace(random_drive(rng)), command=commands.sine(0.02, 20.0), duration_s=0.02,
+        Run(design=random_drive(rng), command=commands.sine(0.02, 20.0), duration_s=0.02,
             reducers=Reducers(window_ticks=50, harmonics=3, extremes=True, step_target_rad=0.02))
         for _ in range(3)
     ]  # fmt: skip

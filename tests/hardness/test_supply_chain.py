@@ -43,8 +43,8 @@ def test_every_package_is_pinned_with_hashes() -> None:
 def test_what_make_report_installs_is_what_the_toolkit_itself_needs_and_no_more() -> None:
     """And that is locked once: in the one file or in the other."""
     core = versions(CORE)
-    needed = {canonicalize_name(Requirement(words).name) for words in (*PROJECT["project"]["dependencies"],
-              *PROJECT["build-system"]["requires"])}  # fmt: skip
+    asked = (*PROJECT["project"]["dependencies"], *PROJECT["build-system"]["requires"])
+    needed = {canonicalize_name(Requirement(words).name) for words in asked}
     todo = list(needed)
     while todo:
         for words in importlib.metadata.requires(todo.pop()) or ():

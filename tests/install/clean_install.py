@@ -40,38 +40,22 @@ MOST_FIRST_S = 1.0
 HEAVY = ("dask", "distributed", "pyarrow", "pandas", "typst", "ziglang", "fmpy", "ruptures")
 
 
-def call(
-    command: list[str | Path],
-    folder: Path,
-    wanted: int = 0,
-    words: str = "",
-    quiet: bool = False,
-    stranger: bool = False,
-) -> str:
+def call(command: list[str | Path], folder: Path, wanted: int = 0, words: str = "", **how: bool) -> str:
     """Run a command away from the checkout; another status, or words that are missing, end it.
 
-    A stranger has no compiler, no home and nothing that is his.
+    ``quiet``: nothing is said of it; ``stranger``: by one without compiler and home.
     """
-    kept = {
-        name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))
-    }
-    if stranger:
-        kept = {"PATH": str(Path(command[0]).parent)}
-    done = subprocess.run(
-        list(map(str, command)),
-        cwd=folder,
-        env=kept,
-        user=other_user(Path(command[0]).with_name("python")) if stranger else None,
-        capture_output=True,
-        text=True,
-        timeout=600,
-        check=False,
-    )
+    user, place = None, Path(command[0]).parent
+    kept = {name: own for name, own in os.environ.items() if not name.startswith(("PYTHON", "VIRTUAL_ENV"))}
+    if how.get("stranger"):
+        user, kept = other_user(place / "python"), {"PATH": str(place)}
+    streams = {"capture_output": True, "text": True, "timeout": 600, "check": False}
+    done = subprocess.run(list(map(str, command)), cwd=folder, env=kept, user=user, **streams)
     said = done.stdout + done.stderr
     right = done.returncode in (0, 1) if wanted < 0 else done.returncode == wanted
     if not right or words not in said:
         raise SystemExit(f"{' '.join(map(str, command))}: status {done.returncode}, not {wanted}\n{said}")
-    if not quiet:
+    if not how.get("quiet"):
         sys.stdout.write(f"ok: {' '.join(str(part) for part in command[1:])[:90]}\n")
     return said
 

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from loop_designs import amber, ctms_position, designs, emps
+from test_stacked import everything
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design.model import Design, Filter
@@ -99,6 +100,7 @@ def test_with_one_frequency_it_is_the_notch() -> None:
 
 @settings(max_examples=6)
 @given(designs(), st.floats(0.01, 0.8))
+@example(everything(), 0.02)
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
     loops = assemble_loops(design)
     for name, loop in loops.present.items():

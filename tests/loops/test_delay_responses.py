@@ -13,6 +13,7 @@ import flint
 import numpy as np
 import pytest
 
+from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 
 Rational = tuple[np.ndarray, np.ndarray]
@@ -58,13 +59,26 @@ def round_the_loop(parts: list[Rational], delays: np.ndarray, end: float) -> dic
     return {float(np.dot(often, delays)): series for often, series in found.items()}
 
 
-def truth(parts: list[Rational], delays: np.ndarray, times: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Response to an input that jumps to its first value and is straight between its bends."""
+def in_one_loop(parts: list[Rational], delays: np.ndarray) -> DelaySystem:
+    """The open loop: the sum of all parts."""
+    loop = DelaySystem.from_system(0.0)
+    for part, delay in zip(parts, delays, strict=True):
+        loop += DelaySystem.from_system(control.tf(*part)) * DelaySystem.delay(delay)
+    return loop
+
+
+def truth(
+    parts: list[Rational], delays: np.ndarray, times: np.ndarray, u: np.ndarray, patch: pytest.MonkeyPatch
+) -> np.ndarray:
+    """Response of 1/(1 + L) to an input that jumps to its first value and is straight between its bends."""
+    fastest, end = max(np.abs(np.roots(den)).max() for _, den in parts), times.max()
+    patch.setattr(flint.ctx, "cap", int(4.0 * fastest * end) + 80)
+    patch.setattr(flint.ctx, "prec", 900)
     y = np.zeros(times.size)
     slopes = [(u[b] - u[a]) / (times[b] - times[a]) for a, b in pairwise(BENDS)]
     changes = np.diff(slopes, prepend=0.0)
     begins = [(0.0, 0, u[0]), *((times[b], 1, k) for b, k in zip(BENDS, changes, strict=False))]
-    for late, series in round_the_loop(parts, delays, times[-1]).items():
+    for late, series in round_the_loop(parts, delays, end).items():
         for begin, order, size in begins:
             terms = [series[k] * size / factorial(k + order) for k in range(flint.ctx.cap)]
             response = flint.arb_poly(terms)
@@ -83,13 +97,28 @@ def test_loops_of_delays_without_a_common_measure(
     parts, delays = random_loop(rng, feedthrough)
     times = np.linspace(0.0, rng.uniform(2.0, 6.0) * delays.max(), POINTS)
     u = np.interp(times, times[list(BENDS)], rng.uniform(-1.0, 1.0, len(BENDS)))
-    loop = DelaySystem.from_system(0.0)
-    for part, delay in zip(parts, delays, strict=True):
-        loop += DelaySystem.from_system(control.tf(*part)) * DelaySystem.delay(delay)
-    closed = DelaySystem.from_system(1.0).feedback(loop)
-    fastest = max(np.abs(np.roots(den)).max() for _, den in parts)
-    monkeypatch.setattr(flint.ctx, "cap", int(4.0 * fastest * times[-1]) + 80)
-    with flint.ctx.workprec(900):
-        wanted = truth(parts, delays, times, u)
+    closed = DelaySystem.from_system(1.0).feedback(in_one_loop(parts, delays))
+    wanted = truth(parts, delays, times, u, monkeypatch)
     found = control.forced_response(closed, times, u).y
     assert np.ravel(found) == pytest.approx(wanted, abs=1e-9 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_step_figures_of_loops_of_delays_without_a_common_measure(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    parts, delays = random_loop(np.random.default_rng([seed, 2]), False)
+    f = step_figures(in_one_loop(parts, delays).feedback())
+    early = np.flatnonzero(f.time_s < 4.0 * delays.max())
+    special = [t for t in (f.peak_time_s, f.settling_time_s) if t < 4.0 * delays.max()]
+    chosen = f.time_s[early[np.linspace(0, early.size - 1, POINTS).astype(int)]]
+    times = np.concatenate((special, chosen))
+    wanted = 1.0 - truth(parts, delays, times, np.ones(times.size), monkeypatch)  # L/(1 + L)
+    found = np.interp(times, f.time_s, f.response)
+    size = np.abs(wanted).max()
+    assert found[len(special) :] == pytest.approx(wanted[len(special) :], abs=1e-7 * size)
+    for t, value in zip(special, wanted, strict=False):
+        if t == f.peak_time_s:
+            assert f.peak_value == pytest.approx(value, rel=1e-7)
+        else:
+            assert abs(value / f.final_value - 1.0) == pytest.approx(0.02, abs=1e-7)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flint import arb, ctx, fmpq, fmpz_poly
+from flint import acb, acb_poly, arb, ctx, fmpq, fmpz_poly
 
+from actuator_lti.margins.distances import MODULUS
 from actuator_lti.margins.exact import real_roots
+from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.real_roots import positive_roots
 from actuator_lti.margins.exact.roots import all_roots
 
@@ -60,3 +62,21 @@ def test_all_roots_agree(seed: int) -> None:
     assert len(found) == len(real)
     ordered = sorted(real, key=lambda root: float(root.mid()))
     assert all(root.overlaps(other) for (root, _), other in zip(found, ordered, strict=True))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_smallest_distance_of_many_states(seed: int) -> None:
+    """Of a loop with narrow and wide resonances: no sample of the response is lower, and one is as low."""
+    rng = np.random.default_rng(seed)
+    N, D = fmpz_poly([1]), fmpz_poly([1])
+    for _ in range(32):
+        w, z = 10.0 ** rng.uniform(-2, 2), 10.0 ** rng.uniform(-4, 0)
+        D *= fmpz_poly([int(x * 2**40) for x in (w * w, 2.0 * z * w, 1.0)])
+        N *= fmpz_poly([int(x * 2**40) for x in (w * w * rng.uniform(0.8, 1.3), z * w, 0.9)])
+    value, place = smallest(N, D, MODULUS)
+    w = np.sort(np.concatenate([np.geomspace(1e-3, 1e3, 4000), place * (1.0 + np.linspace(-1e-6, 1e-6, 21))]))
+    with ctx.workprec(300):
+        points = [acb(0, float(x)) for x in w]
+        seen = [float(abs(1 + acb_poly(N)(s) / acb_poly(D)(s)).mid()) for s in points]
+    assert min(seen) == pytest.approx(value, rel=1e-9)
+    assert min(seen) >= value * (1.0 - 1e-12)

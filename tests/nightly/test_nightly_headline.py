@@ -6,15 +6,8 @@ from pathlib import Path
 import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 
-from reports.nightly.changes import (
-    Cause,
-    Change,
-    Comparison,
-    cause_words,
-    change_words,
-    headlines,
-    main_changes,
-)
+from reports.nightly import changes
+from reports.nightly.changes import Cause, Change, Comparison
 from reports.nightly.night import run_night
 
 
@@ -35,18 +28,17 @@ COMPARISON = Comparison(
 
 
 def test_the_cause_comes_first_then_the_required_figure_in_words() -> None:
-    first = main_changes(COMPARISON)[0]
-    words = f"{cause_words(COMPARISON.cause)}: {change_words(first, COMPARISON, [PHASE])}"
-    assert words == (
-        "control.position.gain 90 → 120 1/s: phase margin of the position loop 62.10 → 55.30 deg"
-    )
-    of_a_table = change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
+    first = changes.main_changes(COMPARISON)[0]
+    assert changes.cause_words(COMPARISON.cause) == "control.position.gain 90 → 120 1/s"
+    words = changes.change_words(first, COMPARISON, [PHASE])
+    assert words == "phase margin of the position loop 62.10 → 55.30 deg"
+    of_a_table = changes.change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
     assert of_a_table == "gain margin of Position loop 20.00 → 5.000 dB"
 
 
 def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> None:
     many = Comparison(changes=(*COMPARISON.changes, *(change(f"x{k}", 2.0, 1.0) for k in range(49))))
-    assert [c.kind for c in main_changes(many)] == ["distance", *["figure"] * 4]
+    assert [c.kind for c in changes.main_changes(many)] == ["distance", *["figure"] * 4]
 
 
 @pytest.mark.parametrize(
@@ -61,7 +53,7 @@ def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> N
     ],
 )
 def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
-    assert cause_words(cause) == words
+    assert changes.cause_words(cause) == words
 
 
 @pytest.fixture(scope="module")
@@ -76,7 +68,7 @@ def nights(tmp_path_factory):
 
 def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
     night, _ = nights
-    first, second = headlines(night.designs)
+    first, second = changes.headlines(night.designs)
     assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
     assert first.cause == "control.position.gain 12 → 10 1/s"
     assert first.effect == "gain margin 12.00 → 10.00 dB"

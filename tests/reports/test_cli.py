@@ -135,10 +135,7 @@ def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_folder_that_is_a_file_is_named(tmp_path, cli) -> None:
-    (tmp_path / "out").write_text("in the way")
-    said = cli.refused("report", "ctms-motor-position", "--out", tmp_path / "out", "--no-validation")
-    assert str(tmp_path / "out") in said
+def test_a_document_that_is_empty_is_named(tmp_path, cli) -> None:
     (tmp_path / "empty.json").touch()
     assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
 
@@ -184,7 +181,10 @@ def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
 
     monkeypatch.setattr("actuator_lti.design.load_design", unwanted)
     (tmp_path / "file").write_text("mine")
-    assert "is not a directory" in cli.refused(command, "ilr33-amber", "--out", tmp_path / "file" / "inside")
+    for place in (tmp_path / "file", tmp_path / "file" / "inside"):
+        said = cli.refused(command, "ilr33-amber", "--out", place)
+        assert f"{tmp_path / 'file'}" in said
+        assert "is not a directory" in said
     assert (tmp_path / "file").read_text() == "mine"
 
 

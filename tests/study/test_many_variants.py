@@ -39,16 +39,13 @@ def many(one) -> Comparison:
     """Thousands of designs with the figures of one, scaled at random; one of them fails a requirement."""
     draw, variants = random.Random(18), []
     for k in range(COUNT):
-        name, factor = f"variant {k}", draw.uniform(0.9, 1.1)
-        figures = {
-            key: None if v is None else v * draw.uniform(0.5, 2.0) for key, v in one.base.figures.items()
-        }
+        name, factor, own = f"variant {k}", draw.uniform(0.9, 1.1), one.base.figures
+        figures = {key: None if v is None else v * draw.uniform(0.5, 2.0) for key, v in own.items()}
         verdicts = [v if v.distance is None else moved(v, v.distance * factor) for v in one.base.verdicts]
         if name == FAILING:
             verdicts[3] = replace(moved(verdicts[3], -1e-9), verdict=Verdict.NOT_MET)
         variant = Variant(name, slug(name), one.base.variant.design, {})
-        made = replace(one.base, variant=variant, figures=figures, verdicts=tuple(verdicts))
-        variants.append(made)
+        variants.append(replace(one.base, variant=variant, figures=figures, verdicts=tuple(verdicts)))
     return replace(one, variants=tuple(variants))
 
 
@@ -65,15 +62,10 @@ def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> No
     names = {one.variant.name for one in shown.variants}
     assert FAILING in names
     for wanted in many.base.verdicts:
-        distances = {
-            one.variant.name: v.distance
-            for one in many.variants
-            for v in one.verdicts
-            if v.id == wanted.id and v.distance is not None
-        }
+        pairs = [(one.variant.name, v) for one in many.variants for v in one.verdicts if v.id == wanted.id]
+        distances = {name: v.distance for name, v in pairs if v.distance is not None}
         if distances:
-            assert min(distances, key=distances.__getitem__) in names
-            assert max(distances, key=distances.__getitem__) in names
+            assert {min(distances, key=distances.get), max(distances, key=distances.get)} <= names
     order = [one.variant.name for one in many.variants if one.variant.name in names]
     assert order == [one.variant.name for one in shown.variants]
 
@@ -92,10 +84,8 @@ def test_one_failing_design_of_thousands_fails_the_verdict_and_is_named(many, mo
     made = {part["id"]: part for part in sections(many)}
     assert not verdict_of(list(made.values()), "compare")["passed"]
     total = (COUNT + 1) * len(many.base.verdicts)
-    said = (
-        f"{total - 1} of {total} requirements met, 1 not met, over {COUNT + 1} designs. Not met: {FAILING}, "
-    )
-    assert made["verdicts"]["result"].startswith(said)
+    counted = f"{total - 1} of {total} requirements met, 1 not met, over {COUNT + 1} designs"
+    assert made["verdicts"]["result"].startswith(f"{counted}. Not met: {FAILING}, ")
     items = made["verdicts"]["blocks"][0]["items"]
     assert len(items) == len(many.base.verdicts)
     (worst,) = (one for one in items if one["verdict"] == "not met")

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from itertools import pairwise
 from typing import Any
 
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
@@ -28,14 +27,20 @@ _TOO_CLOSE = "a root could not be separated from what lies beside it"
 Places = tuple[tuple[fmpz_poly, int, tuple[tuple[arb, arb], ...]], ...]
 """A factor, its multiplicity, intervals with one root each; no two factors have a root in common."""
 
+Spans = tuple[tuple[float, float], ...]
+EVERYWHERE: Spans = ((-math.inf, math.inf),)
 
-def positive_roots(p: fmpz_poly) -> list[tuple[arb, int]]:
-    """The positive real roots in order, to the working precision, with their multiplicity."""
+
+def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, int]]:
+    """The positive real roots in order, to the working precision, with their multiplicity.
+
+    All that lie in some spans of the logarithm to base 2, and maybe some beside them.
+    """
     if p.degree() <= FEW:
         real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
         return sorted(real, key=lambda root: float(root[0].mid()))
     roots, least = [], arb((1, -ctx.prec))
-    for factor, times, places in _places(tuple(p.coeffs())):
+    for factor, times, places in _places(tuple(p.coeffs()), spans):
         with ctx.workprec(ctx.prec + factor.degree() + 32):
             q = _Evaluated(factor)
             roots += [(q.root_in(low, high, least), times) for low, high in places]
@@ -43,18 +48,18 @@ def positive_roots(p: fmpz_poly) -> list[tuple[arb, int]]:
 
 
 @lru_cache(maxsize=64)
-def _places(coefficients: tuple[Any, ...]) -> Places:
+def _places(coefficients: tuple[Any, ...], spans: Spans) -> Places:
     """Where the positive roots are; only where one is not told from its neighbour, factors are looked for."""
     p = fmpz_poly(list(coefficients))
     with ctx.workprec(_MOST_BITS):
         try:
-            return ((p, 1, tuple(_separated(p, 16 * (p.degree() + 64)))),)
+            return ((p, 1, tuple(_separated(p, spans, 16 * (p.degree() + 64)))),)
         except NumericalError:
             factors = p.factor_squarefree()[1]
-            return tuple((q, times, tuple(_separated(q, _MOST_BITS))) for q, times in factors)
+            return tuple((q, times, tuple(_separated(q, spans, _MOST_BITS))) for q, times in factors)
 
 
-def _separated(p: fmpz_poly, most_bits: int) -> Iterator[tuple[arb, arb]]:
+def _separated(p: fmpz_poly, spans: Spans, most_bits: int) -> Iterator[tuple[arb, arb]]:
     """Intervals with one root each, octave by octave."""
     while p.degree() > 0 and p[0] == 0:
         p = p.right_shift(1)
@@ -63,20 +68,25 @@ def _separated(p: fmpz_poly, most_bits: int) -> Iterator[tuple[arb, arb]]:
     scaled = [int(c) for c in p(fmpz_poly([0, _PLACE])).coeffs()]  # of x = v 2^16 / _PLACE, times 2^(16 k)
     sizes = [c.bit_length() - 16 * k for k, c in enumerate(scaled)]
     bits, n = p.degree() + 64, p.degree()
-    for octave in range(*_octaves(scaled, sizes)):
-        while (found := _in_octave(_rounded(scaled, sizes, octave, bits), n)) is None:
+    first, last = octaves(p)
+    for octave in range(first, last + 1):
+        start = octave - 16 + math.log2(_PLACE)
+        here = tuple((a - start, b - start) for a, b in spans if a <= start + 1.0 and b >= start)
+        found: list[tuple[int, int]] | None = []
+        while here and (found := _in_octave(_rounded(scaled, sizes, octave, bits), n, here)) is None:
             if (bits := 2 * bits) > most_bits:
                 raise NumericalError(_TOO_CLOSE)
-        for level, k in found:
+        for level, k in found or ():
             low, high = (arb((_PLACE * ((1 << level) + end), octave - 16 - level)) for end in (k, k + 1))
             yield low, high
 
 
-def _octaves(scaled: Sequence[int], sizes: Sequence[int]) -> tuple[int, int]:
-    """Between which powers of two the roots are, by the bound of Fujiwara."""
-    n = len(scaled) - 1
-    low = max((sizes[k] - sizes[0] + 1) / k for k in range(1, n + 1) if scaled[k])
-    high = max((sizes[k] - sizes[n] + 1) / (n - k) for k in range(n) if scaled[k])
+def octaves(p: fmpz_poly) -> tuple[int, int]:
+    """Between which powers of two the sizes of the roots are, zero left out, by the bound of Fujiwara."""
+    sizes = {k: int(c).bit_length() for k, c in enumerate(p.coeffs()) if c != 0}
+    first, last = min(sizes), max(sizes)
+    low = max((sizes[k] - sizes[first] + 1) / (k - first) for k in sizes if k > first)
+    high = max((sizes[k] - sizes[last] + 1) / (last - k) for k in sizes if k < last)
     return math.floor(-low) - 1, math.ceil(high) + 1
 
 
@@ -87,14 +97,17 @@ def _rounded(scaled: Sequence[int], sizes: Sequence[int], octave: int, bits: int
     return fmpz_poly([c >> move if move > 0 else c << -move for c, move in moves])
 
 
-def _in_octave(p: fmpz_poly, n: int) -> list[tuple[int, int]] | None:
+def _in_octave(p: fmpz_poly, n: int, spans: Spans) -> list[tuple[int, int]] | None:
     """(level, k): one root between 1 + k/2^level and 1 + (k + 1)/2^level; ``None``: more bits are needed."""
     found, left = [], [(p(_SHIFT), 0, 0)]
     while left:
         q, level, k = left.pop()
+        low, high = (math.log2(1.0 + end / (1 << level)) for end in (k, k + 1))
+        if not any(a <= high and b >= low for a, b in spans):
+            continue
         c = q.coeffs()
         c += [fmpz(0)] * (n + 1 - len(c))
-        changes = _sign_changes(fmpz_poly(c[::-1])(_SHIFT), n, level)
+        changes = _sign_changes(fmpz_poly(c[::-1])(_SHIFT), _errors(n, level))
         if changes is None:
             return None
         if changes == 1:
@@ -105,12 +118,27 @@ def _in_octave(p: fmpz_poly, n: int) -> list[tuple[int, int]] | None:
     return found
 
 
-def _sign_changes(over: fmpz_poly, n: int, level: int) -> int | None:
-    """Of the coefficients over an interval; what less than one of each coefficient was is known of them."""
-    error = _SHIFT**n * (1 << (n * (level + 1) + 2))
-    pairs = zip((over - error).coeffs(), (over + error).coeffs(), strict=True)
-    signs = [low > 0 if (low > 0) is (high > 0) else None for low, high in pairs]
-    return None if None in signs else sum(one is not other for one, other in pairwise(signs))
+@lru_cache(maxsize=64)
+def _errors(n: int, level: int) -> list[tuple[fmpz, fmpz]]:
+    """Between what coefficients over an interval may be zero, where those of powers are wrong by one."""
+    above = (_SHIFT**n * (1 << (n * (level + 1) + 2))).coeffs()
+    return [(-x, x) for x in above]
+
+
+def _sign_changes(over: fmpz_poly, errors: list[tuple[fmpz, fmpz]]) -> int | None:
+    """Of coefficients, up to two; ``None`` where a sign is not known."""
+    changes, before = 0, None
+    c = over.coeffs()
+    if len(c) < len(errors):  # the last ones are zero
+        return None
+    for x, (low, high) in zip(c, errors, strict=True):
+        if low <= x <= high:
+            return None
+        changes += before is not None and before is not (x > high)
+        if changes == 2:
+            break
+        before = x > high
+    return changes
 
 
 class _Evaluated:

@@ -1,0 +1,79 @@
+"""What a hint about an unknown key ends with: the number that the right key would have in this file."""
+
+from __future__ import annotations
+
+import re
+from contextlib import suppress
+from math import pi
+from typing import Any
+
+from actuator_lti.design.sheet_words import key_for
+from actuator_lti.design.spellings import split_quantity
+from actuator_lti.design.stated import CONVENTION
+from actuator_lti.design.units import parse_quantity
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import shown
+from actuator_lti.files.tree import Tree
+
+
+def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str:
+    """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``."""
+    word = re.sub(r'(?<=which takes )"([0-9.]+)([^"]*)"', lambda found: _echo(table[key], found), word)
+    if word.startswith(("integral_time =", "derivative_time =")):
+        return word + _time(word, table, key)
+    if word.startswith("every,"):
+        ticks = _period_s(table[key]) / _period_s(_of(tree, "control", "period"))
+        return f"{word}; here {round(ticks)}" if ticks > 0.5 else word
+    if path == "control.current" and key == "bandwidth":
+        time_s = _si(_of(tree, "motor", "inductance"), "H") / _si(_of(tree, "motor", "resistance"), "ohm")
+        here = f", here {time_s:.4g} s" if time_s > 0.0 else ""
+        return f"{word}; a drive that is set so has integral_time = L/R{here}"
+    if word.startswith("back_emf_constant, times the pole pairs"):
+        pairs = [_of(tree, "motor", name) for name in ("pole_pairs", "poles")]
+        p = next((one / k for k, one in enumerate(pairs, 1) if isinstance(one, int)), 0.0)
+        flux = p * _si(f"{_plain(table[key])}".replace("Wb", "V*s"), "V*s")
+        return f"{word}: {flux:.4g} V*s/rad and {1.5 * flux:.4g} N*m/A" if flux > 0.0 else word
+    return word
+
+
+def _plain(value: Any) -> Any:
+    return value.get("value") if isinstance(value, dict) else value
+
+
+def _of(tree: Tree, table: str, key: str) -> Any:
+    found = tree.get(table)
+    return _plain(found.get(key)) if isinstance(found, dict) else None
+
+
+def _si(text: Any, unit: str) -> float:
+    """NaN where it is no such quantity, or none at all."""
+    with suppress(InputError):
+        return parse_quantity(text, unit) or float("nan") if isinstance(text, str) else float("nan")
+    return float("nan")
+
+
+def _period_s(text: Any) -> float:
+    period_s = _si(_plain(text), "s")
+    return period_s if period_s > 0.0 else 2.0 * pi / _si(_plain(text), "rad/s")
+
+
+def _echo(value: Any, example: re.Match[str]) -> str:
+    """The example of a hint with the file's own number."""
+    value = _plain(value)
+    bare = isinstance(value, int | float) or f"{value}".strip().replace(".", "").isdigit()
+    return f'"{value}{example[2]}"' if bare else shown(value) if isinstance(value, str) else example[0]
+
+
+def _time(word: str, table: Tree, key: str) -> str:
+    """The time that an integral or derivative gain is beside the gain of its table."""
+    named = next((one for one in table if "gain" in (one, key_for("control.", one))), "")
+    texts = [f"{table.get(one)}" for one in (named, key)]
+    if CONVENTION.findall(texts[0]) != CONVENTION.findall(texts[1]):  # amperes of two kinds
+        texts[0] = ""
+    gain, own = (CONVENTION.sub("", text) for text in texts)
+    for quotient in [(gain, own), ("1", own)] if word.startswith("integral") else [(own, gain)]:
+        with suppress(ValueError, ZeroDivisionError):
+            (a, of), (b, per) = map(split_quantity, quotient)
+            time_s = parse_quantity(f"{a / b!r} ({of or 1})/({per})", "s/rad")
+            return f"; here {time_s:.4g} s" if time_s > 0.0 else ""
+    return ""
