@@ -182,8 +182,7 @@ def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str
     while name in {job.name for job in jobs}:
         name += " (study)"
     designs = [
-        {k: job.payload[k] for k in ("name", "design", "refused") if k in job.payload}
-        | {"overrides": _texts(variant)}
+        {k: v for k, v in job.payload.items() if k != "settings"} | {"overrides": _texts(variant)}
         for job, variant in zip(jobs, study.all, strict=True)
     ]
     whole = {"title": study.title or study.name, "designs": designs}

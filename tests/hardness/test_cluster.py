@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from kill_cluster import Cluster
-from nightly_fakes import CODE, Fakes, job, study
+from nightly_fakes import CODE, Fakes, job, study, wait_for
 
 from actuator_lti.errors import InputError, NumericalError
 from analyses.monte_carlo import SampleTask
@@ -234,11 +234,8 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_pa
     words = ["montecarlo", "ilr33-amber", "--samples", "40000", "--no-worst", "--out", str(out), "--quiet"]
     command = [str(Path(sys.executable).with_name("actuator-lti")), *words, "--scheduler", bare.address]
     study = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    end = time.monotonic() + 120.0
-    while len(list(out.rglob("*.parquet"))) < 2:
-        assert study.poll() is None
-        assert time.monotonic() < end
-        time.sleep(0.05)
+    wait_for(lambda: len(list(out.rglob("*.parquet"))) >= 2 or study.poll() is not None)
+    assert study.poll() is None
     bare.scheduler.kill()
     _, said = study.communicate(timeout=120)
     assert study.returncode == 3, said

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +91,13 @@ def job(name: str, margin: float = 10.0, **more: Any) -> Job:
 def study(*jobs: Job, name: str = "fake study", **more: Any) -> Study:
     """A study of such jobs."""
     return Study(name=name, jobs=tuple(jobs), title=more.pop("title", "Fin actuators"), **more)
+
+
+def wait_for(condition: Callable[[], bool], seconds: float = 120.0) -> None:
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "did not come true in time"
+        time.sleep(0.02)
 
 
 class Calendar:

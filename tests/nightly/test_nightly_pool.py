@@ -6,14 +6,13 @@ import signal
 import subprocess
 import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
 import psutil
 import pytest
-from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study
+from nightly_fakes import BUILD, CODE, INLINE, Calendar, Fakes, job, study, wait_for
 from site_checks import check_whole
 
 from analyses.studies.engine import Engine
@@ -155,7 +154,7 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     script.write_text(WITH_WORKERS)
     nightly = subprocess.Popen([sys.executable, str(script), str(site), str(log)], env=QUIET)
     cache = tmp_path / "site.state" / "cache"
-    _wait_for(lambda: len(list(cache.glob("*/*.entry"))) >= 4)  # one of them is of the night before
+    wait_for(lambda: len(list(cache.glob("*/*.entry"))) >= 4)  # one of them is of the night before
     workers = psutil.Process(nightly.pid).children()
     nightly.send_signal(signal.SIGKILL)
     nightly.wait()
@@ -170,10 +169,3 @@ def test_a_killed_nightly_takes_its_workers_along_and_resumes(tmp_path) -> None:
     assert len(cached) == kept >= 3
     assert night.interrupted
     assert "did not end" in check_whole(site).text
-
-
-def _wait_for(condition, seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not condition():
-        assert time.monotonic() < end, "did not come true in time"
-        time.sleep(0.02)
