@@ -28,14 +28,14 @@ def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str
         return word + _time(word, table, key)
     if word.startswith("every,"):
         ticks = _period_s(table[key]) / _period_s(_of(tree, "control", "period"))
-        return f"{word}; here {round(ticks)}" if ticks > 0.5 else word
+        return f"{word}; here {round(ticks)}" if 0.5 < ticks <= 1000.0 else word
     if path == "control.current" and key == "bandwidth":
         time_s = _si(_of(tree, "motor", "inductance"), "H") / _si(_of(tree, "motor", "resistance"), "ohm")
         here = f", here {time_s:.4g} s" if time_s > 0.0 else ""
         return f"{word}; a drive that is set so has integral_time = L/R{here}"
     if word.startswith("back_emf_constant, times the pole pairs"):
         pairs = [_of(tree, "motor", name) for name in ("pole_pairs", "poles")]
-        p = next((one / k for k, one in enumerate(pairs, 1) if isinstance(one, int)), 0.0)
+        p = next((one / k for k, one in enumerate(pairs, 1) if isinstance(one, int) and one < 1000), 0.0)
         flux = p * _si(f"{_plain(table[key])}".replace("Wb", "V*s"), "V*s")
         return f"{word}: {flux:.4g} V*s/rad and {1.5 * flux:.4g} N*m/A" if flux > 0.0 else word
     return word
@@ -48,7 +48,7 @@ def per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
     screw = frame.travel_m_rad is not None
     linear = frame.structure.axis == "linear" and not screw
     unit = field.unit(replace(frame.structure, axis="linear" if linear else "rotary"))
-    with suppress(InputError, ValueError, TypeError):
+    with suppress(InputError, ValueError, TypeError, ArithmeticError):
         counts = frame.quantity(_of(tree, "encoder", "counts_per_rev"), FIELDS["encoder.counts_per_rev"])
         plain = CONVENTION.sub("", text)
         power = dict(parse_unit(split_quantity(plain)[1]).dimension).get("[count]", 0)
