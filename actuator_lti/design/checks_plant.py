@@ -94,7 +94,8 @@ def _warm(design: Design, ratio: Any) -> str:
 
 def _ratio(design: Design, off: Any) -> str:
     """What would explain the ratio of kM to kE: a convention that is not the stated one, or a factor."""
-    motor, sheets = design.motor, dict(_SHEETS)
+    sheets = dict(_SHEETS)
+    motor: Any = design.motor
     stated = motor.torque_constant_Nm_A / motor.back_emf_constant_Vs_rad
     if _PER_VOLT.search(_number_written(design, "back_emf_constant")[1]):  # KV is line-line, whatever else
         sheets["peak-phase"] = sheets.pop(_BOTH_PEAK)

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
+from dataclasses import replace
 from math import pi
 from typing import Any
 
+from actuator_lti.design.field import Field
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.spellings import split_quantity
-from actuator_lti.design.stated import CONVENTION
-from actuator_lti.design.units import parse_quantity
+from actuator_lti.design.stated import CONVENTION, Frame
+from actuator_lti.design.units import parse_quantity, parse_unit
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
+
+_COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
 
 
 def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str:
@@ -34,6 +39,26 @@ def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str
         flux = p * _si(f"{_plain(table[key])}".replace("Wb", "V*s"), "V*s")
         return f"{word}: {flux:.4g} V*s/rad and {1.5 * flux:.4g} N*m/A" if flux > 0.0 else word
     return word
+
+
+def per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
+    """What a value in counts of the encoder is in rad or m, where the file says how many there are."""
+    if not isinstance(text, str) or not _COUNT.search(text) or field.key == "counts_per_rev":
+        return ""
+    screw = frame.travel_m_rad is not None
+    linear = frame.structure.axis == "linear" and not screw
+    unit = field.unit(replace(frame.structure, axis="linear" if linear else "rotary"))
+    with suppress(InputError, ValueError, TypeError):
+        counts = frame.quantity(_of(tree, "encoder", "counts_per_rev"), FIELDS["encoder.counts_per_rev"])
+        plain = CONVENTION.sub("", text)
+        power = dict(parse_unit(split_quantity(plain)[1]).dimension).get("[count]", 0)
+        size = (
+            parse_quantity(_COUNT.sub("m" if linear else "rad", plain), unit)
+            * ((1.0 if linear else 2.0 * pi) / counts) ** power
+        )
+        kind = "".join(f" {one}" for one in CONVENTION.findall(text))
+        return f"; of {counts:g} counts {size:.4g} {re.sub(r'(?<=A)(?=[*/ ]|$)', kind, unit)}"
+    return ""
 
 
 def _plain(value: Any) -> Any:

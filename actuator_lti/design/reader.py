@@ -19,7 +19,7 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
-from actuator_lti.design.hint_numbers import with_numbers
+from actuator_lti.design.hint_numbers import per_count, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
@@ -291,7 +291,8 @@ class Reader:
         try:
             value = self.frame.quantity(raw, field)
         except InputError as error:
-            return self.refuse(path, raw, f"{error.message}{self.frame.other_axis(raw, field)}")
+            counts = per_count(raw, field, self.frame, self.tree)
+            return self.refuse(path, raw, f"{error.message}{self.frame.other_axis(raw, field)}{counts}")
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):

@@ -57,8 +57,9 @@ class Fit:
 
     def get(self, name: str, default: float) -> float:
         """A value, or another where it is not among them."""
-        there = name in self
-        return self[name] if there else default
+        if name not in self:
+            return default
+        return self[name]
 
     @property
     def standard_errors(self) -> FloatArray:

@@ -94,7 +94,10 @@ def identify_frequency(
     lines = two_mass.excited_lines(replace(record, signals=signals), tuple(names), period)
     lines = _between_ticks(design, record, lines)
     reaction = _reaction(design, torque, record["angle"])
-    fit = _fitted(lines, design.ratio_to_coupling, _held(design, dict(fixed or {})), reaction)
+    held = held_by_name(fixed or {}, two_mass.NAMES)
+    for name, (others, slope) in _besides(design).items():
+        held |= {name: held[name] / slope + others} if name in held else {}
+    fit = _fitted(lines, design.ratio_to_coupling, held, reaction)
     play = None if play_record is None else play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
@@ -175,15 +178,12 @@ def _held_at_zero(fit: TwoMass) -> TwoMass:
     )
 
 
-def _held(design: Design, fixed: dict[str, float]) -> dict[str, float]:
-    """Values of the design's keys by the names of the fit, at the motor and at the coupling."""
-    held = held_by_name(fixed, two_mass.NAMES)
-    if "motor_inertia" in held:
-        held["motor_inertia"] += design.motor_side_inertia_kgm2 - design.motor.rotor_inertia_kgm2
-    if "load_inertia" in held:
-        change = held["load_inertia"] - design.load.inertia_kgm2
-        held["load_inertia"] = design.load_side_inertia_kgm2 + change / design.ratio_behind_coupling**2
-    return held
+def _besides(design: Design) -> dict[str, tuple[float, float]]:
+    """Of each side: its inertias beside the rotor's or the load's, and what takes the load's to its shaft."""
+    behind = design.ratio_behind_coupling**2
+    motor = design.motor_side_inertia_kgm2 - design.motor.rotor_inertia_kgm2
+    load = design.load_side_inertia_kgm2 - design.load.inertia_kgm2 / behind
+    return {"motor_inertia": (motor, 1.0), "load_inertia": (load, behind)}
 
 
 def _written_item(written: Design, lines: Lines, record: str, reaction: float) -> Item:
@@ -202,19 +202,16 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
 
 
 def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Design:
-    behind, old = design.ratio_behind_coupling, design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
+    old = design.coupling or Coupling(stiffness_Nm_rad=fit["stiffness"])
     coupling = replace(old, stiffness_Nm_rad=fit["stiffness"], damping_Nms_rad=fit["damping"])
     if play is not None:
         coupling = replace(coupling, play_rad=max(2.0 * play.half_rad, 0.0) if play.told else 0.0)
     friction = replace(design.load.friction or LoadFriction(), viscous_Nms_rad=fit["load_viscous"])
     base = replace(design, coupling=coupling, load=replace(design.load, friction=friction))
-    others = base.motor_side_inertia_kgm2 - base.motor.rotor_inertia_kgm2
-    own_load = base.load_side_inertia_kgm2 - base.load.inertia_kgm2 / behind**2
-    shift = {"motor_inertia": -others, "load_inertia": -own_load}
-    slopes, values = {}, {}
+    slopes, values, sides = {}, {}, _besides(base)
     for name in (name for name in fit.names if fit[name] > 0.0):
-        key, slope = parameter(name).key, behind**2 if name == "load_inertia" else 1.0
-        slopes[key], values[key] = {name: slope}, slope * (fit[name] + shift.get(name, 0.0))
+        key, (others, slope) = parameter(name).key, sides.get(name, (0.0, 1.0))
+        slopes[key], values[key] = {name: slope}, slope * (fit[name] - others)
     made = fit.mapped(slopes, values)
     if play is not None and play.told:
         made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)

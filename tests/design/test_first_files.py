@@ -76,7 +76,9 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
         (f"{LAW}D = [1]\nkp = 3", "a number of D", 1),
         *((f'{CURRENT}[control.velocity]\ngain = "{speed}"', NO_BANDWIDTH, 1)
           for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
-        # at 2^19 counts it is 9.2 A s/rad, not 1.1e-4
+        # at 2^19 counts it is 9.179 A s/rad, not 1.1e-4
+        (f'[encoder]\ncounts_per_rev = "19 bit"\n{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"',
+         "of 524288 counts 9.179 A*s/rad", 1),
         (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
         *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
           for word in ("ppr", "CPT", "pulses", "CPR")),

@@ -49,6 +49,7 @@ computing_delay = "{d} s"
 [control.position]
 gain = "0.8 V/rad"
 """
+RIGID = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
 
 
 def _design(folder: Path, off: dict[str, float]) -> Path:
@@ -128,9 +129,8 @@ def test_intervals_hold_what_they_say(tmp_path) -> None:
 
 def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
     """A rigid drive: two inertias on one shaft; far too much noise: the small values drown."""
-    rigid = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
     design = tmp_path / "rigid.toml"
-    design.write_text(rigid.format(J=2e-5, Jl=0.04, C=4e-4, d=6e-4))
+    design.write_text(RIGID.format(J=2e-5, Jl=0.04, C=4e-4, d=6e-4))
     hertz, total = HERTZ[HERTZ < 4.0], 2e-5 + 0.04 / N**2
     fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
     assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
@@ -141,9 +141,8 @@ def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
 
 def test_a_load_without_inertia_is_kept_without(tmp_path) -> None:
     """A rigid drive whose rotor has it all: its inertia is the whole one at the motor."""
-    rigid = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
     design = tmp_path / "rigid.toml"
-    design.write_text(rigid.format(J=5e-5, Jl=0.0, C=4e-4, d=6e-4))
+    design.write_text(RIGID.format(J=5e-5, Jl=0.0, C=4e-4, d=6e-4))
     hertz = HERTZ[HERTZ < 4.0]
     fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
     assert fit["motor.rotor_inertia"] == pytest.approx(2e-5 + 0.04 / N**2, rel=0.02)

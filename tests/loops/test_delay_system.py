@@ -175,6 +175,8 @@ def test_two_delays_without_a_common_measure() -> None:
         system = lag * (DelaySystem.delay(delays[0]) + DelaySystem.delay(delays[1]))
         wanted = sum(np.where(times > d, 1.0 - np.exp(-(times - d)), 0.0) for d in delays)
         np.testing.assert_allclose(control.step_response(system, times).y[0, 0], wanted, atol=1e-10)
+        late = control.forced_response(system, 2.0**20 + times, np.ones(91))  # a record's own clock
+        np.testing.assert_allclose(np.ravel(late.y), wanted, atol=1e-8)
 
 
 def test_jumps_that_go_round_for_ever() -> None:
