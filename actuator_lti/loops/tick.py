@@ -87,6 +87,8 @@ class TickProgram(Program):
 class TickWalk(Walk):
     """The program of one tick; ``next`` holds the states after it."""
 
+    program: TickProgram
+
     def __init__(self, program: TickProgram, k: int) -> None:
         super().__init__(program)
         self.k = k
