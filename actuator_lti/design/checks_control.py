@@ -32,7 +32,7 @@ def _filters(design: Design) -> Iterator[Refusal]:
         for field in fields_in("control.velocity.filter.*"):
             yield from readable(_filter_key(item, field, f"{path}.{field.key}", nyquist))
         for key, most, words in (("b", 3, "1 to 3, b0 b1 b2"), ("a", 2, "1 or 2, a1 a2, after a leading 1")):
-            yield from readable(_biquad(item, f"{path}.{key}", getattr(item, key), most, words))
+            yield from readable(_biquad(item, path, key, most, words))
 
 
 def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterator[Refusal]:
@@ -47,12 +47,13 @@ def _filter_key(item: Filter, field: Field, path: str, nyquist: float) -> Iterat
         yield path, f"{value:.6g} rad/s", allowed
 
 
-def _biquad(item: Filter, path: str, values: Any, most: int, words: str) -> Iterator[Refusal]:
+def _biquad(item: Filter, path: str, key: str, most: int, words: str) -> Iterator[Refusal]:
     """Its numerator or its denominator, of two at most."""
+    values = getattr(item, key)
     if item.kind == "biquad" and len(values) > most:
-        yield path, f"{len(values)} values", f"allowed: {words}"
+        yield f"{path}.{key}", f"{len(values)} values", f"allowed: {words}"
     elif item.kind == "biquad" and most == 2 and not stable_pair(*(*values, 0.0, 0.0)[:2]):
-        yield path, f"{list(values)}", "allowed: poles inside the unit circle"
+        yield f"{path}.{key}", f"{list(values)}", "allowed: poles inside the unit circle"
 
 
 def _filter_count(design: Design) -> Iterator[Refusal]:
@@ -123,9 +124,9 @@ def _command_filter(design: Design) -> Iterator[Refusal]:
 
 def _command(design: Design) -> Iterator[Refusal]:
     for key, (per, outer, limiter) in _PROFILE.items():
-        value, unit = _of(design, f"command.{key}"), ("m" if design.axis == "linear" else "rad") + per
-        yield from readable(_needed(design, key, value, unit, outer))
-        yield from readable(_slow_enough(design, key, value, unit, limiter))
+        value = _of(design, f"command.{key}")
+        yield from readable(_needed(design, key, value, per, outer))
+        yield from readable(_slow_enough(design, key, value, per, limiter))
 
 
 def _of(design: Design, path: str) -> Any:
@@ -133,29 +134,36 @@ def _of(design: Design, path: str) -> Any:
     return getattr(part_at(design, FIELDS[path].section), FIELDS[path].attribute)
 
 
-def _needed(design: Design, key: str, value: float, unit: str, outer: str) -> Iterator[Refusal]:
+def _needed(design: Design, key: str, value: float, per: str, outer: str) -> Iterator[Refusal]:
     if value == inf:
         return
     if design.controller.position is None:
-        yield _written(design, key, value, unit, "allowed with a position loop")
+        yield _written(design, key, value, per, "allowed with a position loop")
     if outer and _of(design, f"command.{outer}") == inf:
-        yield _written(design, key, value, unit, f"needs command.{outer}")
+        yield _written(design, key, value, per, f"needs command.{outer}")
 
 
-def _slow_enough(design: Design, key: str, value: float, unit: str, limiter: str) -> Iterator[Refusal]:
+def _slow_enough(design: Design, key: str, value: float, per: str, limiter: str) -> Iterator[Refusal]:
     limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
+        unit = _of_axis(design, per)
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
         allowed = f"faster than limits.{limiter}; allowed: at most {most} at the output"
-        yield _written(design, key, value, unit, allowed)
+        yield _written(design, key, value, per, allowed)
 
 
-def _written(design: Design, key: str, value: float, unit: str, allowed: str) -> Refusal:
+def _of_axis(design: Design, per: str) -> str:
+    """The unit of a key of the command; that of a time stands alone."""
+    return per if per == "s" else ("m" if design.axis == "linear" else "rad") + per
+
+
+def _written(design: Design, key: str, value: float, per: str, allowed: str) -> Refusal:
     """A key of the command as the file has it, else in SI."""
     parameter = design.parameters.get(f"command.{key}")
-    return f"command.{key}", f"{value:.6g} {unit}" if parameter is None else parameter.text, allowed
+    text = f"{value:.6g} {_of_axis(design, per)}" if parameter is None else parameter.text
+    return f"command.{key}", text, allowed
 
 
 def _jitter(design: Design) -> Iterator[Refusal]:

@@ -108,7 +108,7 @@ def _ratio(design: Design, off: Any) -> str:
         return f"; the ratio is that of {', '.join(filter(None, (named, how)))}"
     factors = {words: abs(abs(log(off)) - log(factor)) for words, factor in _FACTORS.items()}
     words = min(factors, key=factors.__getitem__)
-    return f"; the ratio is {words}" if factors[words] < (_NEAR if _AC in words else 0.08) else ""
+    return f"; the ratio is {words}" if factors[words] < (0.05 if _AC in words else 0.08) else ""
 
 
 def with_stand_ins(design: Design) -> Design:

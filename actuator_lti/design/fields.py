@@ -56,4 +56,4 @@ def field_of(path: str) -> Field | None:
 
 def fields_in(section: str) -> tuple[Field, ...]:
     """All keys of a section such as ``"control.velocity"``, ``"gear.*"`` or ``"requirement"``."""
-    return _IN[section]
+    return _IN.get(section, ())

@@ -22,7 +22,7 @@ _SPELLINGS = (
     (re.compile(r"\bAmp(s?)\b"), r"amp\1"),
     (re.compile(r"^/"), "1/"),  # 25/s
     (
-        re.compile(r"(?i)\(?\b(l|line|ph(?:ase)?)(?:[- ]+| *to[- ]*)\1\b\)?"),
+        re.compile(r"(?i)\(?\b(l|line|ph(?:ase)?)(?:[- ]+|[- ]*to[- ]*)\1\b\)?"),
         "line_line",
     ),
     (re.compile(r"°C|℃|\bdeg(?:rees?)? ?C\b"), " degC"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import isinf, pi, sqrt
 from typing import Any
@@ -48,9 +49,9 @@ class Frame:
             text = _PER_TURN.sub("", text) if field.key in ("lead", "counts_per_rev") else text
             if field.path == "limits.voltage" and _MAINS.search(text):
                 _refuse_mains(_MAINS.sub("", text))
-            if convention := CONVENTION.search(text):
+            if said := {text[of.start() - 1]: of[1].lower() for of in CONVENTION.finditer(text)}:
                 plain = self.quantity(CONVENTION.sub(" dc", text), field)
-                return plain * self._amperes(field, unit, convention[1].lower())
+                return plain * self._amperes(field, unit, said)
         rotary = field.unit(replace(self.structure, axis="rotary"))
         factors = {unit: 1.0}
         if self.travel_m_rad is not None and power and rotary != unit:
@@ -59,6 +60,8 @@ class Frame:
         if counted and _PER_TRAVEL.search(f"{text}"):
             own = field.section == "encoder" and self.travel_m_rad
             factors = {"count/m": 2.0 * pi * own if own else 1.0}  # of a lead, or of a metre
+            counts = parse_quantity(text, "count/m") * factors["count/m"]
+            return float(round(counts)) if abs(counts - round(counts)) <= 1e-9 * counts else counts
         refused: list[InputError] = []
         for one, factor in factors.items():
             try:
@@ -70,6 +73,7 @@ class Frame:
             if (turned := _turned(field.path, text, one)) is not None:
                 line = field.section == "motor" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
+        refused = [one for one in refused if one.message.count(";") > 1] or refused  # with what to write
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]
 
     def _said(self, text: Any, field: Field, unit: str, value: float) -> float:
@@ -85,11 +89,13 @@ class Frame:
             f"{f'; of a dq controller, of a phase: {PHASE}' * gain}"
         )
 
-    def _amperes(self, field: Field, unit: str, convention: str) -> float:
+    def _amperes(self, field: Field, unit: str, said: Mapping[str, str]) -> float:
         """From amperes rms or peak to those of the model; constants of the motor to those of its convention.
 
-        i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak; kE against kM tells a wrong convention.
+        i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak; kE against kM tells a wrong convention. The volts of a gain
+        are peak line-line; ``said`` of them may be rms.
         """
+        convention = said.get("A") or said["V"]
         if convention == "phase" and self.constants != "dc":
             if not unit.startswith("V/A"):
                 raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
@@ -107,7 +113,8 @@ class Frame:
         power = len(sized.findall(above)) - len(sized.findall(below))
         if not (own or power):
             raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
-        return float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
+        volts = sqrt(2.0) if not own and said.get("V") in ("rms", "eff") else 1.0
+        return volts * float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
 
     def other_axis(self, raw: Any, field: Field) -> str:
         """That the unit of a refused value would be one of the other kind of axis."""

@@ -44,10 +44,11 @@ def _sampling(design: Design) -> Iterator[str]:
             yield f"control.{name}.integral_time: {integral:g} s is shorter than the period, {period:g} s"
     current, resistance = design.controller.current, design.effective_motor.resistance_ohm
     if current is not None and current.integral_time_s is None and current.law is None and resistance:
-        error = 1.0 / (1.0 + current.gain_V_A / resistance)
+        error = (1.0 - current.resistance_feedforward) / (1.0 + current.gain_V_A / resistance)
         if error >= 0.1:
-            given = f"gain/R is {1.0 / error - 1.0:.3g}: the current is {100.0 * error:.3g} % short at rest"
-            yield f"control.current.integral_time: not given, and {given}"
+            ratio = f"gain/R is {current.gain_V_A / resistance:.3g}"
+            short = f"the current is {100.0 * error:.3g} % short at rest"
+            yield f"control.current.integral_time: not given, and {ratio}: {short}"
     ticks = design.controller.computing_delay_s / design.controller.period_s
     if ticks > 2:
         yield f"control.computing_delay: {ticks:.3g} ticks is unusually long (1 to 2 are common)"

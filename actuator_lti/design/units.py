@@ -32,7 +32,7 @@ _BASE = {
     "A ampere amp": "[current]", "rad radian": "[angle]",
     "K kelvin": "[temperature]", "degC celsius C": "[celsius]",
     "count counts cnt cts inc increment": "[count]",  # no angle: its revolution is another key
-    "cpr CPR cpt CPT ppr PPR ppt PPT p pulse": "[pulse]",  # of one maker a line, of another a count
+    "cpr Cpr CPR cpt CPT ppr PPR ppt PPT p pulse Pulse": "[pulse]",  # of one maker a line, of another a count
 }  # fmt: skip
 # What each is, in units that stand above it.
 _DERIVED = {
@@ -85,7 +85,10 @@ _FLUX = (
 # What makers write into a unit that is none, and what is to be written instead.
 _ASIDE = {
     "erpm": 'is electrical; over the pole pairs it is "rpm"',
-    "phase": "is no unit; leave it out: motor.constants says of which winding R and L are",
+    "phase": 'is no unit; leave it out: with motor.constants = "peak-phase" R and L are of a phase, with '
+    '"rms-line" line-line, twice those of a phase',
+    "grad": 'is no unit; of 360 a turn it is "deg", of 400 "0.9 deg"',
+    "g": "is no unit; 1 g of a fall is 9.80665 m/s^2",
     "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
@@ -176,6 +179,8 @@ def _named(name: str, units: Units) -> Exact:
         for prefix, power in (("", 0), *_PREFIXES.items()):
             unit = one[len(prefix) :]
             if not one.startswith(prefix) or unit not in units or (power and unit in ("kg", "kilogram")):
+                continue
+            if power > 3 and unit == "rad":  # "Grad" are degrees
                 continue
             if plural and not (len(unit) >= _WORD or unit in _PLURALS):
                 continue
@@ -268,8 +273,9 @@ _ADVICE = {
     ): "a corner (PI, filter) of it is {corner:.4g} s, 1/(2 pi f), a period {period:.6g} s",
     **dict.fromkeys(product((_FREQUENCY, "gain or rate"), ("A*s/rad", "V*s/rad", "V/A")), _IN_HZ),
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
-    ("count or line, by maker", "1"): 'write "{n:g} lines" ({lines:g} counts) or "{n:g} counts"',
-    ("mass", "m/s^2"): "g of a fall is 9.80665 m/s^2, here {fall:.6g} m/s^2",
+    ("count or line, by maker", "1"): 'write "{n:.15g} lines" ({lines:.15g} counts) or "{n:.15g} counts"',
+    (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
+    ("mass", "m/s^2"): "1 g of a fall is 9.80665 m/s^2{fall}",
     ("mass", "N"): "a weight is written kgf",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
     ("mass", "kg*m^2"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
@@ -287,7 +293,8 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         size = number * value.factor
         corner = 1.0 / size if size > 0.0 else nan
         here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
-        told = said.format(size=size, fall=size * 9806.65, **here)
+        fall = f", here {9.80665 * number:.6g} m/s^2" if value.factor == 1e-3 else ""
+        told = said.format(size=size, fall=fall, **here)
         return "" if "nan" in told else f"; {told}"
     if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"

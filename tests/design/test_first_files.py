@@ -68,7 +68,7 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
 @pytest.mark.parametrize(
     ("more", "words", "times"),
     [
-        (f"{LAW}[control.position.law.continuous]\nD = [3]", "D: missing; allowed: the law as it runs", 1),
+        (f"{LAW}[control.position.law.continuous]\nD = [3]", "law.D: missing; allowed: the law as", 1),
         *((LAW + zero, "the law gives nothing", 1)
           for zero in ("D = [0]", "D = [[0]]", STATE, f"{STATE}D = [0]")),
         (LAW + TF, "tf2ss(num,den)", 2),

@@ -4,16 +4,20 @@ import os
 import threading
 from collections.abc import Callable
 
+import control
 import numpy as np
 import pytest
 from programs import needs_compiler
 from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import load_design
+from actuator_lti.axis.library import LIBRARY as AXIS
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
 from actuator_lti.compiled import compiler
 from actuator_lti.compiled.library import Library
 from actuator_lti.errors import InputError
+from actuator_lti.margins import stability_margins
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
@@ -127,6 +131,31 @@ def test_a_library_is_named_by_its_sources(library: Library, tmp_path) -> None:
     assert library.path().parent == tmp_path / "_native"
     assert library.path() != other.path()
     assert other.path("win32-AMD64").suffix == ".dll"
+
+
+def _figures() -> np.ndarray:
+    design = load_design("ctms-motor-position")
+    gain = design.parameters["control.position.gain"].value
+    population = Population(design, {"control.position.gain": gain * np.array([1.0, 1.1])}, 2)
+    return linear_figures(population, time_figures=False).raw
+
+
+def _margins() -> np.ndarray:
+    """Over a resonance, an integrator and a delay: the search of the axis, passages and distances."""
+    found = stability_margins(control.tf([0.2, 0.3, 9.0], [1.0, 0.3, 9.0, 0.0]), delay_s=0.1)
+    assert len(found.gain_margins) > 1
+    gains = [one.ratio for one in found.gain_margins]
+    return np.array([found.gain_margin_db, found.phase_margin_deg, found.modulus_margin, *gains])
+
+
+@pytest.mark.parametrize(("work", "library"), [(_figures, FIGURES), (_margins, AXIS)])
+def test_figures_are_those_of_the_kernels_as_written(
+    work: Callable[[], np.ndarray], library: Library
+) -> None:
+    """To rounding: Python's hypot is not the C library's."""
+    ours = work()
+    with library.written():
+        np.testing.assert_allclose(ours, work(), rtol=1e-9)
 
 
 @needs_compiler

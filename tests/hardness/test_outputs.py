@@ -270,10 +270,13 @@ def test_a_night_that_is_refused_creates_nothing(why, tmp_path) -> None:
     if why == "history lost":
         night(site)
         shutil.rmtree(state)
-    elif why in ("history damaged", "history newer"):
-        newer = json.dumps({"schema": SCHEMA, "version": 999})
+    elif why == "history damaged":
         state.mkdir()
-        (state / "history.json").write_text(newer if why == "history newer" else "no history" * 1000)
+        (state / "history.json").write_text("no history" * 1000)
+    elif why == "history newer":
+        night(site)
+        shutil.rmtree(site)
+        (state / "history.json").write_text(json.dumps({"schema": SCHEMA, "version": 999}))
     elif why == "locked":
         held = hold(state)
     with held:

@@ -148,7 +148,7 @@ def test_random_controllers(part: int) -> None:
     assert limited > CASES / 16  # the limits and what follows them were seen
 
 
-STATE_TICKS = 60
+STATE_TICKS, MORE_THAN_A_BLOCK = 60, layout.BLOCK + 44
 NOISE = {"current_noise_A": 0.01, "angle_noise_rad": 1e-4, "output_angle_noise_rad": 1e-6, "jitter_s": 1e-6}
 NAMED = [
     (part, name)
@@ -207,12 +207,13 @@ def test_nothing_goes_on_from_notes_and_work_space() -> None:
             assert np.array_equal(plain.get()[~held], spoilt.get()[~held])
         with pytest.raises(InputError, match="this drive has"):
             spoilt.set(np.zeros(3))
+        ticks = STATE_TICKS if design.instruments == model.Instruments() else MORE_THAN_A_BLOCK
+        for k in range(STATE_TICKS, ticks):
+            plain.step(command(k))
         rows = Rows.of(design)
-        rows["ticks"] = STATE_TICKS
-        rows.series("command", np.array([command(k) for k in range(STATE_TICKS)]))
-        assert rows.trajectory().final.motor_angle_rad == plain.value(
-            "angle"
-        )  # blocks of ticks, one at a time
+        rows["ticks"] = ticks
+        rows.series("command", np.array([command(k) for k in range(ticks)]))
+        assert rows.trajectory().final.motor_angle_rad == plain.value("angle")
 
 
 def test_something_goes_on_from_every_continuous_number() -> None:

@@ -38,7 +38,10 @@ def saved(path: Path, truth: Response, header: str, *columns: np.ndarray) -> Pat
 def test_gain_and_delay_are_what_lies_between(kind: str) -> None:
     found, model = bench("velocity", kind, 1.05, 1e-4), bench("velocity", kind, 1.0)
     one = measured_over(LOOPS, found, f"velocity:{kind}")
-    np.testing.assert_allclose(one.measured / one.model, (found.frdata / model.frdata).ravel(), rtol=1e-9)
+    apart = (found.frdata / model.frdata).ravel()
+    np.testing.assert_allclose(one.measured / one.model, apart, rtol=1e-9)
+    np.testing.assert_allclose(one.difference_deg, np.degrees(np.angle(apart)), atol=1e-7)
+    np.testing.assert_allclose(one.difference_db, 20.0 * np.log10(np.abs(apart)), atol=1e-9)
     off = one.open_loop.frdata / one.open_model
     np.testing.assert_allclose(20.0 * np.log10(np.abs(off)), 20.0 * np.log10(1.05), atol=1e-9)
     np.testing.assert_allclose(np.degrees(np.angle(off)), -360.0 * 1e-4 * one.frequency_hz, atol=1e-7)

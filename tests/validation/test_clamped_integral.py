@@ -66,6 +66,9 @@ def test_the_linear_border_knows_the_clamp(law: str) -> None:
         assert (integral > 1.2 * output).any() == (feedforward > 0.0)
         assert (integral < 0.8 * output).any()
         assert feedforward or (integral < output).all()
+        both = [assemble_loops(drive(one, feedforward)).limiters["voltage"] for one in ("clamped", law)]
+        ours = [one.onset_amplitude_rad(2.0 * np.pi * hertz) for one in both]
+        assert feedforward or np.testing.assert_allclose(*ours, rtol=1e-10) is None
 
 
 @pytest.mark.parametrize("law", ["clamped", "conditional"])
