@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from math import pi
@@ -18,17 +19,29 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
 
+_TAKES = re.compile(r', which takes "([^"]*)"( too)?')
+_AT_MOTOR = re.compile(
+    r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise"
+)
 _COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
 
 
-def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str:
-    """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``."""
-    word = re.sub(r'(?<=which takes )"([0-9.]+)([^"]*)"', lambda found: _echo(table[key], found), word)
+def with_numbers(
+    word: str, path: str, key: str, table: Tree, tree: Tree, takes: Callable[[str, str], bool]
+) -> str:
+    """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``.
+
+    ``takes`` tells whether a key reads a text as it stands.
+    """
+    if example := _TAKES.search(word):
+        to = f"{path}.{word.partition(',')[0]}"
+        own = next((one for one in (_with_unit(table[key]), example[1]) if one and takes(to, one)), "")
+        too = f", which takes {shown(own)}{example[2] or ''}" if own else ""
+        word = f"{word[: example.start()]}{too}{word[example.end() :]}"
     if word.startswith(("integral_time =", "derivative_time =")):
         return word + _time(word, table, key)
     if word.startswith("every,"):
-        ticks = _period_s(table[key]) / _period_s(_of(tree, "control", "period"))
-        return f"{word}; here {round(ticks)}" if 0.5 < ticks <= 1000.0 else word
+        return _every(word, path, _period_s(table[key]) / _period_s(_of(tree, "control", "period")))
     if path == "control.current" and key == "bandwidth":
         time_s = _si(_of(tree, "motor", "inductance"), "H") / _si(_of(tree, "motor", "resistance"), "ohm")
         here = f", here {time_s:.4g} s" if time_s > 0.0 else ""
@@ -43,7 +56,10 @@ def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree) -> str
 
 def per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
     """What a value in counts of the encoder is in rad or m, where the file says how many there are."""
-    if not isinstance(text, str) or not _COUNT.search(text) or field.key == "counts_per_rev":
+    if not isinstance(text, str) or not _COUNT.search(text) or not _AT_MOTOR.match(field.path):
+        return ""
+    loop = tree.get("control", {}).get(field.section.rpartition(".")[2]) if field.key == "gain" else {}
+    if isinstance(loop, dict) and loop.get("sensor", "motor") != "motor":  # it counts at the output
         return ""
     screw = frame.travel_m_rad is not None
     linear = frame.structure.axis == "linear" and not screw
@@ -82,11 +98,20 @@ def _period_s(text: Any) -> float:
     return period_s if period_s > 0.0 else 2.0 * pi / _si(_plain(text), "rad/s")
 
 
-def _echo(value: Any, example: re.Match[str]) -> str:
-    """The example of a hint with the file's own number."""
-    value = _plain(value)
-    bare = isinstance(value, int | float) or f"{value}".strip().replace(".", "").isdigit()
-    return f'"{value}{example[2]}"' if bare else shown(value) if isinstance(value, str) else example[0]
+def _with_unit(value: Any) -> str:
+    """A value that is a text with a unit, else nothing."""
+    with suppress(ValueError):
+        return value if isinstance(value := _plain(value), str) and split_quantity(value)[1] else ""
+    return ""
+
+
+def _every(word: str, path: str, ticks: float) -> str:
+    """The hint of a loop's own period, with its ticks where they are a whole number."""
+    field = FIELDS.get(f"{path}.every")
+    if field is None:
+        return "not needed: it runs every tick of control.period" if path == "control.current" else ""
+    whole = round(ticks) if 0.5 < ticks < 2.0 * field.high else 0
+    return f"{word}; here {whole}" if field.accepts(whole) and abs(ticks - whole) <= 1e-6 * whole else word
 
 
 def _time(word: str, table: Tree, key: str) -> str:

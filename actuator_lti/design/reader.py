@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from datetime import date
+from difflib import get_close_matches
 from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
@@ -23,7 +24,16 @@ from actuator_lti.design.hint_numbers import per_count, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
-from actuator_lti.design.sections import BY_PATH, HEAD, RECORDS, Section, children, part_at, with_part
+from actuator_lti.design.sections import (
+    BY_PATH,
+    HEAD,
+    RECORDS,
+    Section,
+    children,
+    part_at,
+    template_of,
+    with_part,
+)
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.stated import Frame
@@ -39,6 +49,9 @@ _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z"
 _ENTRY = ("value", "source", "grade", "tolerance")
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 _TICKS = re.compile(r"every, .*; here ([0-9]+)\Z")
+_FORMULA = re.compile(r"= [^,;]*")  # integral_time = gain/integral gain
+_BARE = re.compile(r"\s*[0-9.]+\s*\Z")
+_VERY_NEAR = 0.85  # of a misspelled key whose value is checked
 _ASIDE = re.compile(r", (?:which takes|in|with) ")  # what a hint says beside the one key that it names
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
 
@@ -124,7 +137,7 @@ class Reader:
         meant: dict[str, str] = {}
         for key in (key for key in table if key not in known):
             word = key_for(path, key, known)
-            word = with_numbers(word, path, key, table, self.tree)
+            word = with_numbers(word, path, key, table, self.tree, self.takes)
             said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
             hint = said if word else nearest(key, known)
             where = f"{path}.{key}" if path else key
@@ -133,11 +146,13 @@ class Reader:
                 self.ticks[f"{path}.every"] = int(ticks[1])
             only = _ASIDE.split(word)[0] if word else meant_of(key, known)
             if only in known:
-                meant[only] = meant.get(only) or key
+                near = word or get_close_matches(key, [only], 1, _VERY_NEAR)
+                meant[only] = meant.get(only) or (key if near else "")
                 self.guessed |= set() if word else {f"{path}.{only}"}
                 continue
-            for one in () if word.startswith("not needed") else known:  # that stands for no key
-                if re.search(rf"(?<![\[.])(?<!over )\b{one}\b(?! of)", hint):
+            named = "" if word.startswith("not needed") else _FORMULA.sub("", hint)  # that stand for it
+            for one in known:
+                if re.search(rf"(?<![\[.])(?<!over )\b{one}\b(?! of)", named):
                     meant.setdefault(one, "")
         return meant
 
@@ -147,7 +162,7 @@ class Reader:
         """Attributes and values of the keys of one table, and the keys that unknown ones are near to.
 
         What stands under another name is read as well, so that all that is wrong with it is told at once; the
-        value of a word that is only near to a key is unread all the same.
+        value of a word that is only near to a key is unread all the same, and unseen unless very near.
         """
         if not isinstance(table, dict):
             word = key_for(path.rpartition(".")[0], path.rpartition(".")[2])
@@ -219,16 +234,31 @@ class Reader:
         for key in ("source", "grade"):
             if not isinstance(table.get(key, ""), str):
                 self.refuse(f"{path}.{key}", table[key], "allowed: text")
-        for template, per in GAINS.get(field.path, {}).items() if isinstance(table["value"], str) else ():
+        if (gain := self.as_stated(field, table["value"])) is not None:
+            self.gains[path] = field, table, *gain
+            return UNREAD
+        return self.kept(field, table, self.number(field, table["value"], path), path, into)
+
+    def as_stated(self, field: Field, text: Any) -> tuple[float, Per] | None:
+        """A gain that is stated by what it does: that, and the gain per that."""
+        for template, per in GAINS.get(field.path, {}).items() if isinstance(text, str) else ():
             outer = field.section != "control.position" or self.structure.has_velocity
-            if template == "rad/s" and not (outer and _BANDWIDTH.search(table["value"])):
+            if template == "rad/s" and not (outer and _BANDWIDTH.search(text)):
                 continue
             with suppress(InputError):
                 said = replace(field, path=f"{field.path}, as stated", unit_template=template)
-                size = self.frame.quantity(table["value"], said)
-                self.gains[path] = field, table, size, per
-                return UNREAD
-        return self.kept(field, table, self.number(field, table["value"], path), path, into)
+                return self.frame.quantity(text, said), per
+        return None
+
+    def takes(self, path: str, text: str) -> bool:
+        """Whether a key that holds a number reads a text as it stands."""
+        field = FIELDS.get(template_of(re.sub(r"\[([0-9]+)\]", r".\1", path)))  # gear[1], without a name
+        with suppress(InputError):
+            if field is not None:
+                gain = self.as_stated(field, text)
+                value = gain[0] if gain else self.frame.quantity(text, field)
+                return field.accepts(value) and (field.kind != "integer" or value == int(value))
+        return False
 
     def kept(self, field: Field, table: Tree, value: Any, path: str, into: dict[str, model.Parameter]) -> Any:
         """A value with its pedigree."""
@@ -296,8 +326,10 @@ class Reader:
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
-            percent = f'; or is it "{value:g} %"' * (field.high == 1.0 and 2.0 <= value <= 100.0)
-            return self.refuse(path, raw, f"allowed: {field.allowed(field.unit(self.structure))}{percent}")
+            unit = field.unit(self.structure)
+            share = unit == "1" and field.high == 1.0 and 2.0 <= value <= 100.0 and _BARE.match(f"{raw}")
+            percent = f'; or is it "{value:g} %"' if share else ""
+            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}")
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:

@@ -12,6 +12,7 @@ _MULTIPLE = "every, so many ticks of control.period"
 _PERIOD = 'period, which takes "16 kHz" too'
 _VOLTAGE = "nominal_voltage rated_voltage supply_voltage bus_voltage vbus un"
 _CONTINUOUS = "nominal_current rated_current continuous_current_at_standstill"
+_PEAK = "max_current current_max current_peak"
 _FRICTION = "friction friction_force friction_torque frictional_torque"
 _LINES = "lines lines_per_revolution ppr pulses_per_revolution pulses_per_rev cpt counts_per_turn"
 _INTEGRAL = "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)"
@@ -105,7 +106,8 @@ _WORDS: dict[str, dict[str, str]] = {
     "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
     "encoder": {
         "counts": "counts_per_rev",
-        f"{_LINES} sin_cos_periods": 'counts_per_rev, which takes "1024 lines"',
+        f"{_LINES} sin_cos_periods": "counts_per_rev, in counts, four of each line, "
+        'which takes "1024 lines" too',
         "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
         "(linear axis without a screw: one metre over a step)",
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
@@ -113,7 +115,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "limits": {
         f"supply {_VOLTAGE}": "voltage",
         f"i_cont i_rms {_CONTINUOUS}": "continuous_current",
-        "i_peak i_max current max_current current_limit current_lim stall_current": "peak_current",
+        f"i_peak i_max current {_PEAK} current_limit current_lim stall_current": "peak_current",
         "velocity velocity_limit vel_limit speed_limit": "speed",
         "accel accel_limit": "acceleration",
         "rated_torque continuous_torque": "continuous_current, the torque over torque_constant and ratio",

@@ -501,8 +501,70 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         (
             "[control]",
             f'{CURRENT}integral = "25 Hz"\n[control]',
-            ("here 0.006366 s",),
+            ("velocity.gain: missing", "here 0.006366 s"),
         ),
+        # the file's own value is an example only where the key takes it as it stands
+        *(
+            ("period = ", f"frequency = {value} #", ('(it is period, which takes "16 kHz" too)', why))
+            for value, why in (
+                ("8000", "control.period = 8000: has no unit"),
+                ("true", "control.period = True: "),
+                ("inf", "must be finite"),
+                ('"1e4"', "has no unit"),
+                ('"-8 kHz"', "control.period = "),
+                ('"0.1 mWb"', "is of a flux linkage"),
+            )
+        ),
+        ("period = ", 'frequency = "8 kHz" #', ('(it is period, which takes "8 kHz" too)',)),
+        *(("ratio = ", f"i = {value} #", ('takes "60/20" too)',)) for value in ("66", '"66:1"')),
+        *(
+            ("[control]", f"[encoder]\n{word} = {value}\n[control]", (f"four of each line, {words} too)",))
+            for word, value, words in (
+                ("counts_per_turn", "4096", 'which takes "1024 lines"'),
+                ("cpt", '"4096 counts"', 'which takes "4096 counts"'),
+                ("lines", '"512 lines"', 'which takes "512 lines"'),
+            )
+        ),
+        *(
+            (
+                "[control]",
+                f'{CURRENT}bandwidth = "{value}"\n[control]',
+                ('takes "40 Hz" too)', f'"{value}": w'),
+            )
+            for value in ("300 rpm", "1 ms")
+        ),
+        ("[control]", '[control.position]\nbandwidth = "9 Hz"\n[control]', ("(it is gain)", "like V/rad")),
+        # periods of 1.67, 2, 2.0001, 0.5 and 1 ticks of 100 us
+        *(
+            (
+                "[control]",
+                f'{CURRENT}gain = "9 Hz"\n{key} = "{rate}"\n[control]',
+                (f"of control.period{here})",),
+            )
+            for key, rate, here in (
+                ("frequency", "6 kHz", ""),
+                ("frequency", "5 kHz", "; here 2"),
+                ("period", "200.01 us", ""),
+                ("cycle", "20 kHz", ""),
+                ("ts", "100 us", "; here 1"),
+            )
+        ),
+        (
+            "[control]",
+            CURRENT.replace("[control.v", 'period = "100 us"\n[control.v') + 'gain = "9 Hz"\n[control]',
+            ("(not needed: it runs every tick of control.period)",),
+        ),
+        # only near to current_rate, whose unit says nothing of it
+        (
+            "voltage = ",
+            'current_slope = "15 A"\nvoltage = ',
+            ('current_slope = "15 A": unknown key (nearest',),
+        ),
+        ("voltage = ", 'current_peak = "15 A"\nvoltage = ', ("(it is peak_current)",)),
+        ("[control]", f"{CURRENT}kd = 3\n[control]", ("control.velocity.gain: missing", "kd = 3")),
+        ("efficiency = 0.9", 'efficiency = "9000 %"', ("1e-18 to 1\n",)),
+        ("efficiency = 0.9", "efficiency = 86", ('; or is it "86 %"\n',)),
+        ("[control]", '[instruments]\njitter = "2 s"\n[control]', ("at most 1 s\n",)),
         ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', ("the supply cannot reach", "(it is voltage)")),
     ],
 )
@@ -514,7 +576,7 @@ def test_what_stands_under_a_sheets_own_word_is_read_too(old: str, new: str, wor
         words = ("gear = a table: allowed: [[gear]] tables", "gear.first.backlash")
     with pytest.raises((InputError, Mistakes)) as caught:
         read_design_text(text, "sheet")
-    told = str(caught.value).splitlines()
+    told = f"{caught.value}\n".splitlines(keepends=True)
     assert len(told) == len(words)
     assert all(word in line for word, line in zip(words, told, strict=True))
 

@@ -80,6 +80,12 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
         (f'[encoder]\ncounts_per_rev = "19 bit"\n{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"',
          "of 524288 counts 9.179 A*s/rad", 1),
         (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
+        # the motor's encoder counts nothing of the output
+        *((f'[encoder]\ncounts_per_rev = 4000\n{output}', "of 4000 counts", 0)
+          for output in ('[instruments]\noutput_angle_noise = "1 count"', '[command]\nrate = "4e5 counts/s"',
+                         f'{CURRENT}[control.velocity]\ngain = "1 A/(cnt/s)"\nsensor = "output"')),
+        ('[encoder]\ncounts_per_rev = 4000\n[instruments]\nangle_noise = "1 count"',
+         "of 4000 counts 0.001571 rad", 1),
         *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
           for word in ("ppr", "CPT", "pulses", "CPR")),
         # makers state it at the output as often as at the motor
