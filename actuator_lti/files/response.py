@@ -73,8 +73,9 @@ class RecordedResponse:
         under = rest if of == "T" else self.response
         if not (under != 0.0).all():
             raise InputError(f"{self.name}: {of} is {1 if of == 'T' else 0} at a frequency: no loop there")
-        over = self.response if of == "T" else rest
-        return replace(self, response=over / under, deviation=self.deviation / np.abs(rest))
+        over, apart = self.response if of == "T" else rest, np.abs(rest)
+        known = np.divide(self.deviation, apart, out=np.full(apart.shape, np.inf), where=apart > 0.0)
+        return replace(self, response=over / under, deviation=known)
 
 
 def read_response(source: Path | str | Any, averages: int | None = None) -> RecordedResponse:

@@ -82,6 +82,7 @@ def stability_margins(
         raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
     if band_rad_s is not None and not 0.0 <= band_rad_s[0] < band_rad_s[1]:
         raise InputError(f"band_rad_s = {band_rad_s}: two frequencies, 0 <= low < high, in rad/s")
+    band_rad_s = None if band_rad_s is None else (float(band_rad_s[0]), float(band_rad_s[1]))
     if is_measured(system):
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):

@@ -16,7 +16,7 @@ from actuator_lti.margins.loop import Complex, Real, balanced
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
-from actuator_lti.systems.delay_stepper import NODES, DelayStepper
+from actuator_lti.systems.delay_stepper import MOST_PIECES, NODES, DelayStepper
 from actuator_lti.systems.plain_system import response
 
 _FIRST = 10.0  # longest delays to walk at first
@@ -72,6 +72,8 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
         raise InputError(NO_FINAL)
     head = _FIRST * float(form.delays_s.max())
+    if head > MOST_PIECES * float(form.delays_s.min()):
+        raise InputError("the step response lasts too many delays to be stepped")
     walk, u = DelayStepper(system, 0.0, np.zeros(form.states), np.ones(1)), np.ones(1)
     while True:
         walk.at(head, u)

@@ -39,7 +39,7 @@ _SIZES = np.array([0.25**p / factorial(p) for p in range(_ORDERS)])  # what poly
 _SMALL = 1e-10  # of the largest value so far: a jump that is left out
 _SMOOTH = 1e-9  # of the largest value so far: the highest coefficients of a piece
 _SAME = 1e-9  # of the shortest delay: instants closer are one
-_MOST = 400_000
+MOST_PIECES = 400_000
 
 
 class DelayStepper:
@@ -176,7 +176,7 @@ class DelayStepper:
 
     def _keep(self, h: float, series: Real) -> None:
         k = self._count
-        if k > _MOST:
+        if k > MOST_PIECES:
             raise InputError(
                 f"{self._t:g} s take {k - 1} pieces between the instants at which jumps "
                 f"return (sums of the delays, the shortest {self._shortest:g} s): ask for fewer seconds"

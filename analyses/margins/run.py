@@ -97,7 +97,8 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     found = _with_spread(omega, values, read.deviation[below], loop.period_s)
     spread_of = np.divide(found.radius, np.abs(values), out=np.zeros(omega.size), where=values != 0.0)
     opened = replace(read, response=values, deviation=spread_of).as_loop(cast("Kind", of))
-    radius = np.abs(opened.response) * opened.deviation
+    size = np.abs(opened.response)  # where it is 0 a circle says nothing
+    radius = np.multiply(size, opened.deviation, out=np.zeros(omega.size), where=size > 0.0)
     data = MeasuredResponse(omega, opened.response, radius, loop.period_s, found.source)
     L = np.asarray(loop.plain_open(points)).reshape(-1)
     margins, note = None, ""

@@ -193,6 +193,8 @@ def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
         """The gain nearest to the one asked, and its slope over the angle."""
         z = complex(np.exp(1j * turned))
         whole, slope = t.lifted(z)
+        if not np.isfinite(whole).all():
+            return complex(np.nan), complex(np.nan)
         values, left, right = eig(whole, left=True)
         gains = 1.0 - 1.0 / np.where(values == 0.0, np.nan, values)
         if np.isnan(gains).all():

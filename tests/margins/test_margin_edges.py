@@ -229,3 +229,12 @@ def test_margins_beyond_200_db_are_counted_not_listed(case: str, db: float, form
     if form in ("tf", "certified"):  # rounding makes more of the zeros that a state space has at infinity
         noted = [note for note in m.notes if "beyond 200 dB" in note]
         assert noted == [] if abs(db) < 200.0 else "1 crossing " in noted[0]
+
+
+@pytest.mark.parametrize("certify", [False, True])
+def test_a_band_may_be_any_pair(certify: bool) -> None:
+    loop = control.tf([1.0], [1.0, 2.0, 1.0, 0.0])  # 1/(s (s + 1)^2): gain margin 2 at 1 rad/s
+    for band in ([0.1, 10.0], np.array([0.1, 10.0]), (0.1, 10.0)):
+        found = stability_margins(loop, band_rad_s=band, certify=certify)
+        assert found.gain_margins[0].ratio == pytest.approx(2.0, rel=1e-12)
+        assert found.band_rad_s == (0.1, 10.0)

@@ -51,6 +51,14 @@ def test_chosen_roots(case: str, beside: list[int]) -> None:
             assert root.rel_accuracy_bits() >= 90
 
 
+def test_a_root_at_an_end_of_an_interval() -> None:
+    roots = [fmpq(40503, 2**14), *(fmpq(k, 4) for k in range(1, 20))]
+    with ctx.workprec(96):
+        found = positive_roots(of_roots(roots))
+    assert len(found) == 20
+    assert all(root.overlaps(arb(value)) for (root, _), value in zip(found, sorted(roots), strict=True))
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_all_roots_agree(seed: int) -> None:
     """Coefficients of any size: the real ones among all certified roots."""

@@ -73,10 +73,12 @@ def _crossings(
 ) -> list[Crossing]:
     """The positive roots of p, touches merged; ``off`` is the distance to the line.
 
-    A line just missed is a pair of complex roots, with a turn of p between; few loops have one.
+    A line just missed is a pair of complex roots, with a turn of p between, or of its slope where a root lies
+    beside them; few loops have one.
     """
+    slope = p.derivative()
     with ctx.workprec(_TURN_BITS):
-        turns = [] if p.degree() <= FEW else positive_roots(p.derivative())
+        turns = [] if p.degree() <= FEW else [*positive_roots(slope), *positive_roots(slope.derivative())]
     with ctx.workprec(_FIRST_BITS + p.degree()):
         missed = p.degree() <= FEW or any(abs(off(v.mid()).mid()) <= 10.0 * TOUCH for v, _ in turns)
 

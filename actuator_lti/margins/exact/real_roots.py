@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -36,11 +37,12 @@ def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, i
 
     All that lie in some spans of the logarithm to base 2, and maybe some beside them.
     """
-    if p.degree() <= FEW:
+    isolated = None if p.degree() <= FEW else _places(tuple(p.coeffs()), spans)
+    if isolated is None:
         real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
         return sorted(real, key=lambda root: float(root[0].mid()))
     roots, least = [], arb((1, -ctx.prec))
-    for factor, times, places in _places(tuple(p.coeffs()), spans):
+    for factor, times, places in isolated:
         with ctx.workprec(ctx.prec + factor.degree() + 32):
             q = _Evaluated(factor)
             roots += [(q.root_in(low, high, least), times) for low, high in places]
@@ -48,15 +50,19 @@ def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, i
 
 
 @lru_cache(maxsize=64)
-def _places(coefficients: tuple[Any, ...], spans: Spans) -> Places:
-    """Where the positive roots are; only where one is not told from its neighbour, factors are looked for."""
+def _places(coefficients: tuple[Any, ...], spans: Spans) -> Places | None:
+    """Where the positive roots are; only where one is not told from its neighbour, factors are looked for.
+
+    None where that does not help: a root lies at an end of an interval.
+    """
     p = fmpz_poly(list(coefficients))
     with ctx.workprec(_MOST_BITS):
-        try:
-            return ((p, 1, tuple(_separated(p, spans, 16 * (p.degree() + 64)))),)
-        except NumericalError:
-            factors = p.factor_squarefree()[1]
+        with suppress(NumericalError):
+            return ((p, 1, tuple(_separated(p, spans, 4 * (p.degree() + 64)))),)
+        factors = p.factor_squarefree()[1]
+        with suppress(NumericalError):
             return tuple((q, times, tuple(_separated(q, spans, _MOST_BITS))) for q, times in factors)
+    return None
 
 
 def _separated(p: fmpz_poly, spans: Spans, most_bits: int) -> Iterator[tuple[arb, arb]]:
