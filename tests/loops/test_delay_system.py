@@ -190,7 +190,7 @@ def test_jumps_that_go_round_for_ever() -> None:
 
 def test_jumps_at_too_many_instants_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """y = u - 0.33 (y(t - 1) + y(t - sqrt 2) + y(t - e)): three sums of delays that never fade."""
-    monkeypatch.setattr(delay_stepper, "_MOST", 3000)
+    monkeypatch.setattr(delay_stepper, "MOST_PIECES", 3000)
     ring = sum((0.33 * DelaySystem.delay(d) for d in (1.0, 2**0.5, e)), DelaySystem.from_system(0.0))
     closed = DelaySystem.from_system(1.0).feedback(ring)
     assert np.isfinite(control.step_response(closed, np.linspace(0.0, 9.0, 10)).y).all()
