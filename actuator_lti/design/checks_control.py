@@ -7,7 +7,7 @@ from math import inf, pi
 from typing import Any, get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
-from actuator_lti.design.fields import FIELDS, Field, fields_in
+from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
@@ -108,9 +108,8 @@ def _fed_forward(key: str) -> Rule:
     )
 
 
-# of a key of the command: SI unit, the key that it needs, the limit that it has to keep
-_PROFILE = {"rate": ("/s", "", "speed"), "acceleration": ("/s^2", "rate", "acceleration"),
-            "jerk": ("/s^3", "acceleration", "")}  # fmt: skip
+# of a key of the command: the key that it needs, the limit that it has to keep
+_PROFILE = {"rate": ("", "speed"), "acceleration": ("rate", "acceleration"), "jerk": ("acceleration", "")}
 
 
 def _command_filter(design: Design) -> Iterator[Refusal]:
@@ -119,14 +118,14 @@ def _command_filter(design: Design) -> Iterator[Refusal]:
     period_s = control.period_s * _every(design, control.outermost)
     if 0.0 < filter_time_s <= period_s / pi:
         allowed = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
-        yield _written(design, "filter_time", filter_time_s, "s", allowed)
+        yield _written(design, "filter_time", filter_time_s, allowed)
 
 
 def _command(design: Design) -> Iterator[Refusal]:
-    for key, (per, outer, limiter) in _PROFILE.items():
+    for key, (outer, limiter) in _PROFILE.items():
         value = _of(design, f"command.{key}")
-        yield from readable(_needed(design, key, value, per, outer))
-        yield from readable(_slow_enough(design, key, value, per, limiter))
+        yield from readable(_needed(design, key, value, outer))
+        yield from readable(_slow_enough(design, key, value, limiter))
 
 
 def _of(design: Design, path: str) -> Any:
@@ -134,35 +133,35 @@ def _of(design: Design, path: str) -> Any:
     return getattr(part_at(design, FIELDS[path].section), FIELDS[path].attribute)
 
 
-def _needed(design: Design, key: str, value: float, per: str, outer: str) -> Iterator[Refusal]:
+def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refusal]:
     if value == inf:
         return
     if design.controller.position is None:
-        yield _written(design, key, value, per, "allowed with a position loop")
+        yield _written(design, key, value, "allowed with a position loop")
     if outer and _of(design, f"command.{outer}") == inf:
-        yield _written(design, key, value, per, f"needs command.{outer}")
+        yield _written(design, key, value, f"needs command.{outer}")
 
 
-def _slow_enough(design: Design, key: str, value: float, per: str, limiter: str) -> Iterator[Refusal]:
+def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
     limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
-        unit = _of_axis(design, per)
+        unit = _unit(design, key)
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
         allowed = f"faster than limits.{limiter}; allowed: at most {most} at the output"
-        yield _written(design, key, value, per, allowed)
+        yield _written(design, key, value, allowed)
 
 
-def _of_axis(design: Design, per: str) -> str:
-    """The unit of a key of the command; that of a time stands alone."""
-    return per if per == "s" else ("m" if design.axis == "linear" else "rad") + per
+def _unit(design: Design, key: str) -> str:
+    """SI unit of a key of the command, for which the axis alone counts."""
+    return FIELDS[f"command.{key}"].unit(Structure(design.axis))
 
 
-def _written(design: Design, key: str, value: float, per: str, allowed: str) -> Refusal:
+def _written(design: Design, key: str, value: float, allowed: str) -> Refusal:
     """A key of the command as the file has it, else in SI."""
     parameter = design.parameters.get(f"command.{key}")
-    text = f"{value:.6g} {_of_axis(design, per)}" if parameter is None else parameter.text
+    text = f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
     return f"command.{key}", text, allowed
 
 
