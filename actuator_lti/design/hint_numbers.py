@@ -41,7 +41,7 @@ def with_numbers(
     if word.startswith(("integral_time =", "derivative_time =")):
         return word + _time(word, table, key)
     if word.startswith("every,"):
-        return _every(word, path, _period_s(table[key]) / _period_s(_of(tree, "control", "period")))
+        return _every(word, path, ticks_of(path, table[key], tree))
     if path == "control.current" and key == "bandwidth":
         time_s = _si(_of(tree, "motor", "inductance"), "H") / _si(_of(tree, "motor", "resistance"), "ohm")
         here = f", here {time_s:.4g} s" if time_s > 0.0 else ""
@@ -105,13 +105,18 @@ def _with_unit(value: Any) -> str:
     return ""
 
 
-def _every(word: str, path: str, ticks: float) -> str:
-    """The hint of a loop's own period, with its ticks where they are a whole number."""
-    field = FIELDS.get(f"{path}.every")
-    if field is None:
+def ticks_of(path: str, period: Any, tree: Tree) -> int:
+    """The ticks of a loop's own period; 0 where they are no whole number that its `every` takes."""
+    field, ticks = FIELDS.get(f"{path}.every"), _period_s(period) / _period_s(_of(tree, "control", "period"))
+    whole = round(ticks) if field is not None and 0.5 < ticks < 2.0 * field.high else 0
+    return whole if field is not None and field.accepts(whole) and abs(ticks - whole) <= 1e-6 * whole else 0
+
+
+def _every(word: str, path: str, ticks: int) -> str:
+    """The hint of a loop's own period, with its ticks."""
+    if f"{path}.every" not in FIELDS:
         return "not needed: it runs every tick of control.period" if path == "control.current" else ""
-    whole = round(ticks) if 0.5 < ticks < 2.0 * field.high else 0
-    return f"{word}; here {whole}" if field.accepts(whole) and abs(ticks - whole) <= 1e-6 * whole else word
+    return f"{word}; here {ticks}" if ticks else word
 
 
 def _time(word: str, table: Tree, key: str) -> str:

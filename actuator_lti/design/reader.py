@@ -20,7 +20,7 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
-from actuator_lti.design.hint_numbers import per_count, with_numbers
+from actuator_lti.design.hint_numbers import per_count, ticks_of, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
@@ -48,7 +48,6 @@ MAX_LIST = 200
 _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z")
 _ENTRY = ("value", "source", "grade", "tolerance")
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
-_TICKS = re.compile(r"every, .*; here ([0-9]+)\Z")
 _FORMULA = re.compile(r"= [^,;]*")  # integral_time = gain/integral gain
 _BARE = re.compile(r"\s*[0-9.]+\s*\Z")
 _VERY_NEAR = 0.85  # of a misspelled key whose value is checked
@@ -142,8 +141,8 @@ class Reader:
             hint = said if word else nearest(key, known)
             where = f"{path}.{key}" if path else key
             self.refuse(where, table[key], f"unknown key{hint or '; allowed: ' + ', '.join(known)}")
-            if ticks := _TICKS.match(word):
-                self.ticks[f"{path}.every"] = int(ticks[1])
+            if word.startswith("every,") and (ticks := ticks_of(path, table[key], self.tree)):
+                self.ticks[f"{path}.every"] = ticks
             only = _ASIDE.split(word)[0] if word else meant_of(key, known)
             if only in known:
                 near = word or get_close_matches(key, [only], 1, _VERY_NEAR)
@@ -246,6 +245,7 @@ class Reader:
             if template == "rad/s" and not (outer and _BANDWIDTH.search(text)):
                 continue
             with suppress(InputError):
+                # by a path of its own: that of the position gain has a unit whatever the template
                 said = replace(field, path=f"{field.path}, as stated", unit_template=template)
                 return self.frame.quantity(text, said), per
         return None

@@ -21,10 +21,7 @@ _SPELLINGS = (
     (re.compile(r"\bKg"), "kg"),
     (re.compile(r"\bAmp(s?)\b"), r"amp\1"),
     (re.compile(r"^/"), "1/"),  # 25/s
-    (
-        re.compile(r"(?i)\(?\b(l|line|ph(?:ase)?)(?:[- ]+|[- ]*to[- ]*)\1\b\)?"),
-        "line_line",
-    ),
+    (re.compile(r"(?i)\(?\b(l|line|ph(?:ase)?)(?:[- ]+|[- ]*to[- ]*)\1\b\)?"), "line_line"),
     (re.compile(r"°C|℃|\bdeg(?:rees?)? ?C\b"), " degC"),
     (re.compile(r"\barc[- ](?=min|sec)"), "arc"),
     (re.compile(r"\bK(?:RPM|rpm)\b"), "krpm"),

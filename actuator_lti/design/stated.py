@@ -10,7 +10,7 @@ from typing import Any
 
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.plant import MotorConstants
-from actuator_lti.design.units import ampere_unit, parse_quantity
+from actuator_lti.design.units import AdvisedError, ampere_unit, parse_quantity
 from actuator_lti.errors import InputError
 
 CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|p|phase)\b\)?", re.IGNORECASE)
@@ -73,7 +73,7 @@ class Frame:
             if (turned := _turned(field.path, text, one)) is not None:
                 line = field.section == "motor" and self.constants == "peak-phase"
                 return turned * factor / (sqrt(3.0) if line else 1.0)
-        refused = [one for one in refused if one.message.count(";") > 1] or refused  # with what to write
+        refused = [one for one in refused if isinstance(one, AdvisedError)] or refused
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]
 
     def _said(self, text: Any, field: Field, unit: str, value: float) -> float:

@@ -16,7 +16,7 @@ from difflib import get_close_matches
 from fractions import Fraction
 from functools import lru_cache
 from itertools import product
-from math import isfinite, nan, pi
+from math import isfinite, pi
 from operator import ne
 
 from actuator_lti.design.spellings import LONGEST, split_quantity, tidy
@@ -267,10 +267,7 @@ _GAIN_OF_TORQUE = (
 )
 _IN_HZ = "a bandwidth is written in Hz or rad/s"
 _ADVICE = {
-    (
-        _FREQUENCY,
-        "s",
-    ): "a corner (PI, filter) of it is {corner:.4g} s, 1/(2 pi f), a period {period:.6g} s",
+    (_FREQUENCY, "s"): "a corner (PI, filter) of it is {corner:.4g} s, 1/(2 pi f), a period {period:.6g} s",
     **dict.fromkeys(product((_FREQUENCY, "gain or rate"), ("A*s/rad", "V*s/rad", "V/A")), _IN_HZ),
     ("stiffness", "A/rad"): _GAIN_OF_TORQUE,
     ("count or line, by maker", "1"): 'write "{n:.15g} lines" ({lines:.15g} counts) or "{n:.15g} counts"',
@@ -284,6 +281,10 @@ _ADVICE = {
 """Where engineers mix two up: what is written, the unit wanted, and how to get there."""
 
 
+class AdvisedError(InputError):
+    """A quantity of another dimension than was wanted, with how to get to that."""
+
+
 def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
     """How to get from what is written to what is wanted."""
     kind = _kinds().get(value.dimension)
@@ -291,11 +292,12 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
                if one == kind and parse_unit(unit).dimension == wanted.dimension)  # fmt: skip
     if (said := next(advices, None)) is not None:
         size = number * value.factor
-        corner = 1.0 / size if size > 0.0 else nan
+        if "{corner" in said and size <= 0.0:
+            return ""
+        corner = 1.0 / size if size else 0.0
         here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
         fall = f", here {9.80665 * number:.6g} m/s^2" if value.factor == 1e-3 else ""
-        told = said.format(size=size, fall=fall, **here)
-        return "" if "nan" in told else f"; {told}"
+        return f"; {said.format(size=size, fall=fall, **here)}"
     if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
     if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
@@ -356,7 +358,8 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     if not compatible(result, wanted):
         missing = "has no unit" if not written else _kind_of(written, result)
         wrong = "wrong dimension, " if written else ""
-        raise InputError(f"{wrong}{missing}; allowed: {example}{_advice(result, wanted, number)}")
+        advice = _advice(result, wanted, number)
+        raise (AdvisedError if advice else InputError)(f"{wrong}{missing}; allowed: {example}{advice}")
     value = scaled(number, result.factor)
     if not isfinite(value):
         raise InputError(f"must be finite; allowed: {example}")
