@@ -102,15 +102,14 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
     if len(y) <= w.shape[1]:
         told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"
         raise InputError(f"{told}; allowed: longer motion")
-    scale = np.linalg.norm(w, axis=0)
-    values = np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale
+    values = scaled_lstsq(w, y)
     residual = np.asarray(y - w @ values)
     return Solution(
         values=values,
         white=np.asarray(np.var(residual, ddof=1) * np.linalg.inv(w.T @ w)),
         correlated=correlated_covariance(w, residual, ends),
         residual=residual,
-        condition=float(np.linalg.cond(w / scale)),
+        condition=float(np.linalg.cond(w / np.linalg.norm(w, axis=0))),
     )
 
 

@@ -156,11 +156,8 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
 
 def following_item(record: str, followed: Followed) -> Item:
     """Whether the recorded following error is that of the design's loops at this motion."""
-    label, clock, off = (
-        f"{record}: following error is that of the design's loops",
-        followed.clock,
-        followed.off,
-    )
+    label = f"{record}: following error is that of the design's loops"
+    clock, off = followed.clock, followed.off
     reason = (
         f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with: "
         "counts a revolution, the reduction, or a unit"
