@@ -134,6 +134,12 @@ class MeasuredResponse:
         radius = sigma * _student(n - 1, _checked(confidence))
         return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
 
+    @classmethod
+    def from_scatter(cls, data: Any) -> MeasuredResponse:
+        """Noise as the points scatter about their neighbours."""
+        omega, L, dt = _read(data)
+        return cls(omega, L, _scatter(omega, L), dt, _GUESSED)
+
 
 def is_measured(system: Any) -> bool:
     """Whether this is frequency-response data, of either kind."""
@@ -155,8 +161,7 @@ def measured_response(data: Any) -> MeasuredResponse:
     """Bring data of either kind into this form; the noise of plain ones is estimated from their scatter."""
     if isinstance(data, MeasuredResponse):
         return data
-    omega, L, dt = _read(data)
-    return MeasuredResponse(omega, L, _scatter(omega, L), dt, _GUESSED)
+    return MeasuredResponse.from_scatter(data)
 
 
 def _scatter(omega: Real, L: Complex) -> Real:

@@ -15,7 +15,7 @@ from actuator_lti.files.response import FloatArray, read_response
 from actuator_lti.files.response import Loop as Kind
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
-from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
+from actuator_lti.systems.measured_response import MeasuredResponse
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.margins.asked import Asked
@@ -121,9 +121,7 @@ def _with_spread(
     data = MeasuredResponse(omega, values, np.zeros(omega.size), period_s, "")
     if np.isfinite(deviation).all():
         return MeasuredResponse.with_noise(data, np.abs(values) * deviation)
-    from control import FrequencyResponseData
-
-    return measured_response(FrequencyResponseData(data.frdata, data.omega, dt=data.dt))
+    return MeasuredResponse.from_scatter(data)
 
 
 @dataclass(frozen=True, kw_only=True)
