@@ -133,14 +133,15 @@ def _held(study: Study, site: Path, use: Settings, *, begun: bool = False) -> It
     """Hold history and cache of a site, both as they should be; ``begun``: only where there is a history."""
     state = state_of(site, use.state)
     site_files.check_place(site)
-    there, check = (state / INDEX).exists(), _nobody if use.accept_lost_history else check_memory
-    if not there:
-        check(site, Memory(), state)  # before one is begun
+    there, checked = (state / INDEX).exists(), not use.accept_lost_history
+    if checked and not there:
+        check_memory(site, Memory(), state)  # before one is begun
     if begun and not there:
         raise InputError("no night has been built here yet", where=str(site))
     with hold(state, use.wait_s):
         history = open_history(state)
-        check(site, history.memory(), state)
+        if checked:
+            check_memory(site, history.memory(), state)
         history.claim(study.name)
         yield history, Cache(state / CACHE)
 

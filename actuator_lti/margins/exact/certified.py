@@ -27,8 +27,8 @@ _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
 _GIVEN = "exact arithmetic on the given doubles"
 _COUNTED = f"{ULP} ulp of the entries change how many closed-loop poles are unstable, not that some are"
 _SHARP = 1e-3  # a pole is placed where its own error is below this part of its modulus
-_TOLD = 1e-6
-_MANY = 2.0
+_TOLD = 1e-6  # of the modulus of half of the poles: one that is smaller is far slower
+_MANY = 2.0  # a modulus below which half of the poles lie, where it is told by counting
 
 
 @lru_cache(maxsize=64)

@@ -145,12 +145,8 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
             if value.is_finite()
         ]
 
-    value, w = min(
-        [
-            *candidates,
-            *at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1"),
-        ]
-    )
+    found = at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1")
+    value, w = min([*candidates, *found])
     return (value, w) if value > _ZERO else (0.0, w)
 
 
