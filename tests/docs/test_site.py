@@ -8,8 +8,7 @@ from types import ModuleType
 import pytest
 import typer
 
-from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design import FIELDS, QUANTITIES
 from actuator_lti.design.sections import SECTIONS
 from reports.cli.app import PANELS, build
 

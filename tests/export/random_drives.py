@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti import load_design
-from actuator_lti.design import model
+from actuator_lti.design import load_design, model
 from actuator_lti.design.law import LAW_INPUTS, Law
 
 Rng = np.random.Generator

@@ -12,9 +12,8 @@ import pytest
 from programs import needs_compiler, ran
 from random_drives import random_drive, random_elastic_drive, random_inputs
 
-from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files
-from actuator_lti.design import design_hash
+from actuator_lti.design import design_hash, load_design
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.start import retune

@@ -11,11 +11,8 @@ import pytest
 from programs import ran
 from random_drives import law_at, random_drive, random_elastic_drive
 
-from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
-from actuator_lti.design import design_hash
-from actuator_lti.design.loader import shipped_designs
-from actuator_lti.design.model import Design
+from actuator_lti.design import Design, design_hash, load_design, shipped_designs
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
 

@@ -14,10 +14,8 @@ import pytest
 from executed import executed
 from fmu_host import fmpy, hosted, needs_compiler, written
 
-from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files, system_compiler, zig_command
-from actuator_lti.design.access import parameter_value, paths_of, with_values
-from actuator_lti.design.model import Design
+from actuator_lti.design import Design, load_design, parameter_value, paths_of, with_values
 from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
 from nonlinear.export.trace import trace_keys

@@ -9,11 +9,10 @@ import numpy as np
 import pytest
 from fmu_host import Host, Refused, fmpy, hosted, needs_compiler, written
 
-from actuator_lti import load_design
+from actuator_lti import InputError
 from actuator_lti.compiled.compiler import zig_command
-from actuator_lti.design.access import parameter_value, with_values
+from actuator_lti.design import load_design, parameter_value, with_values
 from actuator_lti.design.asked import FrozenMap
-from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured

@@ -15,10 +15,9 @@ from fmu_host import hosted, needs_compiler, written
 from random_drives import random_drive, random_elastic_drive
 from scipy.optimize import brentq
 
-from actuator_lti import load_design
-from actuator_lti.design.access import with_values
+from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
-from nonlinear.rows import Rows
+from nonlinear import Rows
 from tests.changed import changed
 
 pytestmark = needs_compiler

@@ -8,8 +8,7 @@ from math import pi, sqrt
 
 import pytest
 
-from actuator_lti import load_design
-from actuator_lti.design.model import Design
+from actuator_lti import Design, load_design
 from nonlinear.export import fmu_bytes
 
 MOTOR_SIDE = ("motor.angle", "motor.speed", "motor.torque", "motor.current", "motor.voltage")

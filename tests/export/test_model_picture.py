@@ -10,9 +10,8 @@ import pytest
 from programs import needs_compiler
 
 import reports.model_picture as model_picture
-from actuator_lti import load_design
-from actuator_lti.design.loader import shipped_designs
-from nonlinear.export.fmu import fmu_bytes
+from actuator_lti.design import load_design, shipped_designs
+from nonlinear.export import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
 
 

@@ -10,14 +10,11 @@ import pytest
 from programs import needs_compiler
 from random_drives import random_drive, random_elastic_drive
 
-from actuator_lti import load_design
+from actuator_lti import InputError, load_design, stability_margins
 from actuator_lti.axis.library import LIBRARY as AXIS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
-from actuator_lti.compiled import compiler
-from actuator_lti.compiled.library import Library
-from actuator_lti.errors import InputError
-from actuator_lti.margins import stability_margins
+from actuator_lti.compiled import Library, compiler
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row

@@ -16,16 +16,14 @@ from programs import in_json, needs_node
 from random_drives import random_drive, random_elastic_drive
 from ulps import TIMES, moved_by_an_ulp
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import Loop, assemble_loops, stability_margins
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design import with_values
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import load_design, shipped_designs, with_values
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import point_blocks
-from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from nonlinear.export import linear, linear_loops

@@ -4,11 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_lti import load_design
-from actuator_lti.design import Design
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.law import LAW_INPUTS, Law
-from actuator_lti.design.model import Command, Encoder, Instruments, Limits, OutputEncoder
-from actuator_lti.loops.assemble import assemble_loops
+from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,

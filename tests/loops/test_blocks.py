@@ -9,10 +9,9 @@ from hypothesis import strategies as st
 from loop_designs import amber, ctms_position, designs, emps
 from test_stacked import everything
 
-from actuator_lti import InputError, assemble_loops
+from actuator_lti import InputError, assemble_loops, delay_budget
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.blocks import biquad, pi
-from actuator_lti.loops.delay_budget import delay_budget
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from nonlinear.row.filters import section
 

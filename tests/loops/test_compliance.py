@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
-from actuator_lti.design import load_design
 from actuator_lti.design.model import Requirement
-from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import StiffnessFigures, compliance
-from analyses.specification.requirements import evaluate_requirements
+from analyses import evaluate_requirements
 from nonlinear import commands, simulate
 from tests.changed import changed
 from tests.loops.two_mass import drive_e

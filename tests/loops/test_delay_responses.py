@@ -13,8 +13,7 @@ import flint
 import numpy as np
 import pytest
 
-from actuator_lti.step import step_figures
-from actuator_lti.systems.delay_system import DelaySystem
+from actuator_lti import DelaySystem, step_figures
 
 Rational = tuple[np.ndarray, np.ndarray]
 POINTS = 61

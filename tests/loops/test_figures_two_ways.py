@@ -14,14 +14,11 @@ from loop_designs import controlled
 from test_recursion import wide_designs
 from test_stacked import everything
 
-from actuator_lti import closed_loop_bandwidth, load_design, step_figures
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
-from actuator_lti.batch import Population, linear_figures
-from actuator_lti.batch.static import drive_figures
+from actuator_lti.batch import Population, drive_figures, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Gravity
-from actuator_lti.loops import assemble_loops
-from actuator_lti.margins import stability_margins
 
 
 @st.composite

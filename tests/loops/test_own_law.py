@@ -16,10 +16,8 @@ from own_laws import PlainLaw, drawn, period_s
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
-from actuator_lti.design import Design, design_hash, read_design_text, write_design
+from actuator_lti.design import Design, design_hash, design_tree, read_design_text, warnings_of, write_design
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
-from actuator_lti.design.suspicions import warnings_of
-from actuator_lti.design.writing import design_tree
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup

@@ -8,8 +8,7 @@ from own_laws import linear, period_s
 from scipy.linalg import solve_continuous_are, solve_discrete_are
 from scipy.signal import place_poles
 
-from actuator_lti import assemble_loops, load_design, plant, stability_margins
-from actuator_lti.design import Design
+from actuator_lti import Design, assemble_loops, load_design, plant, stability_margins
 from actuator_lti.design.model import Encoder, PositionLoop
 from nonlinear import Rows, tangent
 

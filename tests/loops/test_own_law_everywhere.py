@@ -8,16 +8,14 @@ import pytest
 from loop_designs import controlled
 from own_laws import period_s
 
-from actuator_lti import load_design
+from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design import Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
+from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
-from analyses.linear.loop_survey import survey_loops
 from analyses.tuning.start import rule_gains
-from analyses.validation import validate
-from reports.live.model import live_model
+from reports.live import live_model
 
 STAGES = ("current", "velocity", "position")
 

@@ -9,11 +9,10 @@ import pytest
 from loop_designs import controlled, sprung
 from mpmath import lu_solve, matrix, mp
 
-from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
-from actuator_lti.design import read_design_text
+from actuator_lti import closed_loop_bandwidth, read_design_text, stability_margins, step_figures
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops import exact_margins
+from actuator_lti.loops import assemble_loops, exact_margins
 from actuator_lti.loops.periodic import fundamental, point_blocks
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block

@@ -8,16 +8,14 @@ import pytest
 from loop_designs import amber, controlled, emps, sprung, without
 from two_mass import drive_d, drive_e
 
-from actuator_lti import assemble_loops, load_design, stability_margins
-from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch._figures import DC_GAIN
-from actuator_lti.batch.static import drive_figures
-from actuator_lti.design import parameter_value, with_overrides, with_values
+from actuator_lti.design import load_design, parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram

@@ -9,12 +9,11 @@ import pytest
 from loop_designs import amber, controlled
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti import InputError, Loops, assemble_loops, stability_margins
 from actuator_lti.design import model
 from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.drive.plant import motor_plant
-from actuator_lti.loops import Loops
 
 NOTCH = model.Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from loop_designs import controlled
 
-from actuator_lti import InputError, load_design
+from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
-from actuator_lti.design.writing import write_design
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire

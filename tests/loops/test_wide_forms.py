@@ -11,12 +11,11 @@ from scipy.integrate import solve_ivp
 from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops
+from actuator_lti import InputError, assemble_loops, delay_budget
 from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.loops.delay_budget import delay_budget
-from analyses.linear.loop_survey import survey_loops
+from analyses import survey_loops
 from reports.sections.delays import section
 
 

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from actuator_lti import load_design
+from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design.model import Design
 from reports.build import design_report
 from reports.cli.app import build
 from reports.document import dumps, loads

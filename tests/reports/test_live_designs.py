@@ -21,11 +21,9 @@ from live_page import (
     verdicts_agree,
 )
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design import with_values
-from actuator_lti.design.access import parameter_value
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import load_design, parameter_value, shipped_designs, with_values
 from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows

@@ -27,12 +27,9 @@ from live_page import (
     written,
 )
 
-from actuator_lti import assemble_loops
-from actuator_lti.design import with_values
+from actuator_lti import InputError, assemble_loops
+from actuator_lti.design import Design, check_design, with_values
 from actuator_lti.design.asked import FrozenMap
-from actuator_lti.design.checks import check_design
-from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
 from nonlinear import simulate
 from nonlinear.commands import step
 

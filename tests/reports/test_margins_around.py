@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from actuator_lti import assemble_loops, load_design
+from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design.access import with_values
-from actuator_lti.margins import stability_margins
+from actuator_lti.design import with_values
 from analyses.linear.outer_loop import loop_around, outer_loop
 from reports.cli.main import main
 

@@ -6,10 +6,9 @@ import control
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, stability_margins
-from actuator_lti.errors import InputError
+from actuator_lti import InputError, assemble_loops, stability_margins
 from analyses.margins.run import measured_over
-from reports.build import report
+from reports import report
 from reports.sections.measured import blocks, words
 
 LOOPS = assemble_loops("ilr33-amber")

@@ -8,8 +8,7 @@ from importlib.resources import files
 
 import pytest
 
-from actuator_lti import load_design
-from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.design import QUANTITIES, load_design
 from reports import document as doc
 from reports import scripts
 from reports.glossary import TERMS, glossary, meaning

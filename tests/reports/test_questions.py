@@ -5,8 +5,7 @@ import re
 import pytest
 from live_page import done
 
-from actuator_lti import load_design
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import load_design, shipped_designs
 
 HANDS, SIZE = '.toc a[href="#hands-on"]', ".run-keys label:has-text('Size') input"
 EACH, LOOPS = "#answer details.fold > summary", "table.loops"

@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from actuator_lti import assemble_loops, load_design, stability_margins
-from actuator_lti.design import with_values
+from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Design, Requirement, Waiver
-from actuator_lti.errors import InputError
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 

@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 import analyses.linear.loop_survey
-from actuator_lti import assemble_loops, stability_margins
+from actuator_lti import InputError, assemble_loops, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
-from actuator_lti.errors import InputError
 from analyses.corners import corners
 from analyses.isolation import drain
 from analyses.linear import loop_figures

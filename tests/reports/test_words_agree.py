@@ -8,9 +8,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.design import with_values
-from actuator_lti.margins import stability_margins
+from actuator_lti import assemble_loops, stability_margins
+from actuator_lti.design import load_design, with_values
 from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
-from actuator_lti import load_design
+from actuator_lti import Design, InputError, NumericalError, load_design
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.places import Bench
 from analyses.validation.row import Row

@@ -21,12 +21,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from actuator_lti import InputError, NumericalError, assemble_loops, stability_margins
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design import model
-from actuator_lti.design.checks import check_design
-from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.loops import assemble_loops
-from actuator_lti.margins import stability_margins
+from actuator_lti.design import check_design, model
 from analyses.isolation import isolated
 from analyses.validation import CHECKS, Settings, validate
 from tests.changed import changed

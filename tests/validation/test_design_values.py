@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_lti import load_design
+from actuator_lti import InputError
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.checks import check_design
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import check_design, load_design, shipped_designs
 from actuator_lti.design.model import Design, FrictionPoint, Instruments, Supply
-from actuator_lti.errors import InputError
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.torque_values import edge, mechanics
 from nonlinear.bench.operating_motion import operating_motion_at

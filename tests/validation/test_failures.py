@@ -8,10 +8,9 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
-from actuator_lti.errors import InputError
-from actuator_lti.loops import assemble_loops
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _followed_most_hz, cases_of
 from nonlinear import commands, simulate

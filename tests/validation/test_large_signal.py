@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.design import with_values
+from actuator_lti import assemble_loops, closed_loop_bandwidth
+from actuator_lti.design import load_design, with_values
 from actuator_lti.drive.operating import rubs
-from analyses.large_signal import large_signals
+from analyses import large_signals, sawtooth
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
 from analyses.large_signal.from_rest import TOO_MANY, margins_by_amplitude
 from analyses.large_signal.map import (
@@ -20,7 +19,6 @@ from analyses.large_signal.map import (
     amplitude_map,
     crossing_range,
 )
-from analyses.large_signal.sawtooth import sawtooth
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from reports.sections.large_signal import _result

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.operating import dead_zone
-from actuator_lti.errors import InputError
-from actuator_lti.loops import assemble_loops
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles import limit_cycles
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio

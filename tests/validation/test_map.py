@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design, onset
+from actuator_lti import NumericalError, assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs, with_values
 from actuator_lti.design.model import Command, Design, Friction
-from actuator_lti.errors import NumericalError
 from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map

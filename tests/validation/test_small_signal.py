@@ -7,10 +7,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from actuator_lti import load_design, onset
+from actuator_lti import Design, load_design, onset
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import shipped_designs
-from actuator_lti.design.model import Design
 from actuator_lti.loops import ExactMargins
 from analyses.validation import CHECKS, validate
 from analyses.validation.design_values import design_value_rows

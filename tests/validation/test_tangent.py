@@ -5,13 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import InputError, stability_margins
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design import shipped_designs
-from actuator_lti.design.model import Design
+from actuator_lti.design import Design, load_design, shipped_designs
 from actuator_lti.drive.wiring import wire
-from actuator_lti.errors import InputError
-from actuator_lti.loops import Loops, exact_margins, periodic_loop
+from actuator_lti.loops import Loops, assemble_loops, exact_margins, periodic_loop
 from analyses.validation import CHECKS, validate
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.places import Bench
