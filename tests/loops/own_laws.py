@@ -1,6 +1,7 @@
 """Random laws of one's own on shipped drives, and a plain writing of model.md section 10."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,16 @@ BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
 def period_s(design: Design, stage: str) -> float:
     return design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+
+
+def as_law(design: Design, stage: str, **settings: Any) -> Design:
+    """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
+    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    gain = loop.gain_V_A if stage == "current" else loop.gain
+    if loop.integral_time_s is None:
+        return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
+    step = gain * T / loop.integral_time_s
+    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], **settings)
 
 
 def linear(design: Design) -> Design:

@@ -59,15 +59,18 @@ def test_delays_are_placed_right(encoder: Encoder) -> None:
     assert np.all(gaps[2] < 0.02 * 100.0 * 0.5e-4 / 32)
 
 
+def by_hand(s: np.ndarray, k: float = 0.0, late_i: Any = 1.0, late_w: Any = 1.0) -> tuple[Any, Any]:
+    """Current and velocity loop of `amber`, a spring k on the motor; each behind its delay."""
+    mechanics = s / (J * s**2 + Cv * s + k)
+    Li = 0.02 * (1 + 1 / (150e-6 * s)) * late_i / (L * s + R + K**2 * mechanics)
+    return Li, 0.12 * (1 + 1 / (15e-3 * s)) * late_w * Li / (1 + Li) * K * mechanics
+
+
 def test_ideal_loops_are_the_hand_transfer_functions() -> None:
-    design = amber()
-    loops = assemble_loops(design, "ideal")
+    loops = assemble_loops(amber(), "ideal")
     s = 1j * np.geomspace(0.1, 1e5, 60)
-    Ci = 0.02 * (1 + 1 / (150e-6 * s))
-    Cw = 0.12 * (1 + 1 / (15e-3 * s))
-    Li = Ci * (J * s + Cv) / ((L * s + R) * (J * s + Cv) + K**2)
+    Li, Lw = by_hand(s)
     np.testing.assert_allclose(loops.current.open_loop(s), Li, rtol=1e-10)
-    Lw = Cw * Li / (1 + Li) * K / (J * s + Cv)
     np.testing.assert_allclose(loops.velocity.open_loop(s), Lw, rtol=1e-9)
     Lp = 120 * Lw / (1 + Lw) / s
     np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
@@ -77,12 +80,9 @@ def test_ideal_loops_are_the_hand_transfer_functions() -> None:
 
 
 def test_continuous_loops_keep_the_nested_delays() -> None:
-    design = amber(2, 10, delay_s=1.3e-4)
-    loops = assemble_loops(design, "continuous")
+    loops = assemble_loops(amber(2, 10, delay_s=1.3e-4), "continuous")
     s = 1j * np.geomspace(0.1, 1e5, 60)
-    Li = 0.02 * (1 + 1 / (150e-6 * s)) * np.exp(-s * 1.8e-4)
-    Li = Li * (J * s + Cv) / ((L * s + R) * (J * s + Cv) + K**2)
-    Lw = 0.12 * (1 + 1 / (15e-3 * s)) * np.exp(-s * 0.5e-4) * Li / (1 + Li) * K / (J * s + Cv)
+    _, Lw = by_hand(s, 0.0, np.exp(-s * 1.8e-4), np.exp(-s * 0.5e-4))
     Lp = 120 / s * np.exp(-s * 4e-4) * Lw / (1 + Lw)
     assert isinstance(loops.position.open_loop, DelaySystem)
     np.testing.assert_allclose(loops.position.open_loop(s), Lp, rtol=1e-8)
@@ -253,12 +253,7 @@ def test_stiffness_of_a_back_drivable_load() -> None:
     design = amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0))
     s = 1j * np.geomspace(0.01, 1e4, 20)
     loop = assemble_loops(design, "ideal").velocity
-    k = 40.0 / 2376**2
-    mechanics = s / (J * s**2 + Cv * s + k)
-    electric = 1 / ((L * s + R) + K**2 * mechanics)
-    Li = 0.02 * (1 + 1 / (150e-6 * s)) * electric
-    Lw = 0.12 * (1 + 1 / (15e-3 * s)) * Li / (1 + Li) * K * mechanics
-    np.testing.assert_allclose(loop.open_loop(s), Lw, rtol=1e-7)
+    np.testing.assert_allclose(loop.open_loop(s), by_hand(s, 40.0 / 2376**2)[1], rtol=1e-7)
     held = assemble_loops(replace(design, load=Load(moment_slope_Nm_rad=-40.0)), "ideal").velocity
     plain = assemble_loops(amber(), "ideal").velocity
     np.testing.assert_array_equal(held.open_loop.A, plain.open_loop.A)
@@ -278,15 +273,12 @@ def test_sensitivities_sum_to_one_in_every_form(design: Design) -> None:
             assert loop.unit_in == loop.unit_out
 
 
-def test_signals_are_named_and_bode_works() -> None:
+def test_signals_are_named() -> None:
     loops = assemble_loops(amber())
     assert loops.velocity.open_loop.input_labels == ["e_w"]
     assert loops.velocity.open_loop.output_labels == ["w_meas"]
     assert loops.reference_to_output.output_labels == ["output_angle"]
-    continuous = assemble_loops(amber(), "continuous").position
-    assert continuous.open_loop.input_labels == ["e_th"]
-    frd = control.frequency_response(continuous.open_loop, np.array([1.0, 10.0, 100.0]))
-    np.testing.assert_allclose(frd.complex, continuous.open_loop(1j * np.array([1.0, 10.0, 100.0])))
+    assert assemble_loops(amber(), "continuous").position.open_loop.input_labels == ["e_th"]
 
 
 def test_printing_says_what_it_is() -> None:

@@ -12,7 +12,7 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, drawn, period_s
+from own_laws import PlainLaw, as_law, drawn, period_s
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
@@ -24,16 +24,6 @@ from nonlinear.bench.loop_setup import loop_setup
 
 TICKS = 400
 SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
-
-
-def as_law(design: Design, stage: str, **settings: Any) -> Design:
-    """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
-    gain = loop.gain_V_A if stage == "current" else loop.gain
-    if loop.integral_time_s is None:
-        return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
-    step = gain * T / loop.integral_time_s
-    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], **settings)
 
 
 @pytest.mark.parametrize("part", range(4))

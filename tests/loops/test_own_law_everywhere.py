@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loop_designs import controlled
-from own_laws import period_s
+from own_laws import as_law, period_s
 
 from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
@@ -23,12 +23,10 @@ STAGES = ("current", "velocity", "position")
 def lead(stage: str) -> Design:
     """The shipped drive with a law of one state and an anti-windup on the error of a stage."""
     design = load_design("ilr33-amber")
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
-    gain = loop.gain_V_A if stage == "current" else loop.gain
-    if loop.integral_time_s is None:
-        return design.with_law(stage, ([[0.5]], [[1.0]], [[-0.25 * gain]], [[1.5 * gain]], T), ["error"])
-    step = gain * T / loop.integral_time_s
-    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], L=[0.5])
+    if stage != "position":
+        return as_law(design, stage, L=[0.5])
+    gain, T = design.controller.position.gain, period_s(design, stage)
+    return design.with_law(stage, ([[0.5]], [[1.0]], [[-0.25 * gain]], [[1.5 * gain]], T), ["error"])
 
 
 @pytest.mark.parametrize("stage", STAGES)
