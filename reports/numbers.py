@@ -1,7 +1,5 @@
 """Numbers as a reader wants them: few digits, no exponent where none is needed, a true minus sign."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """The move that mends the weakest point of a drive: one gain, the least change, nothing else made worse."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf, log

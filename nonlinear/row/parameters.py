@@ -1,7 +1,5 @@
 """A design becomes the row of floats that the compiled kernel reads."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, get_args
 

@@ -1,7 +1,5 @@
 """Simulate one run: check, convert, call the kernel, wrap."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
