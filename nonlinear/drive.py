@@ -1,7 +1,5 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
-from __future__ import annotations
-
 from os import PathLike
 
 import numpy as np

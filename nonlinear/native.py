@@ -4,8 +4,6 @@
 beside it; an installation does so (`actuator_lti.compiled.library`).
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

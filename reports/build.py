@@ -1,7 +1,5 @@
 """From a design to the document of its report; drawing and writing come after."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial

@@ -1,7 +1,5 @@
 """All figures of a document as SVG; what of a document that somebody gives can be drawn."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Blocks of a document as tables on a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

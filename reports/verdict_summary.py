@@ -1,7 +1,5 @@
 """The verdict of a whole document: how many of each kind are met, in numbers and in words."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """Bandwidths of a measured closed loop: each with the range in which it lies."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from typing import Any

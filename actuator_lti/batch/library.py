@@ -1,7 +1,5 @@
 """The compiled figures of many designs, by the library of this package's kernels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -6,8 +6,6 @@ fields of a structure as ``name.field``; all else (sparse, objects) is passed ov
 arrays, which stand beside the real ones for whoever asks for them.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ be a chain of n - 1; as a factor it has a closed form, falls from 1 to its first
 more than 0.22 behind it.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The axis in the parts in which a factored loop is searched, and how far out it has to be."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

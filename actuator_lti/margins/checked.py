@@ -1,7 +1,5 @@
 """Margins of a rational loop, alone or behind a delay, in double precision: checked, or doubtful."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Distances of a response L whose smallest value is asked for: to -1, and those that peaks are one over."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """A rational loop as its factors, and the polish of what they tell by the loop itself."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Poles sorted by the stability boundary, each with the accuracy that its eigenvalue has."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

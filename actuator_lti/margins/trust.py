@@ -1,7 +1,5 @@
 """Whether figures in double precision can be trusted: told from zero, with a small bound of their error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -1,7 +1,5 @@
 """Step response of a system with inner delays: walked along the first of them, then by its poles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

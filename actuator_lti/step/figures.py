@@ -1,7 +1,5 @@
 """Step response and its figures: rise, overshoot, settling."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from operator import itemgetter

@@ -12,8 +12,6 @@ certified balls, and the coordinates of the motion are computed in as many digit
 Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Orthogonal Basis Functions, 2005.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -9,8 +9,6 @@ Instants are kept while their jumps matter, for ever where a loop of delays lets
 Bellen, Zennaro, Numerical Methods for Delay Differential Equations, 2003.
 """
 
-from __future__ import annotations
-
 from heapq import heappop, heappush
 from itertools import count
 from math import factorial

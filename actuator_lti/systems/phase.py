@@ -1,7 +1,5 @@
 """Phase without ambiguity: unwrapped factor by factor, the same on any grid."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

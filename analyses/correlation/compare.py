@@ -1,7 +1,5 @@
 """One signal, measured and modelled: the figures that say how alike they are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from math import isnan
 

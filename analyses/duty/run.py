@@ -1,7 +1,5 @@
 """Simulate a duty, then heat the winding and the overload state with its current."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import exp, inf, isfinite, log
 

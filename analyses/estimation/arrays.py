@@ -1,7 +1,5 @@
 """Arrays of one kind of number, as all analyses of records type them, and rows that are marked in them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Least squares of one or several records: what they tell, what they do not, and how sure it is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

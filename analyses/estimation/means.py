@@ -1,7 +1,5 @@
 """Correlation of series: means with an uncertainty that respects it, and the lag of one behind another."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Run every failure of a design on the rig of `analyses.failures.cases`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, log
 

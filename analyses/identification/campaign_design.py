@@ -1,7 +1,5 @@
 """Which further runs would shrink the uncertainty of the margins most."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 

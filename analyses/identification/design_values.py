@@ -1,7 +1,5 @@
 """Every number of the design against the fit, the one cause of what is off, the constant that all hang on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

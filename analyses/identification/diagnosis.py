@@ -1,7 +1,5 @@
 """A record before it is believed: clipped, late, drifting; put right where it can be, and said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

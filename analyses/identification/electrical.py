@@ -1,7 +1,5 @@
 """Resistance, back-EMF constant and, only where the record shows it, inductance: from u, i and w."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """From records of a two-mass drive to a design: frequency response, play, verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Friction as a map over the speed: break points found, and judged against the plain law."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

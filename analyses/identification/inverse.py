@@ -1,7 +1,5 @@
 """The inverse dynamic model of one or several records: inertia, friction, load, by joint least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

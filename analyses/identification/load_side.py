@@ -1,7 +1,5 @@
 """Motion and torque on either side of an elastic coupling, as far as a record and the design tell them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

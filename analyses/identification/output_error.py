@@ -1,7 +1,5 @@
 """Records simulated: values with which the drive moves as they did, and the written design against them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

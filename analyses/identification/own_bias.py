@@ -1,7 +1,5 @@
 """What the fit of an inverse model makes of a record whose truth is known: its own bias, taken off."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace

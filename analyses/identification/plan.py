@@ -1,7 +1,5 @@
 """Motions within a drive's limits that tell its values as closely as asked: the plan of an experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Play of a coupling from a record of both its sides under a torque that reverses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

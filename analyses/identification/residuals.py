@@ -1,7 +1,5 @@
 """Tests of residuals as in system identification: whiteness, and independence of the inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Is a richer friction law warranted? Asked of runs that the law has not seen."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import nan
 

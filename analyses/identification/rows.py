@@ -1,7 +1,5 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

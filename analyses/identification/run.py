@@ -1,7 +1,5 @@
 """The identification that the files ask for: of a campaign, of records of a motion, or of two masses."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

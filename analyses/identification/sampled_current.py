@@ -1,7 +1,5 @@
 """What a current sampled at the controller's ticks tells of the current between them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

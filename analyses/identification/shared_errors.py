@@ -1,7 +1,5 @@
 """Errors that all runs of a campaign share, the intervals that hold them, and runs that do not belong."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

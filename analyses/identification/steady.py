@@ -1,7 +1,5 @@
 """The steady part of each run, by a stated criterion on the acceleration, and its means: one point a run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The friction surface M = C0 + Cv w + CM |M_ext| through the points of a campaign (paper, equation 9)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

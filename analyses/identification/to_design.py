@@ -1,7 +1,5 @@
 """Identified values into a design, with their tolerances and correlations."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations

@@ -1,7 +1,5 @@
 """A two-mass drive from a record of a periodic excitation: lines, their noise, what fits them best."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product

@@ -11,8 +11,6 @@ a current loop is taken as the current limit U/R that it amounts to: the velocit
 it and goes on integrating.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt

@@ -10,8 +10,6 @@ An angle of amplitude A about a bias d, counted in steps q, has the fundamental 
     n = (2 q/(pi A)) sum_k sqrt(1 - ((k + d) q/A)^2),  all k with |k + d| q < A.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from math import inf, log, pi

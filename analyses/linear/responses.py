@@ -1,7 +1,5 @@
 """Frequency responses on a grid that suits the loop, for tables and figures; no margin is read from them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Margins, bandwidths and requirements of a design at one operating point; a measured response over them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast

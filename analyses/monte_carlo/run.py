@@ -1,7 +1,5 @@
 """A Monte Carlo study from a design to odds, distributions and worst cases."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json

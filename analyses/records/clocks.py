@@ -1,7 +1,5 @@
 """Two recorders with clocks of their own, put on one: by a shared event, or by correlation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple

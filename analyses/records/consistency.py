@@ -1,7 +1,5 @@
 """Does a record agree with itself and with the drive it is said to come from?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf, isfinite

@@ -1,7 +1,5 @@
 """Files of named columns (Parquet, JSON, MATLAB up to 7.2), and a record of any file by its ending."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from io import BytesIO

@@ -1,7 +1,5 @@
 """Records out of named columns of numbers: the time of each row, missing values, SI."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

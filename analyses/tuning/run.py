@@ -1,7 +1,5 @@
 """Tune a design: rules, refinement, rounding to the controller's steps, all corners, nonlinear check."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations

@@ -4,8 +4,6 @@ A run begins in the steady state that its sine has, by the tangent, so that noth
 fundamentals are correlated over whole periods.  It judges nothing: the tangent does (`small_signal`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil
 

@@ -7,8 +7,6 @@ K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and 
 searched, nothing waited for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial

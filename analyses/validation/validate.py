@@ -1,7 +1,5 @@
 """Validate a design: every prediction checked by the simulator, and where the linear model stops holding."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """The response of a system over one base period, of M updates at a place, to a sine there; and its errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """An instrument in the loop, as a frequency response analyser is connected on a bench."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import floor
 from typing import Literal

@@ -1,7 +1,5 @@
 """`actuator-lti export c`: header, source, the design's parameters, an example and a README."""
 
-from __future__ import annotations
-
 import re
 from importlib.metadata import PackageNotFoundError, version
 

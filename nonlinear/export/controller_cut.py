@@ -1,7 +1,5 @@
 """The controller cut out of the tick of one design: what the kernels leave where its parameters are known."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

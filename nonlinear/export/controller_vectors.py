@@ -1,7 +1,5 @@
 """Test vectors of a controller: states, inputs and outputs of the simulator, with the bound of rounding."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Parameters of the event-driven plant (model.md section 6): coupling, load-side friction, friction map."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

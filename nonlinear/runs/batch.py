@@ -7,8 +7,6 @@ numbers do not depend on the number of threads, nor on what else is in the batch
 for its ticks; it leaves ``layout.OUT_SIZE`` numbers.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed

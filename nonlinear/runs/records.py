@@ -1,7 +1,5 @@
 """Columns of numbers from a CSV file, with refusals that name the place."""
 
-from __future__ import annotations
-
 import csv
 from os import PathLike
 

@@ -1,7 +1,5 @@
 """What a drive is asked to do in a run, and how that is written into the run's row and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite

@@ -7,8 +7,6 @@ while friction holds the drive does, the last state before an event is found by 
 overload protection, ``x += a ((i/i_cont)^2 - x)`` a tick, is followed in closed form.
 """
 
-from __future__ import annotations
-
 from math import log, log1p
 
 import numpy as np

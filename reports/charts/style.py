@@ -1,7 +1,5 @@
 """What figures share: colours of series, each with a dash of its own; limits of an axis, ticks of phase."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Figures of a comparison: overlaid Bode and step, tornado charts of what matters to the requirements."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The delay budget: where the phase at each crossover goes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The loops seen from other sides: in three forms, at every break point, at every operating point."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of one loop over frequency: open and closed loop, Nyquist, Nichols."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable, Sequence

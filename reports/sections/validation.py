@@ -1,7 +1,5 @@
 """The verdict of the nonlinear simulator on every prediction, and all sections of a validation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace

@@ -1,7 +1,5 @@
 """Any loop with exact delays, inside or in series."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

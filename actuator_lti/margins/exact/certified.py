@@ -3,8 +3,6 @@
 What the data determine is the answer that is the same for neighbours 8 ulp away.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

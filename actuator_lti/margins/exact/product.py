@@ -5,8 +5,6 @@ to more digits than a double has, and so is its way to any point beside it. What
 same, once for the loop as given and once for each of its neighbours 8 ulp away.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Between which values a measured response lies, point by point and between the points; how near to -1."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
