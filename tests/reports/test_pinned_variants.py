@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from live_page import AMBER, FIGURES, LIVE, Page, command_line, done, saved, settled, type_value
+from live_page import AMBER, FIGURES, LIVE, Page, command_line
 
 from actuator_lti import load_design
 
@@ -14,9 +14,8 @@ CURSOR = """(name) => { const svg = document.querySelector(`[data-chart=${name}]
 
 
 def press(page: Page, does: str, letter: str = "") -> None:
-    of = f'[data-letter="{letter}"]' if letter else ""
-    settled(page, lambda: page.click(f'[data-do="{does}"]{of}'))
-    done(page)
+    page.does(does, f'[data-letter="{letter}"]' if letter else "")
+    page.done()
 
 
 def column(page: Page, heading: str) -> list[str]:
@@ -37,9 +36,9 @@ def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
     page = opens(AMBER)
     wanted = {}
     for letter, gain in (("A", 80.0), ("B", 140.0)):
-        type_value(page, "control.position.gain", gain)
+        page.type_value("control.position.gain", gain)
         press(page, "pin")
-        wanted[letter] = command_line(saved(page, tmp_path / f"{letter}.toml"))["position"]
+        wanted[letter] = command_line(page.saved(tmp_path / f"{letter}.toml"))["position"]
     press(page, "reset")
     followed = page.evaluate(f"{LIVE}.figures")
     for letter, figures in wanted.items():

@@ -3,7 +3,6 @@
 import re
 
 import pytest
-from live_page import done
 
 from actuator_lti.design import load_design, shipped_designs
 
@@ -37,7 +36,7 @@ def test_ten_questions_are_answered_within_two_clicks(opens, name: str) -> None:
         if SIZE in clicks:
             page.fill(SIZE, "20")
             page.press(SIZE, "Enter")
-            done(page)
+            page.done()
         answer = page.locator(place).first
         assert answer.is_visible(), question
         assert re.search(pattern, answer.inner_text()), (question, answer.inner_text())
