@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
 from actuator_lti.loops.limiters import Onset, onset
 from actuator_lti.loops.result import Form
+from actuator_lti.types import Progress
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
 MOST_STATES = 120  # of a periodic loop's fundamental: its certificate takes the fifth power of their number

@@ -25,6 +25,7 @@ import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.systems.resolvent import balanced
+from actuator_lti.types import Complexes, Floats
 from analyses.linear.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
@@ -33,8 +34,6 @@ from nonlinear.bench.lifted import GRID, eigenvalues, relative, sized
 if TYPE_CHECKING:
     from actuator_lti.loops import ExactMargins
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 WITHIN = 1e-6  # of a response, of a margin
 SURE = 10.0  # times the stated error
 RESOLVED = 1e-4  # of a response: a tangent that is worse proves nothing

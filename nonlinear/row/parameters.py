@@ -4,18 +4,16 @@ from math import inf
 from typing import Any, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.row.elastic import put_drive_train
 from nonlinear.row.filters import Section, command_section, section
-
-Floats = npt.NDArray[np.float64]
 
 MAX_EVENTS_PER_TICK = 1000
 TANH_TOLERANCE = 1e-8

@@ -1,7 +1,7 @@
 """Simulate one run: check, convert, call the kernel, wrap."""
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import fields, replace
 from math import inf
@@ -15,6 +15,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import NumericalError, finite_number, whole_number
+from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
@@ -24,8 +25,6 @@ from nonlinear.runs.running import Running
 from nonlinear.runs.setup import STATE_PLACES, Run, Tables, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
-Floats = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 LOOK_S = 0.1  # between two looks at a run
 SWITCHES = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
 STORED = ("magnetic_J", "kinetic_J", "spring_J")  # the other energies are the kernel's, in its order

@@ -1,0 +1,11 @@
+"""Kinds of arguments and results that many functions share."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[np.complex128]
+Progress = Callable[[int, int], None]
+"""Called with (done, total) while long work goes on."""
