@@ -8,17 +8,10 @@ import pytest
 from actuator_lti import assemble_loops, closed_loop_bandwidth
 from actuator_lti.design import load_design, with_values
 from actuator_lti.drive.operating import rubs
-from analyses import large_signals, sawtooth
+from analyses import amplitude_map, large_signals, sawtooth
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
 from analyses.large_signal.from_rest import TOO_MANY, margins_by_amplitude
-from analyses.large_signal.map import (
-    MINUS_3DB,
-    AmplitudeBode,
-    _crossing,
-    amplitude_bode,
-    amplitude_map,
-    crossing_range,
-)
+from analyses.large_signal.map import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from reports.sections.large_signal import _result

@@ -134,24 +134,21 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
 
 
+BEHIND = {"dry_torque": "2 N*m", "viscous": "3 N*m*s/rad"}
+
+
 @pytest.mark.parametrize(
     ("name", "more"),
     [
         ("fin", {"load.moment_damping": "2 N*m*s/rad"}),
-        ("ilr33-amber", {"load.moment_damping": "300 N*m*s/rad", "load.path": "back-drivable"}),
-        (
-            "ilr33-amber-compliant",
-            {
-                "load.path": "back-drivable",
-                "load.friction.dry_torque": "2 N*m",
-                "load.friction.viscous": "3 N*m*s/rad",
-            },
-        ),
+        ("ilr33-amber", {"load.moment_damping": "300 N*m*s/rad"}),
+        ("ilr33-amber-compliant", {f"load.friction.{key}": value for key, value in BEHIND.items()}),
     ],
 )
 def test_the_demand_of_the_plane_is_what_steady_motion_takes(name: str, more: dict[str, str]) -> None:
     """Friction behind the coupling and damping of the load too: the torque of a ramp, simulated."""
-    design = with_overrides(load_design(name), {**more, "load.moment_slope": "0 N*m/rad"})
+    free = {"load.path": "back-drivable", "load.moment_slope": "0 N*m/rad"}
+    design = with_overrides(load_design(name), {**more, **free})
     top = 0.3 * drive_figures(design, 0.0).output_rate_rad_s * design.total_ratio
     (curve,) = torque_speed_plane(changed(design, validation={"loads_Nm": (0.0,)}), top).demands
     wanted = float(np.interp(top, curve.speed_rad_s, curve.torque_Nm))
