@@ -71,14 +71,9 @@ def propagated(design: Design, voltage: np.ndarray) -> np.ndarray:
     c = design.controller
     late = round(c.computing_delay_s / c.period_s * FINE)
     held = np.concatenate([np.zeros(late), np.repeat(voltage, FINE)])[: voltage.size * FINE]
-    bare = replace(
-        design,
-        controller=Controller(period_s=c.period_s / FINE, computing_delay_s=0.0),
-        limits=Limits(voltage_V=inf),
-        supply=None,
-        instruments=Instruments(),
-        command=Command(),
-    )
+    free = {"limits": Limits(voltage_V=inf), "supply": None, "command": Command()}
+    control = Controller(period_s=c.period_s / FINE, computing_delay_s=0.0)
+    bare = replace(design, controller=control, instruments=Instruments(), **free)
     fine = run(bare, held.size, held, tanh_tolerance=1e-13)
     return np.transpose([fine.output_angle_rad, fine.motor_angle_rad, fine.motor_speed_rad_s, fine.current_A])
 

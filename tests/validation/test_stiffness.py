@@ -10,8 +10,13 @@ from actuator_lti.design import load_design, with_overrides, write_design
 from actuator_lti.design.model import Load
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
-from analyses import stiffness
-from analyses.stiffness import check_stiffness, lost_motion_seen, stiffness_at_rest, stiffness_curves
+from analyses.stiffness import (
+    check_stiffness,
+    lost_motion_seen,
+    stiffness,
+    stiffness_at_rest,
+    stiffness_curves,
+)
 from reports.drawing import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed
