@@ -34,14 +34,13 @@ SHOWN = {"deg": 180 / pi, "deg/s": 180 / pi, "rpm": 30 / pi, "mm": 1000.0}
 
 
 def described(design: Design, version: int) -> ET.Element:
-    with zipfile.ZipFile(io.BytesIO(fmu_bytes(design, version, ()))) as archive:  # type: ignore[arg-type]
+    with zipfile.ZipFile(io.BytesIO(fmu_bytes(design, version, ()))) as archive:
         return ET.fromstring(archive.read("modelDescription.xml"))
 
 
 def variables(root: ET.Element) -> dict[str, dict[str, str]]:
     """Attributes of each variable by its name; of FMI 2 those of its type are an element of their own."""
     listed = root.find("ModelVariables")
-    assert listed is not None
     return {each.attrib["name"]: each.attrib | (each[0].attrib if len(each) else {}) for each in listed}
 
 
@@ -90,7 +89,6 @@ def test_the_command_is_that_of_the_outermost_stage(version: int) -> None:
 @pytest.mark.parametrize("version", [2, 3])
 def test_any_step_is_allowed_and_the_period_is_said(version: int) -> None:
     simulation = described(load_design("joint"), version).find("CoSimulation")
-    assert simulation is not None
     assert simulation.attrib["canHandleVariableCommunicationStepSize"] == "true"
     period = repr(load_design("joint").controller.period_s)
     assert simulation.attrib.get("fixedInternalStepSize") == (period if version == 3 else None)

@@ -67,7 +67,7 @@ def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
     a_speed = motor.back_emf_constant_Vs_rad + motor.resistance_ohm * viscous / motor.torque_constant_Nm_A
     wanted = design.limits.voltage_V / (design.total_ratio * a_speed)
     for form in ("sampled", "continuous", "ideal"):
-        border = onset(assemble_loops(design, form), [1e-3])  # type: ignore[arg-type]
+        border = onset(assemble_loops(design, form), [1e-3])
         assert border.each_rad["voltage"] == pytest.approx(wanted, rel=1e-6)
 
 

@@ -193,8 +193,6 @@ def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:
 
 def test_trap_the_inner_loops_do_not_see_the_angle() -> None:
     loops = assemble_loops(amber(encoder=Encoder(speed="difference", difference_samples=2)))
-    assert loops.current is not None
-    assert loops.velocity is not None
     # the PI's own integrator is the only eigenvalue at 1 of the current and the velocity loop
     for loop in (loops.current, loops.velocity):
         assert np.sum(np.abs(loop.open_loop.poles() - 1) < 1e-9) == 1

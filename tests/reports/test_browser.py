@@ -58,7 +58,6 @@ def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Buil
     for selector in FIRST:
         for part in page.locator(selector).all():
             box = part.bounding_box()
-            assert box is not None
             assert 0 <= box["y"] <= 900 - box["height"], (selector, box)
     assert page.locator(".findings li").count() <= 3
     assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900

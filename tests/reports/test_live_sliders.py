@@ -198,7 +198,6 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
     slider.scroll_into_view_if_needed()
     box = slider.bounding_box()
-    assert box is not None
     small.settled(lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 

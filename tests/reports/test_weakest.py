@@ -125,14 +125,11 @@ def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -
     design = load_design("ilr33-amber")
     seen = survey_loops(design)
     point = weakest(seen)
-    assert point is not None
     assert (point.view.kind, point.view.load_Nm, point.quantity) == ("rest", 8.0, "phase_margin")
     move = mending(point, seen)
-    assert move is not None
     for part, inside in ((1.0, True), (0.8, False)):
         value = move.was + part * (move.value - move.was)
         loops = assemble_loops(with_values(design, {move.path: value}), operating_point="rest", load_Nm=8.0)
-        assert loops.position is not None
         margins = stability_margins(loops.position.open_loop)
         found = {
             "phase_margin": abs(margins.phase_margin_deg), "gain_margin": abs(margins.gain_margin_db),
@@ -140,7 +137,6 @@ def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -
         }  # fmt: skip
         assert all(found[name] >= limit for name, limit in CUSTOMARY.items()) is inside
     mended = weakest(survey_loops(with_values(design, {move.path: move.value})))
-    assert mended is not None
     assert mended.reserve >= 0.0
 
 
@@ -148,9 +144,7 @@ def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
     """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
     bounds = corners(FIN)
     point = weakest(survey, bounds)
-    assert point is not None
     free = mending(point, survey, bounds)
-    assert free is not None
     assert free.path == "control.position.gain"
     whole = load_design("fin")
     assert mending(point, replace(survey, design=whole), bounds) is None
