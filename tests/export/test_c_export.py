@@ -147,9 +147,7 @@ def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", *ELASTIC])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_the_example_builds_without_a_warning_and_is_the_simulator(
-    name: str, compiler: str, tmp_path
-) -> None:
+def test_the_example_builds_without_a_warning_and_is_the_simulator(name: str, compiler: str, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} on this machine")
     design = load_design(name)

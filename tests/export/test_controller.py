@@ -48,9 +48,7 @@ def without_library(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize("name", shipped_designs())
-def test_vectors_of_the_simulator_hold_and_no_library_is_called(
-    name: str, single: bool, tmp_path: Path
-) -> None:
+def test_vectors_of_the_simulator_hold_and_no_library_is_called(name: str, single: bool, tmp_path: Path):
     folder = written(tmp_path, load_design(name), single=single)
     assert without_library(folder) <= (MATHEMATICS if name in ("joint", "ballscrew") else set())
     worst = worst_of(folder)

@@ -65,9 +65,7 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
         ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
     ],
 )  # fmt: skip
-def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
-    name: str, delay_ticks: float, form: str
-) -> None:
+def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(name: str, delay_ticks: float, form: str):
     """Through stick, slip and limits; the last form that fits, which is taken, is this drive's own."""
     design = load_design(name)
     period_s = design.controller.period_s
@@ -146,9 +144,7 @@ def _margins() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("work", "library"), [(_figures, FIGURES), (_margins, AXIS)])
-def test_figures_are_those_of_the_kernels_as_written(
-    work: Callable[[], np.ndarray], library: Library
-) -> None:
+def test_figures_are_those_of_the_kernels_as_written(work: Callable[[], np.ndarray], library: Library):
     """To rounding: Python's hypot is not the C library's."""
     ours = work()
     with library.written():

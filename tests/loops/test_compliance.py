@@ -38,9 +38,7 @@ def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -
          ("least_stiffness",)),
     ],
 )  # fmt: skip
-def test_stacked_designs_have_the_figures_of_each_alone(
-    name: str, values: dict[str, list[float]], quantities: tuple[str, ...]
-) -> None:
+def test_stacked_designs_have_the_figures_of_each_alone(name, values, quantities):
     design, count = load_design(name), len(next(iter(values.values())))
     stacked = {path: np.array(each) for path, each in values.items()}
     for quantity in quantities:

@@ -89,9 +89,7 @@ def truth(
 
 @pytest.mark.parametrize("feedthrough", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_loops_of_delays_without_a_common_measure(
-    feedthrough: bool, seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_loops_of_delays_without_a_common_measure(feedthrough, seed, monkeypatch):
     rng = np.random.default_rng([seed, feedthrough])
     parts, delays = random_loop(rng, feedthrough)
     times = np.linspace(0.0, rng.uniform(2.0, 6.0) * delays.max(), POINTS)
@@ -103,9 +101,7 @@ def test_loops_of_delays_without_a_common_measure(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_step_figures_of_loops_of_delays_without_a_common_measure(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_step_figures_of_loops_of_delays_without_a_common_measure(seed: int, monkeypatch: pytest.MonkeyPatch):
     parts, delays = random_loop(np.random.default_rng([seed, 2]), False)
     f = step_figures(in_one_loop(parts, delays).feedback())
     early = np.flatnonzero(f.time_s < 4.0 * delays.max())

@@ -135,9 +135,7 @@ def same(blocks: list[Any], k: int) -> None:
         (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
     ],
 )
-def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
-    design: Design, k: int, loop: str, told: bool
-) -> None:
+def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(design, k, loop, told):
     values = scattered(design, k + 1)
     figures = linear_figures(Population(design, values, k + 1), time_figures=False)
     alone = stacked(design, {path: float(array[k]) for path, array in values.items()})

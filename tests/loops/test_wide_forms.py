@@ -1,7 +1,6 @@
 """The wider drive in all three forms: limits of the sampled one, hand-made transfer functions, budgets."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, delay_budget
-from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
+from actuator_lti.design.model import Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
 from analyses import survey_loops
@@ -22,9 +21,7 @@ from reports.sections.delays import section
     ("drive", "final", "order"), [(amber(2, 10), 5e-3, (1.9, 2.1)), (everything(), 0.02, (1.8, np.inf))]
 )
 @pytest.mark.parametrize("form", ["sampled", "continuous"])
-def test_every_form_of_a_drive_tends_to_the_ideal_one(
-    form: Any, drive: Design, final: float, order: tuple[float, float]
-) -> None:
+def test_every_form_of_a_drive_tends_to_the_ideal_one(form, drive, final, order):
     """First order in Ts for every loop, break point, the command and the moment."""
     omega, ideal, worst = np.array([20.0, 100.0, 300.0]), assemble_loops(drive, "ideal"), []
     for factor in (64, 128):

@@ -62,9 +62,7 @@ def test_log_ticks_lie_inside_and_say_their_value(power: float, decades: float) 
 
 
 @given(st.floats(0.01, 1e4), st.floats(1.5, 1e6), st.floats(0.0, 1.0), st.booleans(), st.booleans())
-def test_an_axis_places_its_ends_and_what_lies_between(
-    low: float, ratio: float, part: float, log: bool, reversed_: bool
-) -> None:
+def test_an_axis_places_its_ends_and_what_lies_between(low, ratio, part, log, reversed_):
     axis = Axis(log=log, reversed=reversed_)
     axis.limits(low, low * ratio)
     value = low * ratio**part if log else low + part * (low * ratio - low)

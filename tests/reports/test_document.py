@@ -44,9 +44,7 @@ def holding(blocks: list[Any], **section: Any) -> str:
         ((), "", "met", [("the design states no requirements", "info")]),
     ],
 )
-def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
-    passed: tuple[bool | None, ...], waiver: str, word: str, lines: list[tuple[str, str]]
-) -> None:
+def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(passed, waiver, word, lines):
     items = [judged(f"v{k}", one) | {"waiver": waiver * (one is None)} for k, one in enumerate(passed)]
     result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
     assert (result["verdict"], result["passed"]) == (word, word == "met")
@@ -71,9 +69,7 @@ GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
         (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),
     ],
 )  # fmt: skip
-def test_a_document_is_as_good_as_its_worst_part(
-    parts: list[Any], kind: str, word: str, said: list[str]
-) -> None:
+def test_a_document_is_as_good_as_its_worst_part(parts: list[Any], kind: str, word: str, said: list[str]):
     """A section that has failed or is open by itself counts; one whose verdict fails is not said twice."""
     whole = doc.document(title="T", subtitle="", design={}, provenance={}, sections=parts, kind=kind)
     assert (whole["verdict"]["verdict"], whole["verdict"]["passed"]) == (word, word == "met")
@@ -145,9 +141,7 @@ CURVE = ("columns", 0, "panels", 0, "items", 0)
         ((*CURVE, "look"), {"colour": 'red"/><b>'}, r"columns\..*\.look\.colour: .*allowed: ink"),
     ],
 )
-def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(
-    place: tuple[str | int, ...], value: Any, words: str, tmp_path
-) -> None:
+def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(place, value, words, tmp_path):
     chart = Chart()
     chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")
     first, second = (doc.figure(name, chart, caption="c", alt="a") for name in ("bode", "distribution"))

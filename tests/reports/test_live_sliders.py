@@ -93,9 +93,7 @@ def test_undo_redo_reset_and_keyboard(page: Page) -> None:
 @pytest.mark.parametrize(("delay_us", "words", "place"), [
     (1e4, "too many states for this page", "table.now"), (1.1e4, "allowed: at most 100 ticks", ".state")
 ])  # fmt: skip
-def test_a_value_that_is_too_much_is_said_and_undone(
-    page: Page, delay_us: float, words: str, place: str
-) -> None:
+def test_a_value_that_is_too_much_is_said_and_undone(page: Page, delay_us: float, words: str, place: str):
     before = page.read()
     page.type_value("control.computing_delay", delay_us)
     has = "([place, words]) => document.querySelector(place).innerText.includes(words)"

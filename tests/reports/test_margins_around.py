@@ -51,9 +51,7 @@ def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:
 
 @needs_compiler
 @pytest.mark.parametrize(("table", "seconds"), [(AIRFRAME, 0.6), (WEATHERCOCK, 1.5)])
-def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
-    table: dict, seconds: float, tmp_path
-) -> None:
+def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(table, seconds, tmp_path):
     loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
     result = stability_margins(loop.open_loop)
     assert result.stable

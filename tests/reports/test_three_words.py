@@ -50,9 +50,7 @@ CASES = pytest.mark.parametrize(
 
 
 @CASES
-def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_margins_and_report_say_the_same(waivers, status, head, written, tmp_path, cli):
     path = written(asking(*waivers))
     said = cli.text("margins", path, status=status)
     assert said.startswith(f"{head}  ")
@@ -73,9 +71,7 @@ def test_margins_and_report_say_the_same(
 
 
 @CASES
-def test_what_corners_and_samples_leave_out_is_not_proven(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_what_corners_and_samples_leave_out_is_not_proven(waivers, status, head, written, tmp_path, cli):
     design = asking(*waivers)
     drawn = ("--samples", "4", "--no-worst", "--quiet", "--out", tmp_path)
     for name, *more in (("corners", "--quiet"), ("montecarlo", *drawn)):

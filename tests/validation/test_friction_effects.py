@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -54,9 +53,7 @@ def _joint_rate(loop: Hysteresis) -> float:
         ("fin", 0.0, lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
     ],
 )
-def test_what_a_reversal_loses_is_predicted(
-    name: str, load_Nm: float, expected: Callable[[Hysteresis], float], within: float
-) -> None:
+def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
     design = quiet(load_design(name))
     static = threshold(design, load_Nm).static

@@ -105,9 +105,7 @@ def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, wor
         ("ballscrew", 1.0, True, (2, 14), 1e-4),
     ],
 )
-def test_the_linear_bandwidth_is_that_of_the_margins(
-    name: str, share: float, friction_on: bool, counts: tuple[int, int], within: float
-) -> None:
+def test_the_linear_bandwidth_is_that_of_the_margins(name, share, friction_on, counts, within):
     design, loops = load_design(name), assemble_loops(name)
     small = changed(design, validation={"full_deflection_rad": share * design.validation.full_deflection_rad})
     shown = amplitude_map(small, loops, friction_on=friction_on, counts=counts)

@@ -91,9 +91,7 @@ def verdicts(design: Design, model: Design, place: str) -> set[Verdict]:
     [("ilr33-amber", cogging), ("fin", cogging), ("fin", gear_error)],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
-    name: str, effect: Callable[..., Design]
-) -> None:
+def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(name: str, effect: Callable[..., Design]):
     plain = load_design(name)
     design, wrong = effect(plain), effect(plain, 1.01)
     for place in ("velocity", "u"):
