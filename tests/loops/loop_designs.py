@@ -72,7 +72,6 @@ def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> model.Design
 
 
 def picker(draw: st.DrawFn) -> Callable[..., Any]:
-    """Draws one of some values."""
     return lambda *values: draw(st.sampled_from(values))
 
 

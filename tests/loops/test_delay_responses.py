@@ -59,7 +59,6 @@ def round_the_loop(parts: list[Rational], delays: np.ndarray, end: float) -> dic
 
 
 def in_one_loop(parts: list[Rational], delays: np.ndarray) -> DelaySystem:
-    """The open loop: the sum of all parts."""
     loop = DelaySystem.from_system(0.0)
     for part, delay in zip(parts, delays, strict=True):
         loop += DelaySystem.from_system(control.tf(*part)) * DelaySystem.delay(delay)

@@ -19,7 +19,6 @@ R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6  # of `amber`
 
 
 def proportional(design: Design) -> Design:
-    """The design with P controllers only."""
     return controlled(design, velocity={"integral_time_s": None}, current={"integral_time_s": None})
 
 

@@ -37,7 +37,6 @@ class Case:
         return (pi - PHASE) / self.order
 
     def put(self, design: model.Design) -> model.Design:
-        """Add it to a drive."""
         if self.name == "cogging":
             motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
             return replace(design, motor=motor)

@@ -21,7 +21,6 @@ def judged(id: str, passed: bool | None, value: float | None = None) -> doc.Verd
 
 
 def made(**changes: Any) -> dict[str, Any]:
-    """Give a small document."""
     met = doc.details("More", [doc.verdicts([judged("c", True, 3.0)])])
     blocks = [doc.verdicts([judged("a", False, 1.0), judged("b", None)]), met]
     parts = [doc.section("one", "One", blocks, status="fail")]
@@ -30,7 +29,6 @@ def made(**changes: Any) -> dict[str, Any]:
 
 
 def holding(blocks: list[Any], **section: Any) -> str:
-    """The JSON of a document with one section."""
     return json.dumps(made(sections=[doc.section("x", "X", blocks, **section)]))
 
 

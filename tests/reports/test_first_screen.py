@@ -16,7 +16,6 @@ from reports.verdict_summary import gathered
 
 
 def glance(document: dict[str, Any]) -> dict[str, Any]:
-    """Give the block of the first screen."""
     return next(block for block in document["sections"][0]["blocks"] if block["kind"] == "glance")
 
 

@@ -25,7 +25,6 @@ CROSSOVER_HZ = GAIN / (2.0 * math.pi)  # of 100 exp(-0.002 s)/s, exactly
 
 
 def document() -> dict[str, Any]:
-    """Make a document with a Bode figure, a Nyquist figure and curves over time."""
     f = np.geomspace(0.1, 1000.0, 240)
     w = 2.0 * np.pi * f
     phase = -90.0 - np.degrees(w * DELAY_S)
@@ -91,7 +90,6 @@ def spot(figure: Locator, across: float, up: float, panel: int = 0) -> tuple[flo
 
 
 def read(figure: Locator) -> dict[str, float]:
-    """Read the read-out as numbers by name."""
     result = {}
     for row in figure.locator(".readout tr").all():
         _, name, value = (cell.inner_text() for cell in row.locator("td").all())

@@ -19,14 +19,12 @@ def press(page: Page, does: str, letter: str = "") -> None:
 
 
 def column(page: Page, heading: str) -> list[str]:
-    """Give the cells of a variant, as they are read."""
     heads = page.locator("table.variants thead th").all_inner_texts()
     rows = page.locator("table.variants tbody tr").all()
     return [row.locator("th, td").all_inner_texts()[heads.index(heading)] for row in rows]
 
 
 def curves(page: Page, label: str) -> list[str]:
-    """Give the figures whose legend names a curve."""
     found = 'all => all.filter(li => !li.hidden).map(li => li.closest("[data-chart]").dataset.chart)'
     legends = page.locator("[data-chart] .keys li").filter(has_text=re.compile(f"^([ST] )?{label}$"))
     return sorted(set(legends.evaluate_all(found)))

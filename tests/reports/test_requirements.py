@@ -14,7 +14,6 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 
 
 def judged(design: Design, waivers: tuple[Waiver, ...] = (), **keys: Any) -> RequirementVerdict:
-    """The verdict on the one requirement of a design."""
     asked = replace(design, requirements=(Requirement(id="r", **keys),), waivers=waivers)
     (verdict,) = evaluate_requirements(asked)
     return verdict

@@ -29,7 +29,6 @@ def page(browser: Browser, built: Built) -> Page:
 
 
 def save(page: Page, place: str, kind: str, folder: Path) -> Path:
-    """Save a figure by its menu, as a user does."""
     chart = page.locator(f"{place} .chart").first
     chart.scroll_into_view_if_needed()
     chart.hover()

@@ -35,8 +35,6 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
 
 @pytest.fixture
 def written(tmp_path) -> Callable[[Design], Path]:
-    """Write a design; the path of its file."""
-
     def call(design: Design) -> Path:
         (tmp_path / "d.toml").write_text(write_design(design), encoding="utf-8")
         return tmp_path / "d.toml"

@@ -25,7 +25,6 @@ T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 
 
 def drive(law: str, feedforward: float = 3.0) -> model.Design:
-    """The drive of the docstring."""
     velocity = model.VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
     place = model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward)
     return model.Design(
