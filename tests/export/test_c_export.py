@@ -151,8 +151,7 @@ def test_the_example_builds_without_a_warning_and_is_the_simulator(name: str, co
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} on this machine")
     design = load_design(name)
-    texts = c_export(design)
-    ours = {file: text for file, text in texts.items() if file != "README.md"}
+    ours = {file: text for file, text in c_export(design).items() if file != "README.md"}
     said = said_by(tmp_path, ours, "400", "0.01", compiler=[compiler])
     table = np.array([[float(x) for x in line.split(",")] for line in said.splitlines()[1:]])
     run = simulate(design, commands.step(0.01), 400 * design.controller.period_s, loads.constant(0.0))

@@ -42,8 +42,7 @@ needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst 
 @needs_typesetter
 def test_names_cannot_break_the_picture() -> None:
     design = replace(load_design("fin"), name='a<b>&"c', title="x" * 300)
-    data = model_png(design)
-    made = matplotlib.image.imread(io.BytesIO(data))
+    made = matplotlib.image.imread(io.BytesIO(model_png(design)))
     assert made.shape[:2] == (2 * HEIGHT, 2 * WIDTH)
     assert made.std() > 0.05  # something is drawn
 

@@ -118,8 +118,7 @@ def test_a_current_command_closes_the_current_loop() -> None:
 def test_a_controller_can_be_closed_around_it() -> None:
     """Proportional speed feedback by python-control: the poles are those of A - B k C."""
     system = plant("ilr33-amber")["speed", "u"]
-    closed = control.feedback(system, 1e-3)
-    found = np.sort_complex(closed.poles())
+    found = np.sort_complex(control.feedback(system, 1e-3).poles())
     wanted = np.sort_complex(np.linalg.eigvals(system.A - 1e-3 * system.B @ system.C))
     assert found == pytest.approx(wanted, rel=1e-9)
 

@@ -101,8 +101,7 @@ def test_with_one_frequency_it_is_the_notch() -> None:
 @given(designs(), st.floats(0.01, 0.8))
 @example(everything(), 0.02)
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
-    loops = assemble_loops(design)
-    for name, loop in loops.present.items():
+    for name, loop in assemble_loops(design).present.items():
         omega = fraction * np.pi / loop.period_s
         budget = delay_budget(design, name, omega)
         assert sum(budget.items.values()) == pytest.approx(budget.total_deg, abs=1e-9)

@@ -163,8 +163,7 @@ def test_an_integrator_behind_a_delay(gain: float, delay: float) -> None:
 
     times = np.linspace(0.0, 6.3 * delay, 190)
     terms = [-((-gain) ** k) * np.maximum(times - k * delay, 0.0) ** k / factorial(k) for k in range(1, 8)]
-    closed = loop.feedback()
-    response = control.step_response(closed, times)
+    response = control.step_response(loop.feedback(), times)
     np.testing.assert_allclose(response.y[0, 0], sum(terms), rtol=1e-4, atol=1e-4 * gain * delay)
 
 

@@ -56,8 +56,7 @@ def test_the_active_limiter_and_its_bias() -> None:
     np.testing.assert_array_equal(border.amplitude_rad, np.min(list(border.each_rad.values()), axis=0))
     half = onset(loops, omega, bias={"speed": -942.5 / 2})
     assert half.amplitude_rad[0] == pytest.approx(border.amplitude_rad[0] / 2)
-    gone = onset(loops, omega, bias={"speed": 2000.0})
-    assert gone.amplitude_rad[0] == 0
+    assert onset(loops, omega, bias={"speed": 2000.0}).amplitude_rad[0] == 0
 
 
 def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:

@@ -85,8 +85,7 @@ def test_g6_ctms_motor_position() -> None:
     J, b, K, R, L = 3.2284e-6, 3.5077e-6, 0.0274, 4.0, 2.75e-6
     loops = assemble_loops(ctms_position(), "ideal")
     assert loops.velocity is None
-    omega = np.geomspace(0.1, 1e7, 50)
-    s = 1j * omega
+    s = 1j * np.geomspace(0.1, 1e7, 50)
     expected = K / (s * ((J * s + b) * (L * s + R) + K**2))
     np.testing.assert_allclose(loops.position.open_loop(s), expected, rtol=1e-10)
 

@@ -55,8 +55,7 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
 
 @pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
 def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
-    found = drawn(case, stable=True)
-    design, _ = found
+    design, _ = drawn(case, stable=True)
     for place in (*design.controller.stages, *assemble_loops(design).break_points):
         setup = loop_setup(design, place, limits_on=False)
         loops = loops_at(design, setup.bias.operating(design))

@@ -92,8 +92,7 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     continuous = A + B @ F + H @ (C + D @ F)
     Ak, Bk, Ck, Dk = bilinear(continuous, H, B.T @ X, -D.T, -1.0)
     mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
-    law = mine.controller.position_loop.law
-    assert len(law.A) == 6
+    assert len(mine.controller.position_loop.law.A) == 6
     loop = assemble_loops(mine).position
     assert stability_margins(loop.open_loop).stable
     z = np.exp(1j * np.geomspace(1e-4, np.pi * 0.9999, 4000))
@@ -101,8 +100,7 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     K = L / P  # of what runs, in units of the shaped plant
     norm = np.sqrt((1.0 + np.abs(K) ** 2) * (1.0 + np.abs(P) ** 2)) / np.abs(1.0 + L)
     assert optimum * (1 - 1e-6) < norm.max() < gamma * (1 + 1e-6)
-    model = tangent(mine, "position")
-    assert np.abs(model.open(z[::100]) / L[::100] - 1.0).max() < 1e-6
+    assert np.abs(tangent(mine, "position").open(z[::100]) / L[::100] - 1.0).max() < 1e-6
 
 
 def test_state_feedback_from_motor_and_load_of_a_joint() -> None:

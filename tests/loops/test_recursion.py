@@ -144,8 +144,7 @@ def test_any_design_from_any_start(design: model.Design) -> None:
 def test_the_gate_has_teeth() -> None:
     """A notch moved by 0.1 %, or 1 % of a tick of delay more, is far outside the tolerance."""
     design = everything()
-    velocity = design.controller.velocity
-    assert velocity.filters == FILTERS
+    assert design.controller.velocity.filters == FILTERS
     moved = replace(FILTERS[1], frequency_rad_s=900.9)
     other = controlled(design, velocity={"filters": (FILTERS[0], moved, *FILTERS[2:])})
     late = controlled(amber(), computing_delay_s=1.01e-4)

@@ -208,8 +208,7 @@ def test_cogging_of_a_screw_is_over_the_angle_of_its_motor() -> None:
 
 def test_a_self_locking_drive_feels_its_cogging() -> None:
     """It holds the rotor against a torque below its peak, whatever the load path."""
-    amber = load_design("ilr33-amber")
-    plain = replace(amber, friction=model.Friction(viscous_Nms_rad=2e-4))
+    plain = replace(load_design("ilr33-amber"), friction=model.Friction(viscous_Nms_rad=2e-4))
     design = CASES[1].put(plain)
     assert design.load.path == "self-locking"
     assert follows_angle(design)

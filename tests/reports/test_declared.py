@@ -60,8 +60,7 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
 
 def test_the_page_of_a_command_is_its_section(tmp_path, cli) -> None:
     shown = cli.text("stiffness", "emps", "--out", tmp_path, "--quiet")
-    made = load(tmp_path / "stiffness.json")
-    first = made["sections"][0]
+    first = load(tmp_path / "stiffness.json")["sections"][0]
     assert shown.splitlines()[0] == f"PASS  emps: {first['result']}"
     assert "<svg" in (tmp_path / "stiffness.html").read_text(encoding="utf-8")
     for block in first["blocks"]:

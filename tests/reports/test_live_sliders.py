@@ -116,8 +116,7 @@ def test_nonsense_is_not_taken(opens, page: Page) -> None:
     page.wait_for_selector(f"{row} .field[aria-invalid=false]")
     assert page.inner_text(f"{row} .was") == ""
     nonsense = "#hands-on?control.position.gain=-1&%E0%A4%A=3&control.velocity.gain&no.key=4"
-    other = opens(AMBER, fragment=nonsense)
-    assert other.read() == before
+    assert opens(AMBER, fragment=nonsense).read() == before
 
 
 def test_a_link_carries_the_changes(opens, page: Page) -> None:

@@ -83,8 +83,7 @@ def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_dr
     driven_away = with_overrides(FIN, {"load.moment_slope": "5 N*m/rad"})
     gap = assemble_loops(driven_away, operating_point="gap").position
     assert np.abs(curve(gap.plain_open, np.array([1.0, 10.0])).values).max() < 1e-12
-    made = report(driven_away, validation=False)
-    first, *others = made["sections"]
+    first, *others = report(driven_away, validation=False)["sections"]
     assert first["id"] == "answer"
     assert not [part["id"] for part in others if part["id"].startswith("missing")]
     glance, bode, _ = first["blocks"]
@@ -144,7 +143,5 @@ def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
     """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
     bounds = corners(FIN)
     point = weakest(survey, bounds)
-    free = mending(point, survey, bounds)
-    assert free.path == "control.position.gain"
-    whole = load_design("fin")
-    assert mending(point, replace(survey, design=whole), bounds) is None
+    assert mending(point, survey, bounds).path == "control.position.gain"
+    assert mending(point, replace(survey, design=load_design("fin")), bounds) is None

@@ -50,8 +50,7 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115() -> 
     assert db[1] == pytest.approx(-12.7, abs=0.05)
     to_command = judged(SCREW, to="command")
     to_reference = judged(SCREW, to="reference")
-    default = judged(SCREW)
-    assert to_command.value == default.value == pytest.approx(5.62, abs=0.01)
+    assert to_command.value == judged(SCREW).value == pytest.approx(5.62, abs=0.01)
     assert to_reference.value == pytest.approx(114.8, abs=0.05)
     assert label(to_command) == "Position loop: bandwidth (−3 dB), to the command"
     assert "rate and acceleration of the command are not in it: they act above" in to_command.reason

@@ -81,8 +81,7 @@ def test_the_clamp_is_judged(law: str) -> None:
 
 def test_the_map_draws_the_border_that_is_judged() -> None:
     design = drive("clamped")
-    loops = assemble_loops(design)
-    shown = amplitude_map(design, loops, counts=(12, 6))
+    shown = amplitude_map(design, assemble_loops(design), counts=(12, 6))
     output, integral = sizes(shown.frequency_hz)
     lowest = LIMIT / np.maximum(output, integral)
     np.testing.assert_allclose(shown.onset_rad["voltage"], lowest, rtol=1e-7)

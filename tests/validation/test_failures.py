@@ -73,8 +73,7 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     design = with_overrides(load_design("joint"), slow)
     result = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
     assert abs(result.deflection_rad).max() < 1e-6
-    k = np.searchsorted(result.time_s, 0.15)
-    assert result.current_A[k] == pytest.approx(15.0, rel=1e-3)
+    assert result.current_A[np.searchsorted(result.time_s, 0.15)] == pytest.approx(15.0, rel=1e-3)
     assert 0.1 < result.protected_s < 0.2  # a little was used on the way
     assert result.current_A[-1] == pytest.approx(6.0, rel=1e-3)
 

@@ -30,8 +30,7 @@ def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
 def test_every_limit_of_a_shipped_drive(name: str) -> None:
     """Each limiter that the limit of linear validity lists has its row, and it is met."""
     design = load_design(name)
-    bench = Bench(design, design)
-    border = onset(bench.loops("command"), [10.0])
+    border = onset(Bench(design, design).loops("command"), [10.0])
     wanted = {f"{each}_onset".replace("-", "_") for each, at in border.each_rad.items() if np.isfinite(at[0])}
     found = rows(design)
     assert set(found) == wanted
@@ -54,8 +53,7 @@ def one_per_cent_more(place: Place, z: np.ndarray) -> np.ndarray:
 def test_one_per_cent_of_the_linear_side_is_not_met(name: str) -> None:
     """Of every limiter: its response scaled, and a gain that all of them feel."""
     design = load_design(name)
-    bench = Bench(design, design)
-    for place in bench.onsets():
+    for place in Bench(design, design).onsets():
         (row,) = small_signal(replace(place, predicted=partial(one_per_cent_more, place)))
         assert row.verdict is Verdict.NOT_MET, row
         assert row.error == pytest.approx(0.01, rel=0.02)

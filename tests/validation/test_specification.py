@@ -118,8 +118,7 @@ def test_sections_are_plain_and_their_figures_can_be_drawn(name: str) -> None:
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_a_note_speaks_of_no_column_and_no_controller_that_is_not_there(name: str) -> None:
-    design = load_design(name)
-    blocks = specification_section.section(specification(design))["blocks"]
+    blocks = specification_section.section(specification(load_design(name)))["blocks"]
     (table,) = [block for block in blocks if "Rate," in block.get("caption", "")]
     assert ("Duty" in table["note"]) == any(column["key"] == "duty" for column in table["columns"])
     assert "current controller" not in table["note"]
