@@ -63,8 +63,7 @@ def test_every_part_of_a_drive_has_its_place_in_the_diagram(monkeypatch: pytest.
 
 def test_every_file_that_the_architecture_names_exists() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Six changes")[1]
-    section = ""
-    result = 0
+    section, result = "", 0
     for first in re.findall(r"(?m)^\| (`[^|]+) \|", text):
         for name in re.findall(r"`([\w/.]+\.(?:py|md))`", first):
             section = section if "/" not in name else str(Path(name).parent)
@@ -100,8 +99,7 @@ def test_the_list_of_quantities_holds_every_quantity(made: ModuleType) -> None:
 
 
 def test_the_list_of_commands_holds_every_command_and_option(made: ModuleType) -> None:
-    page = made.commands_page()
-    root = typer.main.get_command(build())
+    page, root = made.commands_page(), typer.main.get_command(build())
     for panel, names in PANELS.items():
         assert f"## {panel}" in page
         for name in names:

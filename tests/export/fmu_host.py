@@ -71,8 +71,7 @@ class Host:
 @contextmanager
 def hosted(path: Path, count: int = 1) -> Iterator[tuple[Host, ...]]:
     """Instances of one unit, each instantiated only."""
-    description = fmpy.read_model_description(str(path))
-    folder = fmpy.extract(str(path))
+    description, folder = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
     hosts = tuple(_instance(description, folder, f"unit{n}") for n in range(count))
     try:
         yield hosts

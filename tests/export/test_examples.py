@@ -21,8 +21,7 @@ def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> N
     design = load_design("ilr33-amber")
     result = margins(design)
     assert result.stable
-    limit = GAIN_S * result.gain_margins[0].ratio
-    path = written(tmp_path, design)
+    limit, path = GAIN_S * result.gain_margins[0].ratio, written(tmp_path, design)
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
 
 

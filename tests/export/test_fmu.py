@@ -87,8 +87,7 @@ def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
 def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
     """The statements, run as Python, against `design_row` of the design with these values."""
     design = load_design(name)
-    trace = trace_keys(design)
-    rng = np.random.default_rng(5)
+    trace, rng = trace_keys(design), np.random.default_rng(5)
     free = [key for key in trace.keys if not key.fixed and key.path != "friction.breakaway_ratio"]
     tried = 0
     for _ in range(40):
@@ -165,8 +164,7 @@ def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, 
     path = written(tmp_path, design)
     assert set(change) <= {key.path for key in trace_keys(design).keys if not key.fixed}
     p, s = parameters(exported_row(design))
-    p = np.concatenate([p, np.zeros(spare_parameters(p))])
-    row = np.zeros(at.IO_SIZE)
+    p, row = np.concatenate([p, np.zeros(spare_parameters(p))]), np.zeros(at.IO_SIZE)
     row[at.IN_COMMAND] = 0.05
     period = design.controller.period_s
     with hosted(path) as (host,):
@@ -210,11 +208,9 @@ def wine_prefix(tmp_path_factory) -> Path:
 def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path) -> None:
     """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
     design = load_design(name)
-    period_s = design.controller.period_s
-    guid = own_host(tmp_path, design, "win64")
+    period_s, guid = design.controller.period_s, own_host(tmp_path, design, "win64")
     call = ["wine", "host.exe", "binaries/win64/drive.dll", guid, "300", repr(period_s), "0.05", "100"]
-    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix)}
-    said = ""
+    quiet, said = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix)}, ""
     with suppress(subprocess.TimeoutExpired):
         options = {"cwd": tmp_path, "capture_output": True, "text": True, "env": quiet, "timeout": 120}
         said = subprocess.run(call, **options).stdout

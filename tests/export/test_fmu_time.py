@@ -92,8 +92,7 @@ def latched(step: float, ticks: int, period: float) -> np.ndarray:
 @pytest.mark.parametrize("name", drives())
 def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     design = drives()[name]
-    period = design.controller.period_s
-    path = written(tmp_path, design)
+    period, path = design.controller.period_s, written(tmp_path, design)
     for part in (1, 5, 10, 15, 27) if name in ALL_STEPS else (1, 27):
         step = part / FINE * period
         command = np.asarray(wanted(latched(step, TICKS, period) * step, design))
@@ -117,8 +116,7 @@ def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
 def test_a_command_between_ticks_is_seen_at_the_next(tmp_path) -> None:
     """At 0.9 Ts it is that of a run whose command steps at Ts; voltages are of the tick they are in."""
     design = load_design("ilr33-amber")
-    period = design.controller.period_s
-    path = written(tmp_path, design, 3)
+    period, path = design.controller.period_s, written(tmp_path, design, 3)
     command = np.full(40, 0.05)
     command[0] = 0.0
     plain = run(design, 40, command)
@@ -160,10 +158,8 @@ def lifted(design: Design, K: float, Ts: float, parts: int, common: int) -> np.n
     gain = design.motor.source_gain_Nm_V
     h, m = Ts / FINE, design.encoder.difference_samples
     y, v, u, z, seen, r = range(6)
-    angles = list(range(6, 6 + m))
-    n = 6 + m
-    plant = np.eye(n)
-    e = np.exp(-b / J * h)
+    angles, n = list(range(6, 6 + m)), 6 + m
+    plant, e = np.eye(n), np.exp(-b / J * h)
     plant[y, v], plant[v, v] = (1.0 - e) * J / b, e
     plant[v, u] = (1.0 - e) * gain / b
     plant[y, u] = (h - (1.0 - e) * J / b) * gain / b

@@ -51,10 +51,8 @@ def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -
 @pytest.mark.parametrize("place", range(len(drives())))
 def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
     """Over a decade of every key at once the statements give what the drive asked anew gives."""
-    design = drives()[place]
-    rng = np.random.default_rng(place)
-    keys = followed_keys(design)
-    compared = 0
+    design, rng = drives()[place], np.random.default_rng(place)
+    keys, compared = followed_keys(design), 0
     for name in NAMES:
         if name == "motor_current" and not design.motor.has_electrical_dynamics:
             continue

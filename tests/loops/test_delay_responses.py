@@ -22,8 +22,7 @@ BENDS = (0, 10, 11, 25, 60)  # samples at which the input changes its slope
 
 def random_loop(rng: np.random.Generator, feedthrough: bool) -> tuple[list[Rational], np.ndarray]:
     """Gains and lags of first and second order, each behind a delay of its own."""
-    delays = rng.uniform(0.3, 2.0, int(rng.integers(1, 4)))
-    parts = []
+    delays, parts = rng.uniform(0.3, 2.0, int(rng.integers(1, 4))), []
     for _ in delays:
         w, zeta = rng.uniform(0.5, 4.0), rng.uniform(0.1, 0.9)
         dens = ([1.0, 0.0], [1.0, rng.uniform(0.2, 5.0)], [1.0, 2.0 * zeta * w, w**2])
@@ -108,8 +107,7 @@ def test_step_figures_of_loops_of_delays_without_a_common_measure(seed: int, mon
     chosen = f.time_s[early[np.linspace(0, early.size - 1, POINTS).astype(int)]]
     times = np.concatenate((special, chosen))
     wanted = 1.0 - truth(parts, delays, times, np.ones(times.size), monkeypatch)  # L/(1 + L)
-    found = np.interp(times, f.time_s, f.response)
-    size = np.abs(wanted).max()
+    found, size = np.interp(times, f.time_s, f.response), np.abs(wanted).max()
     assert found[len(special) :] == pytest.approx(wanted[len(special) :], abs=1e-7 * size)
     for t, value in zip(special, wanted, strict=False):
         if t == f.peak_time_s:

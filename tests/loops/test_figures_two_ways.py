@@ -24,8 +24,7 @@ from actuator_lti.design.model import Design, FrictionPoint, Gravity
 @st.composite
 def wider_designs(draw: st.DrawFn) -> Design:
     """Also under gravity, with a friction map or another friction backwards, sizes over two decades."""
-    design = draw(wide_designs())
-    size = 10.0 ** draw(st.floats(-1.0, 1.0))
+    design, size = draw(wide_designs()), 10.0 ** draw(st.floats(-1.0, 1.0))
     torque = design.friction.dry_torque_Nm or 1e-3
     shape = ((0.0, 1.0), (50.0, 0.6), (400.0, 1.4))
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=part * torque) for w, part in shape)

@@ -46,8 +46,7 @@ def test_delays_are_placed_right(encoder: Encoder) -> None:
     A hold counted twice, or missing, would leave a first-order difference: halving, not quartering.
     """
     design = proportional(amber(2, 10, delay_s=1.5e-4, encoder=encoder))
-    omega = np.array([30.0, 100.0])
-    gaps = []
+    omega, gaps = np.array([30.0, 100.0]), []
     for k in (8, 16, 32):
         quick = replace(encoder, filter_time_s=encoder.filter_time_s / k)
         quicker = replace(faster(design, k), encoder=quick)
@@ -66,8 +65,7 @@ def by_hand(s: np.ndarray, k: float = 0.0, late_i: Any = 1.0, late_w: Any = 1.0)
 
 
 def test_ideal_loops_are_the_hand_transfer_functions() -> None:
-    loops = assemble_loops(amber(), "ideal")
-    s = 1j * np.geomspace(0.1, 1e5, 60)
+    loops, s = assemble_loops(amber(), "ideal"), 1j * np.geomspace(0.1, 1e5, 60)
     Li, Lw = by_hand(s)
     np.testing.assert_allclose(loops.current.open_loop(s), Li, rtol=1e-10)
     np.testing.assert_allclose(loops.velocity.open_loop(s), Lw, rtol=1e-9)
@@ -169,8 +167,7 @@ def exactly_stable(loop: control.StateSpace, gain: float, samples: int) -> bool:
 
 def test_exact_margins_are_those_of_the_exact_polynomial_where_the_loop_is_time_invariant() -> None:
     loops = assemble_loops(amber())
-    exact = exact_margins(loops, "u")
-    loop = loops.break_points["u"].open_loop
+    exact, loop = exact_margins(loops, "u"), loops.break_points["u"].open_loop
     assert exact.stable
     assert exactly_stable(loop, exact.gain_upper * (1 - 1e-6), 0)
     assert not exactly_stable(loop, exact.gain_upper * (1 + 1e-6), 0)
@@ -225,8 +222,7 @@ def test_operating_points_of_the_friction() -> None:
     slow = replace(swings, load_Nm=0.0, speed_amplitude_rad_s=10.0)
     assert slope_at(uneven, slow) == pytest.approx(2e-6 + 4 * 3e-3 / (np.pi * 10))
     rest = assemble_loops(design, operating_point="rest", load_Nm=8.0).velocity
-    sliding = assemble_loops(design).velocity
-    z = np.exp(1j * 50 * 1e-4)
+    sliding, z = assemble_loops(design).velocity, np.exp(1j * 50 * 1e-4)
     assert abs(rest.open_loop(z)) < 0.5 * abs(sliding.open_loop(z))
 
 
@@ -248,8 +244,7 @@ def test_refusals_name_the_argument(wrong: dict[str, Any], words: str) -> None:
 
 def test_stiffness_of_a_back_drivable_load() -> None:
     design = amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0))
-    s = 1j * np.geomspace(0.01, 1e4, 20)
-    loop = assemble_loops(design, "ideal").velocity
+    s, loop = 1j * np.geomspace(0.01, 1e4, 20), assemble_loops(design, "ideal").velocity
     np.testing.assert_allclose(loop.open_loop(s), by_hand(s, 40.0 / 2376**2)[1], rtol=1e-7)
     held = assemble_loops(replace(design, load=Load(moment_slope_Nm_rad=-40.0)), "ideal").velocity
     plain = assemble_loops(amber(), "ideal").velocity

@@ -141,14 +141,12 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
             q, qo = 4096 / (2 * pi), (1 << 14) / (2 * pi)
             counted, out = floor(th * q) / q, floor(y * qo) / qo
             if k % n_v == 0:
-                speed = (counted - line[0]) / (2 * n_v * 1e-4)
-                line = [line[1], counted]
+                speed, line = (counted - line[0]) / (2 * n_v * 1e-4), [line[1], counted]
             seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
             if stage == "position" and k % n_p == 0:
                 own = counted if control_.position.sensor == "motor" else N * out
                 v = law.output(seen | {"command": N * command, "error": N * command - own})
-                clamped = min(max(v, -30.0), 30.0)
-                step = 4e4 * T
+                clamped, step = min(max(v, -30.0), 30.0), 4e4 * T
                 new = w_ref + min(max(clamped - w_ref, -step), step)
                 limited += new != v
                 w_ref = new

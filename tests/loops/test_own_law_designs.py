@@ -36,13 +36,11 @@ def test_lqg_velocity_controller() -> None:
     system, T = plant(base, command="i_ref"), period_s(base, "velocity")
     seen = [k for k, name in enumerate(system.state_labels) if name != "th"]
     A, B = system.A[np.ix_(seen, seen)], system.B[seen, :1]
-    C = system.C[system.output_labels.index("speed")][None, seen]
-    n = len(A)
+    C, n = system.C[system.output_labels.index("speed")][None, seen], len(A)
     S = solve_discrete_are(A, B, 1e-3 * C.T @ C + 1e-12 * np.eye(n), [[1.0]])
     K = np.linalg.solve(1.0 + B.T @ S @ B, B.T @ S @ A)
     P = solve_discrete_are(A.T, C.T, 1e2 * B @ B.T + 1e-9 * np.eye(n), [[1.0]])
-    G = np.linalg.solve(1.0 + C @ P @ C.T, C @ P @ A.T).T
-    closed = A - B @ K
+    G, closed = np.linalg.solve(1.0 + C @ P @ C.T, C @ P @ A.T).T, A - B @ K
     pre = 1.0 / (C @ np.linalg.solve(np.eye(n) - closed, B)).item()
     law = (closed - G @ C, np.hstack([G, pre * B]), -K, [[0.0, pre]], T)
     mine = base.with_law("velocity", law, ["speed", "command"], L=B)
@@ -85,8 +83,7 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     Z = solve_continuous_are(left.T, C.T, B @ B.T / R, np.array([[R]]))
     X = solve_continuous_are(left, B, C.T @ C / R, np.array([[R]]))
     optimum = float(np.sqrt(1.0 + np.max(np.abs(np.linalg.eigvals(X @ Z)))))
-    gamma = 1.1 * optimum
-    F = -(D.T @ C + B.T @ X) / R
+    gamma, F = 1.1 * optimum, -(D.T @ C + B.T @ X) / R
     W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
     H = gamma**2 * W @ Z @ C.T
     continuous = A + B @ F + H @ (C + D @ F)
@@ -129,8 +126,7 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     rows["ticks"] = int(0.3 / T)
     rows.step("command", 0.1)
     assert abs(rows.trajectory().output_angle_rad[-1] - 0.1) < 1e-7
-    loop = assemble_loops(mine).position
-    z = np.exp(1j * np.geomspace(1e-3, 3.0, 50))
+    loop, z = assemble_loops(mine).position, np.exp(1j * np.geomspace(1e-3, 3.0, 50))
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)

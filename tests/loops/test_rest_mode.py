@@ -35,8 +35,7 @@ def at_rest(design: Any) -> float:
 @pytest.mark.parametrize("form", ["sampled", "ideal", "continuous"])
 def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any, slope: float) -> None:
     design = sprung("ilr33-amber", slope)
-    loop = assemble_loops(design, form=form).velocity
-    L0 = at_rest(design)
+    loop, L0 = assemble_loops(design, form=form).velocity, at_rest(design)
     m = stability_margins(loop.open_loop)
     assert m.evidence in ("checked", "certified")
     assert m.stable is True
@@ -134,8 +133,7 @@ def test_a_users_own_loop_of_that_kind_has_its_bandwidth(slope: float) -> None:
     assert width.minus3db_rad_s == pytest.approx(expected.minus3db_rad_s, rel=1e-9)
     assert width.resonance_peak_db == pytest.approx(expected.resonance_peak_db, rel=1e-9)
     grid = np.geomspace(1.0, 1e4, 4000)
-    gain = np.abs(T(np.exp(1j * grid * 1e-4)))
-    L0 = at_rest(design)
+    gain, L0 = np.abs(T(np.exp(1j * grid * 1e-4))), at_rest(design)
     assert width.resonance_peak_db == pytest.approx(20 * np.log10(gain.max() * (1 + L0) / L0), abs=1e-4)
 
 

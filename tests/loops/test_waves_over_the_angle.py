@@ -270,8 +270,7 @@ def ratio(viscous: float, slope: float) -> float:
 
 @pytest.mark.parametrize("viscous", [0.0, 1e-3])
 def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
-    design = rotor(viscous, damping=D)
-    expected = ratio(viscous, D / N**2)
+    design, expected = rotor(viscous, damping=D), ratio(viscous, D / N**2)
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
     w = run.motor_speed_rad_s
     assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)

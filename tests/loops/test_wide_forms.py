@@ -81,8 +81,7 @@ def test_faces_of_the_blocks_agree_at_low_frequency() -> None:
     gained = (1 - 1 / z) / (1j * omega)
     np.testing.assert_allclose(block.at_z(omega) * gained, block.at_s(omega), rtol=5e-3)
     for item in FILTERS:  # Tustin, prewarped: exact at its own frequency
-        centre = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5
-        block = biquad(item, T)
+        centre, block = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5, biquad(item, T)
         at = np.array([centre])
         np.testing.assert_allclose(block.at_z(at), block.at_s(at), rtol=1e-10)
     with pytest.raises(InputError, match="below pi/T"):
@@ -106,8 +105,7 @@ def test_the_budget_has_a_share_for_each_filter() -> None:
     for name in ("velocity", "position"):
         assert len(delay_budget(design, name, omega).filters_deg) == 5
     unfed = controlled(design, current={"back_emf_feedforward": 0.0})
-    shares = delay_budget(unfed, "velocity", omega).filters_deg
-    s = 1j * omega
+    shares, s = delay_budget(unfed, "velocity", omega).filters_deg, 1j * omega
     own = np.angle(2000.0**2 / (s**2 + np.sqrt(2) * 2000.0 * s + 2000.0**2), deg=True)
     assert shares["torque lowpass 1 2000 rad/s"] == pytest.approx(own, abs=1e-6)
     assert shares["speed filter 5000 rad/s"] == pytest.approx(-np.degrees(np.arctan(omega * 2e-4)), abs=1e-6)
@@ -159,11 +157,9 @@ def test_any_loop_goes_through_python_control() -> None:
 
 def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() -> None:
     """A bare D is proper in front of this plant, as the angle's derivative is a state."""
-    base = drive_e()
-    bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
+    base, bare = drive_e(), PositionLoop(gain=20.0, derivative_time_s=2e-3)
     loop = assemble_loops(controlled(base, position=bare), "ideal").position
-    plain = assemble_loops(base, "ideal").position
-    s = 1j * np.geomspace(1, 1000, 10)
+    plain, s = assemble_loops(base, "ideal").position, 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
 
 

@@ -143,8 +143,7 @@ def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(place, value,
     chart = Chart()
     chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")
     first, second = (doc.figure(name, chart, caption="c", alt="a") for name in ("bode", "distribution"))
-    path = tmp_path / "report.json"
-    parts = [doc.section("one", "One", [first, second])]
+    path, parts = tmp_path / "report.json", [doc.section("one", "One", [first, second])]
     written = json.dumps(made(sections=parts, verdict=verdict_of(parts, "report")))
     path.write_text(written)
     assert len(doc.figures(doc.load(path))) == 2

@@ -103,8 +103,7 @@ def test_a_value_that_is_too_much_is_said_and_undone(page: Page, delay_us: float
 
 
 def test_nonsense_is_not_taken(opens, page: Page) -> None:
-    before = page.read()
-    row = '.row[data-path="control.position.gain"]'
+    before, row = page.read(), '.row[data-path="control.position.gain"]'
     for words in ("-5", "abc", "", "0", "Infinity", "1e300"):
         page.fill(f"{row} .field", words)
         page.press(f"{row} .field", "Enter")
@@ -157,8 +156,7 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
 
 def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
-    model = assemble_loops(AMBER).velocity.open_loop
-    hertz = np.geomspace(2.0, 400.0, 40)
+    model, hertz = assemble_loops(AMBER).velocity.open_loop, np.geomspace(2.0, 400.0, 40)
     open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
     closed = open_loop / (1.0 + open_loop)
     rows = zip(hertz, 20.0 * np.log10(abs(closed)), np.degrees(np.angle(closed)), strict=True)

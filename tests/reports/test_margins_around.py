@@ -63,8 +63,7 @@ def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(table, s
 
 def test_closed_forms_of_an_integrator_around_the_ideal_drive() -> None:
     """L = -s K T/p: at low frequency T = 1, so the crossover is at K and the phase margin 90 deg less T's."""
-    K = 0.5
-    loops = assemble_loops("ilr33-amber", form="ideal")
+    K, loops = 0.5, assemble_loops("ilr33-amber", form="ideal")
     table = {"num": [K], "den": [1.0, 0.0], "dt": 0}
     loop = loop_around(loops, outer_loop(table, "test"))
     drive = complex(loops.reference_to_output(1j * K))

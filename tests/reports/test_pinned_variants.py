@@ -31,8 +31,7 @@ def curves(page: Page, label: str) -> list[str]:
 
 
 def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
-    page = opens(AMBER)
-    wanted = {}
+    page, wanted = opens(AMBER), {}
     for letter, gain in (("A", 80.0), ("B", 140.0)):
         page.type_value("control.position.gain", gain)
         press(page, "pin")

@@ -102,8 +102,7 @@ def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey) -> No
 def test_the_spread_is_that_of_the_operating_points() -> None:
     found = spread(operating_points(FIN, [], described=False, certify=False))["position"]["gain_margin"]
     loads = FIN.validation.loads_Nm
-    every = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}
-    margins = []
+    every, margins = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}, []
     for point, load in [*every.items(), *(("rest", load) for load in loads)]:
         loop = assemble_loops(FIN, operating_point=point, load_Nm=load).position
         margins.append(abs(stability_margins(loop.open_loop).gain_margin_db))

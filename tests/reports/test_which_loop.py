@@ -48,8 +48,7 @@ def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115() -> 
     db = answer_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
     assert db[0] == pytest.approx(-2.37, abs=0.01)
     assert db[1] == pytest.approx(-12.7, abs=0.05)
-    to_command = judged(SCREW, to="command")
-    to_reference = judged(SCREW, to="reference")
+    to_command, to_reference = judged(SCREW, to="command"), judged(SCREW, to="reference")
     assert to_command.value == judged(SCREW).value == pytest.approx(5.62, abs=0.01)
     assert to_reference.value == pytest.approx(114.8, abs=0.05)
     assert label(to_command) == "Position loop: bandwidth (−3 dB), to the command"
@@ -70,8 +69,7 @@ def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal() -> None:
 
 def test_what_rate_and_acceleration_leave_is_simulated() -> None:
     """The sentence beside the requirement, against a run of the simulator read by hand."""
-    verdict = judged(SCREW, to="command")
-    full = SCREW.validation.full_deflection_rad
+    verdict, full = judged(SCREW, to="command"), SCREW.validation.full_deflection_rad
     hz = verdict.value
     onset = 1e3 * min(0.4 / (2.0 * np.pi * hz), 4.0 / (2.0 * np.pi * hz) ** 2)
     assert f"above {onset:.3g} mm" in verdict.reason
@@ -87,8 +85,7 @@ def test_a_sine_from_rest_is_compared_with_the_response_to_the_command() -> None
     """Below the profile's limits a drive without dry friction is linear, the mean included."""
     friction = replace(SCREW.friction, dry_torque_Nm=0.0, load_coefficient=0.0)
     still = replace(SCREW, friction=friction, load=replace(SCREW.load, friction=None))
-    hz = np.array([2.0, 5.0, 9.0, 20.0])
-    loops = assemble_loops(still)
+    hz, loops = np.array([2.0, 5.0, 9.0, 20.0]), assemble_loops(still)
     sweep = sweep_from_rest(still, hz, free_amplitude(still, loops, hz, 1.0), 40_000)
     assert np.abs(sweep.measured / sweep.sliding - 1.0).max() < 1e-3
     large = amplitude_map(still, loops, friction_on=False, counts=(3, 6))
@@ -167,8 +164,7 @@ def test_the_step_behind_a_mean_is_the_simulated_one() -> None:
 
 def test_a_filter_of_the_command_is_in_one_response_only() -> None:
     design = with_overrides(load_design("ilr33-amber"), {"command.filter_time": "50 ms"})
-    to_command = judged(design)
-    to_reference = judged(design, to="reference")
+    to_command, to_reference = judged(design), judged(design, to="reference")
     bare = closed_loop_bandwidth(assemble_loops(load_design("ilr33-amber")).plain_response)
     assert to_reference.value == pytest.approx(bare.minus3db_hz)
     assert to_command.value < 3.2 < to_reference.value  # 1/(2 pi 50 ms) = 3.18 Hz

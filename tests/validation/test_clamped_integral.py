@@ -40,8 +40,7 @@ def drive(law: str, feedforward: float = 3.0) -> model.Design:
 
 def sizes(hertz: Any, feedforward: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
     """|U/R| and |I'/R| on the unit circle."""
-    z = np.exp(2j * np.pi * np.asarray(hertz) * T)
-    b = T * k / J
+    z, b = np.exp(2j * np.pi * np.asarray(hertz) * T), T * k / J
     per_u = Kv * T * b * (z + 1.0) / (2.0 * (z - 1.0) ** 2) + b / (z - 1.0)
     integral = Kp * T / Tn * z / (z - 1.0)
     F = feedforward * J / k * (1.0 - 1.0 / z) ** 2 / T**2
@@ -97,8 +96,7 @@ def test_a_run_says_that_the_integral_is_clamped(law: str) -> None:
     hertz = 2.0
     output, integral = (float(x) for x in sizes(hertz))
     assert integral > 1.2 * output
-    amplitude = 0.5 * (LIMIT / output + LIMIT / integral)
-    design = drive(law)
+    amplitude, design = 0.5 * (LIMIT / output + LIMIT / integral), drive(law)
     run = simulate(design, commands.sine(amplitude, hertz), 3.0, limits_on=True)
     late = run.limit_active("voltage")[run.time_s > 2.0]
     assert bool(late.any()) == (law == "clamped")

@@ -200,8 +200,7 @@ def drawn() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("name", "key"), drawn())
 def test_a_key_of_the_table_is_seen_by_the_row_it_names(name: str, key: str) -> None:
-    line = rows_of_page(name)[key]
-    result = seen(load_design(name), key)
+    line, result = rows_of_page(name)[key], seen(load_design(name), key)
     if result.row is None:
         assert result.why
         assert result.why in line

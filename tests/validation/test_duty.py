@@ -80,8 +80,7 @@ def test_the_protection_acts_when_the_running_drive_says() -> None:
 @pytest.mark.parametrize("rms", [1.0, 6.0, 11.0, 13.0])
 def test_temperature_against_its_equation(rms: float) -> None:
     """tau dT/dt = Ta - T + Rth R I^2 (1 + alpha (T - Tref)), by an integrator; at 13 A it runs away."""
-    result = heating(with_overrides(FIN, HOT), rms)
-    P = 2.0 * 1.0 * rms**2
+    result, P = heating(with_overrides(FIN, HOT), rms), 2.0 * 1.0 * rms**2
     course = solve_ivp(
         lambda _, T: (25.0 - T + P * (1 + 0.00393 * (T - 25.0))) / 60.0, (0.0, result.time_s[-1]), [25.0],
         t_eval=result.time_s, rtol=1e-10, atol=1e-9,
@@ -99,8 +98,7 @@ def test_temperature_against_its_equation(rms: float) -> None:
 
 def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
     design = with_overrides(FIN, {**HOT, "temperature.resistance_coefficient": "0 1/K"})
-    result = heating(design, 5.0)
-    k = 100
+    result, k = heating(design, 5.0), 100
     assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
 
 

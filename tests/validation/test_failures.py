@@ -86,8 +86,7 @@ def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     half = 0.5 * design.validation.full_deflection_rad
     run = simulate(design, commands.step(2.0 * half), 0.5)
     at = int(np.argmax(run.output_angle_rad >= half))
-    speed = run.motor_speed_rad_s[at] / N
-    before = abs(run.coupling_torque_Nm[at])
+    speed, before = run.motor_speed_rad_s[at] / N, abs(run.coupling_torque_Nm[at])
     impact = speed * sqrt(k * J) * N
     limit = design.limits.peak_current_A * design.effective_motor.torque_constant_Nm_A * N
     assert impact - 2 * limit - before < case.peak_moment_Nm < impact + 2 * limit + before

@@ -119,8 +119,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
     """
     values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
     design = with_values(AMBER, {**values, "control.position.gain": 250.0})
-    threshold = static_threshold(design).forward_rad
-    cycles = limit_cycles(design, 0.0)
+    threshold, cycles = static_threshold(design).forward_rad, limit_cycles(design, 0.0)
     assert cycles.confirmations == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
@@ -216,8 +215,7 @@ def extruder(position_s: float | None = None, velocity_s: float | None = None) -
 
 def test_a_friction_map_is_dry_friction() -> None:
     """The torque at rest over the stiffness: 30 mN m / (kM/R Kp Kv N)."""
-    stiffness = 0.05 / 2.0 * 0.25 * 25.0 * 20.0
-    result = friction_effects(extruder())
+    stiffness, result = 0.05 / 2.0 * 0.25 * 25.0 * 20.0, friction_effects(extruder())
     assert result.integrator == ""
     (point,) = result.points
     assert point.dry_torque_Nm == pytest.approx(0.03)

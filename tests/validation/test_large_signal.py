@@ -157,8 +157,7 @@ def _words(gain_db: list[float]) -> str:
     gain, nothing = np.array([gain_db]), np.full((1, 4), np.nan)
     low_high = np.array([crossing_range(HZ, row, MINUS_3DB) for row in gain])
     found = np.array([_crossing(HZ, row, MINUS_3DB) for row in gain])
-    size = np.array([np.radians(10.0)])
-    below = gain[:, 0] < MINUS_3DB
+    size, below = np.array([np.radians(10.0)]), gain[:, 0] < MINUS_3DB
     result = AmplitudeBode(
         0.0, HZ, (1.0,), size, gain, nothing, gain[0], nothing[0], size, found, nothing[:, 0], low_high,
         below, 5.0, None,

@@ -61,8 +61,7 @@ def test_thermal_duty() -> None:
 def test_a_sine_within_the_limits_needs_the_current_of_its_friction(amber: Specification) -> None:
     """Slow sine: dry friction is a square wave, viscous a sine in phase: rms of their sum by hand."""
     move = next(m for m in amber.manoeuvres if m.load_Nm == 8.0 and "70 %" in m.name)
-    dry = (2.25e-3 + 8 * 1.34e-3) / 5.9e-3
-    viscous = 5.25e-6 * 0.7 * 942.5 / 5.9e-3
+    dry, viscous = (2.25e-3 + 8 * 1.34e-3) / 5.9e-3, 5.25e-6 * 0.7 * 942.5 / 5.9e-3
     by_hand = math.sqrt(dry**2 + viscous**2 / 2.0 + 4.0 / math.pi * dry * viscous)
     assert move.rms_current_A == pytest.approx(by_hand, rel=0.01)
 
