@@ -25,6 +25,8 @@ needs_compiler = pytest.mark.skipif(
 )
 Refused = pytest.importorskip("fmpy.fmi1").FMICallException
 fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
+# the text of a message comes behind its format, "%s"
+_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
 
 
 def written(folder: Path, design: Design, version: Version = 2, platform: str = "linux64") -> Path:
@@ -79,10 +81,6 @@ def hosted(path: Path, count: int = 1) -> Iterator[tuple[Host, ...]]:
         for host in hosts:
             host.unit.freeInstance()
         shutil.rmtree(folder)
-
-
-# the text of a message comes behind its format, "%s"
-_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
 
 
 def _instance(description: Any, folder: str, name: str) -> Host:

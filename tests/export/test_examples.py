@@ -10,6 +10,7 @@ from actuator_lti import load_design
 from examples import firmware_controller as firmware
 
 pytestmark = needs_compiler
+LAW_OF_JOINT = [("joint", stage) for stage in ("current", "velocity", "position")]
 
 
 def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> None:
@@ -56,9 +57,6 @@ def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) ->
     alone, with_drive, smooth = rms
     assert with_drive > 10.0 * max(alone, smooth)
     assert min(alone, smooth) > 0.0
-
-
-LAW_OF_JOINT = [("joint", stage) for stage in ("current", "velocity", "position")]
 
 
 @pytest.mark.parametrize(

@@ -14,6 +14,8 @@ from actuator_lti.design import load_design, shipped_designs
 from nonlinear.export import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
 
+needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst is not installed")
+
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_every_stage_and_gear_has_its_box(name: str) -> None:
@@ -34,9 +36,6 @@ def test_the_coupling_stands_behind_its_gear() -> None:
     assert [title for title, _ in train_boxes(inside)] == ["motor", "spur", "coupling", "belt", "load"]
     motor = replace(inside, gears=(), coupling=replace(inside.coupling, after=None))
     assert [title for title, _ in train_boxes(motor)] == ["motor", "coupling", "load"]
-
-
-needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst is not installed")
 
 
 @needs_typesetter

@@ -20,6 +20,8 @@ from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
 
+quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
+
 
 def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
     """A run that is the same, to the bit, by the compiled kernels and by those as written."""
@@ -32,9 +34,6 @@ def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
     assert (ours.status, ours.limits) == (theirs.status, theirs.limits)
     assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
     return ours
-
-
-quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
 @quiet

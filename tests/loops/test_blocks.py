@@ -15,6 +15,8 @@ from actuator_lti.drive.blocks import biquad, pi
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from nonlinear.row.filters import section
 
+RNG = np.random.default_rng(7)
+
 
 @given(st.floats(0, 5), st.floats(1e-6, 10))
 def test_first_order_lag_behind_any_delay(ticks: float, period: float) -> None:
@@ -63,9 +65,6 @@ def test_pi_forms_agree_up_to_half_a_period_of_gain() -> None:
     law, omega = pi(2.0, 0.05, 0.001), np.array([1.0, 10.0])
     gap = law.at_z(omega) - law.at_s(omega)
     np.testing.assert_allclose(gap, 2.0 * 0.001 / 0.1, rtol=5e-3)
-
-
-RNG = np.random.default_rng(7)
 
 
 def skewed(zero: float, pole: float, width: float, depth: float) -> Filter:

@@ -16,6 +16,8 @@ from nonlinear import commands, simulate
 from tests.changed import changed
 from tests.loops.two_mass import drive_e
 
+AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
+
 
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
 def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -> None:
@@ -66,9 +68,6 @@ def test_lost_motion_is_a_requirement() -> None:
     (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
     assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
     assert result.verdict == "met"
-
-
-AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
 
 
 def test_torque_margin_by_hand() -> None:

@@ -16,6 +16,9 @@ from actuator_lti.systems import delay_stepper
 S = 1j * np.geomspace(0.01, 1e4, 40)
 LAG = control.tf([2.0], [0.1, 1.0])
 LEAD = control.tf([0.3, 1.0], [0.01, 1.0])
+FORMS = ("sampled", "continuous", "ideal")
+NAMES = ("current", "velocity", "position")
+INTEGRATOR = control.tf([1], [1, 0])
 
 
 def lag(s: Any) -> Any:
@@ -99,11 +102,6 @@ def test_refusals() -> None:
         DelaySystem.from_system(-1.0).feedback()
     with pytest.raises(InputError, match="finite"):
         DelaySystem.from_system(float("nan"))
-
-
-FORMS = ("sampled", "continuous", "ideal")
-NAMES = ("current", "velocity", "position")
-INTEGRATOR = control.tf([1], [1, 0])
 
 
 @pytest.fixture(scope="module")

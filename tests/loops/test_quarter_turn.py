@@ -15,6 +15,7 @@ from actuator_lti.drive.operating import Operating, moment_slope
 from analyses.linear.loop_figures import all_loop_figures
 
 QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
+SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 
 
 def level(offset_rad: float) -> Gravity:
@@ -57,9 +58,6 @@ def test_a_slope_beside_it_stays() -> None:
     many = slope(replace(level(0.0), offset_rad=offsets))
     assert many.tolist() == [slope(level(each)) for each in offsets]
     assert (many == 0.0).tolist() == [False, True, False, True]
-
-
-SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 
 
 @pytest.mark.parametrize("slope", SLOPES)

@@ -22,6 +22,7 @@ from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
+CURRENT = {"current": model.CurrentLoop(gain_V_A=0.5, integral_time_s=1e-3)}
 
 
 def at_rest(design: Any) -> float:
@@ -181,9 +182,6 @@ def test_the_mode_at_rest_is_no_border_of_stability(slope: float) -> None:
     below = [one.ratio for one in certified.gain_margins if 1e-4 < one.ratio < 1.0]  # so far it looks
     assert exact.gain_upper == pytest.approx(min(above, default=np.inf), rel=1e-9)
     assert exact.gain_lower == pytest.approx(max(below, default=0.0), rel=1e-9)
-
-
-CURRENT = {"current": model.CurrentLoop(gain_V_A=0.5, integral_time_s=1e-3)}
 
 
 def servo(gain: float = 0.02, **stages: Any) -> model.Design:

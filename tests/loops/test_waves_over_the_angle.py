@@ -19,6 +19,8 @@ from nonlinear.bench.operating_motion import operating_motion
 from tests.changed import changed
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
+HELD = r" = .*: held over a tick,? .*; allowed: at most"
+D = 3.0  # N m s/rad
 
 
 @dataclass(frozen=True)
@@ -172,9 +174,6 @@ def test_every_wave_has_its_place_in_the_row() -> None:
     assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
 
 
-HELD = r" = .*: held over a tick,? .*; allowed: at most"
-
-
 @pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
 def test_keys_of_a_wave(name: str) -> None:
     fin, part, peak = load_design("fin"), name.partition(".")[0], 0.1 if name.startswith("load") else 5e-3
@@ -255,9 +254,6 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
         x = tick.A @ x + tick.B[:, 0] * 1e-4
     seen = 0.5 * (turned[1] - turned[2])
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
-
-
-D = 3.0  # N m s/rad
 
 
 def ratio(viscous: float, slope: float) -> float:

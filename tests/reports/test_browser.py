@@ -24,6 +24,7 @@ SCREENS = {
     "desktop, dark": {**DESK, "color_scheme": "dark"},
     "phone": {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"},
 }
+FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
 
 
 @pytest.mark.parametrize("screen", SCREENS)
@@ -48,9 +49,6 @@ def test_dark_and_light_differ(opens, built: Built) -> None:
         colours.add(page.locator("figure svg text").first.evaluate("e => getComputedStyle(e).fill"))
         colours.add(page.evaluate("getComputedStyle(document.body).backgroundColor"))
     assert len(colours) == 4
-
-
-FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
 
 
 def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Built) -> None:

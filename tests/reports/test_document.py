@@ -15,6 +15,9 @@ from reports.charts.chart import Chart
 from reports.numbers import fixed, show, significant
 from reports.verdict_summary import verdict_lines, verdict_of, verdict_words
 
+ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
+CURVE = ("columns", 0, "panels", 0, "items", 0)
+
 
 def judged(id: str, passed: bool | None, value: float | None = None) -> doc.VerdictItem:
     return doc.verdict(id, id.upper(), value=value, limit=2.0, unit="dB", comparison=">=", passed=passed)
@@ -107,9 +110,6 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
-ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
-
-
 @pytest.mark.parametrize(
     "change",
     [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}],
@@ -121,9 +121,6 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
     path.write_text(doc.dumps({**made(), "verdict": made()["verdict"] | change}), encoding="utf-8")
     with pytest.raises(InputError, match=r"report\.json: verdict"):
         doc.load(path)
-
-
-CURVE = ("columns", 0, "panels", 0, "items", 0)
 
 
 @pytest.mark.parametrize(

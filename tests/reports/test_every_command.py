@@ -18,6 +18,7 @@ from tests.command_line import commands
 
 NO_DESIGN = {"designs", "keys", "pdf", "nightly", "objects import", "init"}  # nightly, pdf: a study, a report
 COMMANDS = commands()
+WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
 
 
 def test_every_command_is_listed() -> None:
@@ -123,9 +124,6 @@ def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
     said = cli.refused("identify", file, "--set", "nothing")
     said += cli.refused("correlate", file, "none.csv", "--set", "limits.voltage")
     assert "allowed: KEY=VALUE" in said
-
-
-WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
 
 
 def wide_table(columns: int) -> dict:

@@ -12,14 +12,13 @@ from actuator_lti.design.model import Design, Requirement, Waiver
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 
+AMBER = load_design("ilr33-amber")
+
 
 def judged(design: Design, waivers: tuple[Waiver, ...] = (), **keys: Any) -> RequirementVerdict:
     asked = replace(design, requirements=(Requirement(id="r", **keys),), waivers=waivers)
     (verdict,) = evaluate_requirements(asked)
     return verdict
-
-
-AMBER = load_design("ilr33-amber")
 
 
 def test_every_shipped_requirement_is_met_with_its_distance() -> None:

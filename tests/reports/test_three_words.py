@@ -26,6 +26,9 @@ from tests.command_line import Command, Ran
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
+CASES = pytest.mark.parametrize(
+    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
+)
 
 
 def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> Design:
@@ -40,11 +43,6 @@ def written(tmp_path) -> Callable[[Design], Path]:
         return tmp_path / "d.toml"
 
     return call
-
-
-CASES = pytest.mark.parametrize(
-    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
-)
 
 
 @CASES

@@ -27,6 +27,8 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
+SCREW = load_design("ballscrew")
+
 
 def asking(design: Design, **keys: object) -> Design:
     kept = {"id": "r", "quantity": "bandwidth", "unit": "Hz", "loop": "position", "minimum": 1.0}
@@ -36,9 +38,6 @@ def asking(design: Design, **keys: object) -> Design:
 def judged(design: Design, **keys: object) -> RequirementVerdict:
     (verdict,) = evaluate_requirements(asking(design, **keys))
     return verdict
-
-
-SCREW = load_design("ballscrew")
 
 
 def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115() -> None:

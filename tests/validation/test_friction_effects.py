@@ -23,6 +23,9 @@ from tests.nonlinear.elastic_drive import stribeck
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))
 STIFFNESS = 5.9e-3 * 0.12 * 120.0 * 2376.0  # motor torque per error of the output of the first
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
+KICKS = {
+    "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
+}  # fmt: skip
 
 
 def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
@@ -251,11 +254,6 @@ def test_two_integrals_one_behind_the_other() -> None:
             t += dt
         assert wait.predicted_s == pytest.approx(t, rel=1e-3, abs=1e-4)
         assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)
-
-
-KICKS = {
-    "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("kick", KICKS)

@@ -22,6 +22,7 @@ from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")
 TRIANGLE_CREST, TRIANGLE_DISTORTION = math.sqrt(3.0), 0.1212  # model.md section 5
+HZ = np.array([1.0, 2.0, 4.0, 8.0])
 
 
 def test_h1_rate_limit() -> None:
@@ -147,9 +148,6 @@ def test_a_coarse_map_shows_no_amplitude_as_another() -> None:
     assert len(coarse.fractions) == 4
     assert coarse.fractions[-1] == 1.0
     assert coarse.gain_db.shape == (4, 4)
-
-
-HZ = np.array([1.0, 2.0, 4.0, 8.0])
 
 
 def _words(gain_db: list[float]) -> str:

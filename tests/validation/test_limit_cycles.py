@@ -24,15 +24,13 @@ from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
 AMBER, FIN = load_design("ilr33-amber"), load_design("fin")
+FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
+TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
+every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 def counting(per_rev: int, **encoder: object) -> Design:
     return changed(AMBER, encoder={"counts_per_rev": per_rev, **encoder})
-
-
-FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
-TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
-every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 @cache

@@ -20,6 +20,9 @@ from nonlinear import tangent
 from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
+INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
+FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
+
 
 def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
     places = Bench(design, design if model is None else model).onsets()
@@ -117,10 +120,6 @@ def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
         for drive, model in ((1.0, 1.01), (1.01, 1.0)):
             one, other = (design.with_values({key: factor * value}) for factor in (drive, model))
             assert Verdict.NOT_MET in {row.verdict for row in design_value_rows(one, other)}, key
-
-
-INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
-FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
 
 
 def pendulum(falls_Nm_rad: float) -> Design:

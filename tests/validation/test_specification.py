@@ -24,6 +24,7 @@ from tests.changed import changed
 
 AMBER = load_design("ilr33-amber")
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
+BEHIND = {"dry_torque": "2 N*m", "viscous": "3 N*m*s/rad"}
 
 
 @pytest.fixture(scope="module")
@@ -130,9 +131,6 @@ def test_a_hunting_drive_fails_its_verdict() -> None:
     assert made["status"] == "fail"
     items = next(block["items"] for block in made["blocks"] if block["kind"] == "verdicts")
     assert any(item["verdict"] == Verdict.NOT_MET and "refuted" in item["reason"] for item in items)
-
-
-BEHIND = {"dry_torque": "2 N*m", "viscous": "3 N*m*s/rad"}
 
 
 @pytest.mark.parametrize(

@@ -30,6 +30,7 @@ from reports.verdict_summary import verdict_of
 from tests.changed import changed
 
 EMPS = load_design("emps")
+WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
 def _with_gain(gain: float) -> Design:
@@ -72,9 +73,6 @@ def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
         periods=8, limited=(), after_s=1.0, work=1,
     )  # fmt: skip
     return Settling(step_rad, 0.0, rest)
-
-
-WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
 @pytest.mark.parametrize("name", ["emps", "fin"])
