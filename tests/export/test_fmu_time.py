@@ -84,18 +84,14 @@ def wanted(t: float | np.ndarray, design: Design) -> Any:
     return 0.1 * size * np.sin(2.0 * np.pi * t / (60.0 * design.controller.period_s))
 
 
-def latched(step: float, ticks: int, period: float) -> np.ndarray:
-    """Number of the communication point at or before each tick."""
-    return np.floor((np.arange(ticks) * period) / step + 1e-6)
-
-
 @pytest.mark.parametrize("name", drives())
 def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     design = drives()[name]
     period, path = design.controller.period_s, written(tmp_path, design)
     for part in (1, 5, 10, 15, 27) if name in ALL_STEPS else (1, 27):
         step = part / FINE * period
-        command = np.asarray(wanted(latched(step, TICKS, period) * step, design))
+        points = np.floor((np.arange(TICKS) * period) / step + 1e-6)  # at or before each tick
+        command = np.asarray(wanted(points * step, design))
         plain = run(design, TICKS, command)
         truth = propagated(design, plain.voltage_V)
         with hosted(path) as (host,):

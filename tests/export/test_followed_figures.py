@@ -33,11 +33,6 @@ def drives() -> list[Design]:
     return made + [load_design(name) for name in ("fin", "emps", "joint")]
 
 
-def followed_keys(design: Design) -> dict[str, float]:
-    keys = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
-    return {path: value for path, value in keys.items() if value != 0.0}
-
-
 def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -> list[float]:
     """Every value over decades; the speeds of a friction map together, as their order is its structure."""
     together = 10.0 ** rng.uniform(-spread, spread)
@@ -52,7 +47,8 @@ def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -
 def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
     """Over a decade of every key at once the statements give what the drive asked anew gives."""
     design, rng = drives()[place], np.random.default_rng(place)
-    keys, compared = followed_keys(design), 0
+    known = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
+    keys, compared = {path: value for path, value in known.items() if value != 0.0}, 0
     for name in NAMES:
         if name == "motor_current" and not design.motor.has_electrical_dynamics:
             continue

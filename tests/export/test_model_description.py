@@ -3,13 +3,13 @@
 import io
 import xml.etree.ElementTree as ET
 import zipfile
-from dataclasses import replace
 from math import pi, sqrt
 
 import pytest
 
 from actuator_lti import Design, load_design
 from nonlinear.export import fmu_bytes
+from tests.changed import changed
 
 MOTOR_SIDE = ("motor.angle", "motor.speed", "motor.torque", "motor.current", "motor.voltage")
 # full deflection, ratio, top speed of the motor, its torque, current, voltage, largest load; None: unbounded
@@ -44,11 +44,6 @@ def variables(root: ET.Element) -> dict[str, dict[str, str]]:
     return {each.attrib["name"]: each.attrib | (each[0].attrib if len(each) else {}) for each in listed}
 
 
-def speed_drive() -> Design:
-    design = load_design("ilr33-amber")
-    return replace(design, controller=replace(design.controller, position=None))
-
-
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("name", SIZES)
 def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) -> None:
@@ -81,7 +76,8 @@ def test_sizes_and_units_are_those_of_the_data_sheet(name: str, version: int) ->
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_the_command_is_that_of_the_outermost_stage(version: int) -> None:
-    command = variables(described(speed_drive(), version))["command"]
+    speed_drive = changed(load_design("ilr33-amber"), controller={"position": None})
+    command = variables(described(speed_drive, version))["command"]
     assert (command["unit"], command["displayUnit"]) == ("rad/s", "deg/s")
     assert float(command["nominal"]) == pytest.approx(942.5 / 2376, rel=1e-12)
 

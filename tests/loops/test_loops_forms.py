@@ -18,10 +18,6 @@ from actuator_lti.loops import exact_margins
 R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6  # of `amber`
 
 
-def proportional(design: Design) -> Design:
-    return controlled(design, velocity={"integral_time_s": None}, current={"integral_time_s": None})
-
-
 def phase_gaps(design: Design, omega: np.ndarray) -> np.ndarray:
     """Phase of sampled over continuous, one row a loop, in rad."""
     sampled, continuous = assemble_loops(design), assemble_loops(design, "continuous")
@@ -45,7 +41,8 @@ def test_delays_are_placed_right(encoder: Encoder) -> None:
 
     A hold counted twice, or missing, would leave a first-order difference: halving, not quartering.
     """
-    design = proportional(amber(2, 10, delay_s=1.5e-4, encoder=encoder))
+    proportional = {stage: {"integral_time_s": None} for stage in ("velocity", "current")}
+    design = controlled(amber(2, 10, delay_s=1.5e-4, encoder=encoder), **proportional)
     omega, gaps = np.array([30.0, 100.0]), []
     for k in (8, 16, 32):
         quick = replace(encoder, filter_time_s=encoder.filter_time_s / k)

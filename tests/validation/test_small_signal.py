@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -48,16 +47,12 @@ def test_speed_drives_and_clamped_integrals(seed: int) -> None:
     assert seed != 730_037 or "voltage_onset_integral" in found
 
 
-def one_per_cent_more(place: Place, z: np.ndarray) -> np.ndarray:
-    return 1.01 * place.predicted(z)
-
-
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "joint"])
 def test_one_per_cent_of_the_linear_side_is_not_met(name: str) -> None:
     """Of every limiter: its response scaled, and a gain that all of them feel."""
     design = load_design(name)
     for place in Bench(design, design).onsets():
-        (row,) = small_signal(replace(place, predicted=partial(one_per_cent_more, place)))
+        (row,) = small_signal(replace(place, predicted=lambda z, place=place: 1.01 * place.predicted(z)))
         assert row.verdict is Verdict.NOT_MET, row
         assert row.error == pytest.approx(0.01, rel=0.02)
     gain = 1.01 * design.controller.position.gain
