@@ -286,7 +286,7 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
     ranges, rows = spread(seen), list[doc.Row]()
     for label, figures in named.items():
         name, own = figures.loop.name, ranges.get(figures.loop.name, {})
-        row: doc.Row = {"loop": next(iter(with_held({label: figures})))}
+        row: doc.Row = {"loop": list(with_held({label: figures}))[figures.held is not None]}  # as judged
         row |= {name.split("_")[0]: range_words(range_, name) for name, range_ in own.items()}
         doubts = {words: list[str]() for words in DOUBTS.values()}
         for point in seen:

@@ -1,5 +1,6 @@
 """A load that pushes away: an inner loop alone is unstable, the drive is not, and is judged so everywhere."""
 
+import re
 from dataclasses import replace
 from math import exp
 from typing import Any
@@ -154,3 +155,26 @@ def test_the_command_line_says_which_case_it_is(cli) -> None:
     assert (made["passed"], current["stable"]) == (True, False)
     assert (current["judged"]["how"], current["judged"]["stable"]) == ("rotor locked", True)
     assert "FAIL" in cli.text("margins", "ilr33-amber", *SET, "load.moment_slope=1e9 N*m/rad", status=1)
+
+
+@pytest.mark.parametrize("held", [[], PUSHED], ids=["as it is", "held"])
+def test_a_range_stands_under_the_loop_whose_margins_it_begins_or_ends_with(held, cli, monkeypatch) -> None:
+    """Sliding is one of the operating points, so one end of each range is the margin of its column."""
+    monkeypatch.setenv("COLUMNS", "250")
+
+    def cells(line: str) -> dict[int, str]:
+        return {one.end(): one[0] for one in re.finditer(r"\S+(?: \S+)*", line)}
+
+    lines = cli.text("margins", "ilr33-amber", *held).splitlines()
+
+    def row(*words: str) -> dict[int, str]:
+        return cells(next(line for line in lines if all(word in line for word in words)))
+
+    for name, unit in (("Gain margin", "dB"), ("Phase margin", "deg")):
+        own, over = row(f"{name}, {unit}"), row(f"{name}, operating points, {unit}")
+        ranges = {end: text for end, text in over.items() if end in own and end > min(own)}
+        assert len(ranges) == 3
+        for end, text in ranges.items():
+            words = text.split()
+            assert f"{float(own[end]):.3g}" in (words[0], words[-1])
+        assert row("Velocity", "Position")[min(ranges)].endswith("locked" if held else "free")
