@@ -84,7 +84,7 @@ def law_at(rng: Rng, design: model.Design, stage: str, n: int) -> model.Design:
     D[0] = gain
     law = Law(inputs=inputs, A=tuple(map(tuple, A.tolist())), B=tuple(map(tuple, (1e-2 * B).tolist())),
               C=tuple(C.tolist()), D=tuple(D.tolist()), L=tuple((0.1 * rng.standard_normal(n)).tolist()),
-              gain=Draw(rng).near(1.0))  # type: ignore[arg-type]  # fmt: skip
+              gain=Draw(rng).near(1.0))  # fmt: skip
     own = (key for key in ("every", "sensor", "back_emf_feedforward") if hasattr(loop, key))
     part = type(loop)(**{key: getattr(loop, key) for key in own}, law=law)
     if (velocity := design.controller.velocity) is not None:
@@ -156,7 +156,7 @@ def _encoder(draw: Draw) -> model.Encoder:
         "difference_samples": int(draw.rng.integers(1, 5)),
     }
     own |= {"filter_time_s": draw.maybe(5e-4), "bandwidth_rad_s": draw.near(2000.0)}
-    return model.Encoder(speed=speed, **own)  # type: ignore[arg-type]
+    return model.Encoder(speed=speed, **own)
 
 
 def _command(draw: Draw) -> Parts:

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from actuator_lti.design import load_design, model
 from tests.changed import changed
 
+GAINS = {"current": 0.01, "velocity": 1.0, "current velocity": 0.05}  # of the stage outside the gap
+
 
 def amber(
     n_v: int = 1, n_p: int = 1, delay_s: float = 1e-4, feedforward: float = 0.0, **changes: Any
@@ -72,15 +74,7 @@ def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> model.Design
 
 
 def picker(draw: st.DrawFn) -> Callable[..., Any]:
-    """Draws one of some values."""
     return lambda *values: draw(st.sampled_from(values))
-
-
-GAINS = {
-    "current": 0.01,
-    "velocity": 1.0,
-    "current velocity": 0.05,
-}  # of the stage outside the gap
 
 
 @st.composite

@@ -50,9 +50,7 @@ def linear(design: Design) -> Design:
 
 def radius(design: Design) -> float:
     """Spectral radius of the whole closed loop over a base period."""
-    system = assemble_loops(design).tick_system
-    assert system is not None
-    program = system.program
+    program = assemble_loops(design).tick_system.program
     A, _ = compose([program.tick(k) for k in range(program.ticks)])
     return float(np.max(np.abs(np.linalg.eigvals(A))))
 

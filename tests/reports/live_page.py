@@ -38,7 +38,6 @@ def page_text(design: Design) -> str:
 
 
 def written(design: Design, folder: Path) -> Path:
-    """Write the page of a design without validation."""
     path = folder / "page.html"
     path.write_text(page_text(design), encoding="utf-8")
     return path

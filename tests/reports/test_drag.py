@@ -62,8 +62,7 @@ def decibels(page: Page, pixels: float) -> float:
 
 
 def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page) -> None:
-    before = page.read()["velocity"]
-    grab = page.locator('[data-chart="bode"] path.grab')
+    before, grab = page.read()["velocity"], page.locator('[data-chart="bode"] path.grab')
     drag(page, tuple(grab.evaluate(MIDDLE)), 0.0, -8.0)
     by = decibels(page, -8.0)
     assert by > 3.0

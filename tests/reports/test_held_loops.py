@@ -43,11 +43,6 @@ def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
     return pushed(slope_Nm_rad, friction=friction, requirements=())
 
 
-def torque_drive() -> Design:
-    """Nothing around the current loop stops the load that pushes away."""
-    return pushed(requirements=(), controller={"position": None, "velocity": None})
-
-
 def held_phase_margin_deg(design: Design) -> float:
     """PI(z) (1 - a)/(R (z - a)) behind the delay, a = exp(-R T/L): the winding alone, its voltage held."""
     motor, law, T = design.effective_motor, design.controller.current, design.controller.period_s
@@ -114,7 +109,8 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
     [
         (falling_friction(), ["current"], "met"),
         (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
-        (torque_drive(), [], "not met"),
+        # nothing around the current loop stops the load that pushes away
+        (pushed(requirements=(), controller={"position": None, "velocity": None}), [], "not met"),
     ],
 )
 def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[str], verdict: str) -> None:

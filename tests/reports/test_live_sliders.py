@@ -93,9 +93,7 @@ def test_undo_redo_reset_and_keyboard(page: Page) -> None:
 @pytest.mark.parametrize(("delay_us", "words", "place"), [
     (1e4, "too many states for this page", "table.now"), (1.1e4, "allowed: at most 100 ticks", ".state")
 ])  # fmt: skip
-def test_a_value_that_is_too_much_is_said_and_undone(
-    page: Page, delay_us: float, words: str, place: str
-) -> None:
+def test_a_value_that_is_too_much_is_said_and_undone(page: Page, delay_us: float, words: str, place: str):
     before = page.read()
     page.type_value("control.computing_delay", delay_us)
     has = "([place, words]) => document.querySelector(place).innerText.includes(words)"
@@ -105,8 +103,7 @@ def test_a_value_that_is_too_much_is_said_and_undone(
 
 
 def test_nonsense_is_not_taken(opens, page: Page) -> None:
-    before = page.read()
-    row = '.row[data-path="control.position.gain"]'
+    before, row = page.read(), '.row[data-path="control.position.gain"]'
     for words in ("-5", "abc", "", "0", "Infinity", "1e300"):
         page.fill(f"{row} .field", words)
         page.press(f"{row} .field", "Enter")
@@ -118,8 +115,7 @@ def test_nonsense_is_not_taken(opens, page: Page) -> None:
     page.wait_for_selector(f"{row} .field[aria-invalid=false]")
     assert page.inner_text(f"{row} .was") == ""
     nonsense = "#hands-on?control.position.gain=-1&%E0%A4%A=3&control.velocity.gain&no.key=4"
-    other = opens(AMBER, fragment=nonsense)
-    assert other.read() == before
+    assert opens(AMBER, fragment=nonsense).read() == before
 
 
 def test_a_link_carries_the_changes(opens, page: Page) -> None:
@@ -160,8 +156,7 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
 
 def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
-    model = assemble_loops(AMBER).velocity.open_loop
-    hertz = np.geomspace(2.0, 400.0, 40)
+    model, hertz = assemble_loops(AMBER).velocity.open_loop, np.geomspace(2.0, 400.0, 40)
     open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
     closed = open_loop / (1.0 + open_loop)
     rows = zip(hertz, 20.0 * np.log10(abs(closed)), np.degrees(np.angle(closed)), strict=True)
@@ -198,7 +193,6 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
     slider.scroll_into_view_if_needed()
     box = slider.bounding_box()
-    assert box is not None
     small.settled(lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 

@@ -32,6 +32,9 @@ from reports.sections.margins import DOWNWARDS, margin_table, result, spread_tab
 from reports.sections.names import Unit
 from reports.terminal import print_blocks
 
+SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
+SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
+
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
     """A slow position integral: held by the load's friction, the gain may fall by 3.6 dB, not rise."""
@@ -95,10 +98,6 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     assert {name for name in tested if name.startswith("feedback_")} == {
         f"feedback_{name}" for name in set(to_command) - set(tested) - {"to_reference"}
     }
-
-
-SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
-SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 
 
 @pytest.mark.parametrize(

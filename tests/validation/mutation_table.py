@@ -128,7 +128,6 @@ def first_row(design: Design, model: Design) -> Row | None:
 
 
 def lines(name: str) -> Iterator[str]:
-    """The table of one drive."""
     yield f"## {name}"
     yield ""
     yield "| key | change | seen by | where |"
@@ -158,7 +157,6 @@ Made by `python -m tests.validation.mutation_table`; tests/validation/test_desig
 
 
 def main() -> None:
-    """Write the page."""
     page = [HEAD]
     for name in DRIVES:
         page += lines(name)

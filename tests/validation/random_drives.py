@@ -29,8 +29,6 @@ Parts = dict[str, Any]  # of a design, as `changed` takes them
 
 
 class Dice:
-    """Random choices of one drive."""
-
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
 
@@ -42,7 +40,6 @@ class Dice:
         return bool(self.rng.random() < share)
 
     def one_of(self, *values: T) -> T:
-        """One of some values."""
         return values[int(self.rng.integers(len(values)))]
 
 
@@ -53,7 +50,6 @@ def _full_torque(design: model.Design) -> float:
 
 
 def _rigid_drive(dice: Dice, seed: int) -> model.Design:
-    """A rigid cascade."""
     period = dice.decades(2e-6 if dice.chance(0.1) else 2e-5, 1e-3)
     delay = period * dice.one_of(0.0, 0.5, 1.0, 1.0, 2.0, 3.0)
     axis = dice.one_of("rotary", "rotary", "rotary", "linear")
@@ -79,7 +75,6 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
 def _plant(
     dice: Dice, delay: float, axis: str
 ) -> tuple[model.Motor, float, tuple[model.Gear, ...], model.Load]:
-    """Motor, inertia at its shaft, gears and load."""
     R, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
     L = R * delay * dice.decades(2.0, 60.0)
     inertia = dice.decades(1.0, 300.0) * (L / R) * k**2 / R
@@ -156,7 +151,6 @@ def _friction(dice: Dice, torque: float, speed: float) -> model.Friction:
 
 
 def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
-    """Ideal, or a real one."""
     source = dice.one_of("ideal", "ideal", "difference", "tracking")
     counts = None
     if source != "ideal" and dice.chance(0.7):
@@ -233,7 +227,6 @@ def _frictions(dice: Dice, design: model.Design) -> Parts:
 
 
 def _loads(dice: Dice, design: model.Design) -> Parts:
-    """Gravity on a rotary output."""
     if not dice.chance(0.15) or design.axis == "linear":
         return {}
     peak = dice.decades(0.01, 0.2) * _full_torque(design) * design.total_ratio
@@ -313,7 +306,6 @@ def _sensors(dice: Dice, design: model.Design) -> Parts:
 
 
 def _commanded(dice: Dice, design: model.Design) -> Parts:
-    """A filter, a profile."""
     kind = dice.one_of("", "", "", "filter", "profile")
     gain, full = design.controller.position_loop.gain, design.validation.full_deflection_rad
     if kind == "filter":
@@ -335,7 +327,6 @@ def _supplied(dice: Dice, design: model.Design) -> Parts:
 
 
 def _protected(dice: Dice, design: model.Design) -> Parts:
-    """Overload protection."""
     peak = design.limits.peak_current_A
     if peak == inf or not dice.chance(0.3):
         return {}
@@ -344,7 +335,6 @@ def _protected(dice: Dice, design: model.Design) -> Parts:
 
 
 def _instrumented(dice: Dice, design: model.Design) -> Parts:
-    """Noise, resolution, jitter."""
     if not dice.chance(0.15):
         return {}
     noise = 1e-4 * design.validation.full_deflection_rad * design.total_ratio
@@ -379,7 +369,6 @@ def is_stable(design: model.Design) -> bool:
 
 
 def tried(design: model.Design, settings: Settings) -> None:
-    """Validate one drive and print what it came to."""
     try:
         with isolated() as missing:
             found = validate(design, settings)
