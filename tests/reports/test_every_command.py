@@ -130,11 +130,10 @@ def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
 @pytest.mark.parametrize("columns", [1, 4, 12])
 def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, printed) -> None:
     named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
-    rows = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
-    out = printed(
-        width, doc.table("A table", named, [{"name": f"row {r}", **row} for r, row in enumerate(rows)])
-    )
-    assert all(value in out for r, row in enumerate(rows) for value in (f"row {r}", *row.values()))
+    cells = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
+    rows = [{"name": f"row {r}", **row} for r, row in enumerate(cells)]
+    out = printed(width, doc.table("A table", named, rows))
+    assert all(value in out for row in rows for value in row.values())
 
 
 @pytest.mark.parametrize("width", range(70, 140, 5))
