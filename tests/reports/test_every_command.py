@@ -27,24 +27,19 @@ def test_every_command_is_listed() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
+def test_every_command_speaks_json_takes_changes_and_shows_an_example_that_it_takes(name: str) -> None:
+    """Examples of its help are cut at the next sentence; click itself parses what is left."""
     command = COMMANDS[name]
     options = {option for parameter in command.params for option in parameter.opts}
     assert {"--json", *(["--set"] if name not in NO_DESIGN else [])} <= options
-    assert command.help
     for parameter in command.params:
         assert getattr(parameter, "help", None), f"{name}: {parameter.name} has no help"
-
-
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_help_has_an_example_that_the_command_takes(name: str) -> None:
-    """Cut at the next sentence; click itself parses what is left."""
-    text = COMMANDS[name].help.partition("Try: ")[2].partition("\n\n")[0]
+    text = command.help.partition("Try: ")[2].partition("\n\n")[0]
     tried = re.split(rf"actuator-lti {name}\b", text)[1:]
     assert tried, f"{name}: no example"
     for words in tried:
         line = re.split(r", or\b|: (?=actuator)|; ", words)[0].rstrip(",")
-        COMMANDS[name].make_context(name, shlex.split(line))
+        command.make_context(name, shlex.split(line))
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])
