@@ -33,6 +33,7 @@ from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
 from analyses.records.readers import read_mat_record, read_record
+from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
@@ -144,6 +145,11 @@ def controller_file(path: Path) -> None:
     if b"30A0" in path.read_bytes():  # no velocity loop inside a position loop
         del tree["control"]["position"]
     import_controller_file(path, design_from_tree(tree, "base"))
+
+
+def accounted(found: Record) -> None:
+    """Every row is used, or counted among those that are not."""
+    assert found.counts.rows_in == found.counts.rows_out + sum(found.counts.dropped.values())
 
 
 def record(path: Path) -> None:
@@ -344,9 +350,9 @@ def targets() -> tuple[Target, ...]:
         Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault),
         Target("campaign", (CAMPAIGN,), load_campaign),
         Target("record file", (RECORD,), record),
-        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
+        Target("record", (ROWS,), lambda p: accounted(read_csv_record(p, SPEC)), ".csv"),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
-        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
+        Target("mat", mat_files(), lambda p: accounted(read_mat_record(p, SPEC)), ".mat"),
         Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault),
         Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet"),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),

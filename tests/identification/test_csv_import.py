@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from actuator_lti.errors import InputError
 from analyses.records import csv_stream as module
@@ -55,6 +57,58 @@ def test_every_line_is_accounted_for(tmp_path) -> None:
     assert (counts.rows_in, counts.rows_out) == (4, 3)
     assert counts.dropped == {"with a missing value": 1}
     assert counts.first_dropped == {"with a missing value": "line 5"}
+
+
+CELLS = st.one_of(
+    st.integers(-3, 9).map(str),
+    st.floats(allow_nan=True, width=32).map(str),
+    st.sampled_from(["", "nan", "abc", "1,5", "1_0", '"2"', "#", "1e999", "\u00b5", "-"]),
+)
+TABLES = st.lists(st.lists(CELLS, min_size=0, max_size=4), max_size=12)
+BYTES = st.builds(
+    bytes.__add__, st.sampled_from([b"", b"t,x\n", b"t,x\n0,1\n1,2\n"]), st.binary(max_size=300)
+)
+LAYOUTS = st.sampled_from(
+    [
+        CsvFormat(),
+        CsvFormat(separator=";", decimal=","),
+        CsvFormat(separator="whitespace"),
+        CsvFormat(names=("t", "x")),
+    ]
+)
+
+
+@settings(max_examples=240)
+@given(
+    held=TABLES | BYTES, layout=LAYOUTS, policy=st.sampled_from(["error", "drop"]),
+    end=st.sampled_from(["\n", "\r\n"]),
+)  # fmt: skip
+def test_whatever_a_file_holds_every_row_and_line_is_accounted_for(
+    held, layout, policy, end, tmp_path_factory
+) -> None:
+    """Tables of odd cells, and any bytes; or it is refused in one line."""
+    content = held
+    if isinstance(held, list):
+        separator = " " if layout.separator == "whitespace" else layout.separator
+        head = [] if layout.names else [f"t{separator}x"]
+        content = end.join([*head, *(separator.join(row) for row in held), ""]).encode()
+    path = _write(tmp_path_factory.getbasetemp(), content)
+    columns, said = (SignalColumn(name="x", column="x"),), ""
+    try:
+        record = read_csv_record(
+            path, _spec(format=layout, signals=columns, bad_rows=policy, disorder=policy)
+        )
+    except InputError as error:
+        said, record = str(error), None
+    assert bool(said) == (record is None)
+    assert "\n" not in said
+    if record is None:
+        return
+    counts = record.counts
+    assert counts.rows_in == counts.rows_out + sum(counts.dropped.values())
+    assert counts.rows_out == len(record)
+    lines = content.removesuffix(b"\n").count(b"\n") + 1
+    assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
 
 
 def test_ticks_that_wrap_around(tmp_path) -> None:

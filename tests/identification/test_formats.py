@@ -1,5 +1,6 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
+import io
 import json
 from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
@@ -12,6 +13,7 @@ import pytest
 from scipy.io import savemat
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.mat5 import read_mat5
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from tests.identification.bench_records import record_of
@@ -117,6 +119,19 @@ def test_one_record_in_many_formats(form: str, tmp_path) -> None:
     assert record.time_s == pytest.approx(TIME, abs=1e-9)
     assert record["angle"] == pytest.approx(ANGLE, abs=1e-9)
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)
+
+
+def test_a_compressed_and_a_plain_file_read_alike() -> None:
+    values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
+    for packed in (False, True):
+        stream = io.BytesIO()
+        savemat(stream, values, do_compression=packed)
+        content = read_mat5(stream.getvalue())
+        assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
+        assert content.arrays["k"].item() == 3.5
+        assert content.passed_over == []
+        assert content.texts == {"text": ("abc",)}
 
 
 @pytest.mark.parametrize(
