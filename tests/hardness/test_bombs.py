@@ -122,13 +122,16 @@ def test_a_count_beyond_every_run_is_as_good_as_all(digits: int) -> None:
     assert simulate_many([asked], threads=count).status.tolist() == [0]
 
 
-def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
+def test_a_multisine_of_many_lines_is_summed_in_parts_and_one_as_large_as_a_double_has_no_warning() -> None:
     """The tones at 100 001 ticks are never held at once; it begins at zero, rising."""
     times, values = summed([1.0, 500.0], 10.0).samples
     assert times.size == 100_001
     assert abs(values[0]) < 1e-9
     assert values[1] > 0.0
     assert abs(values).max() == pytest.approx(0.1)
+    # warnings are errors here: its spectrum is of its shape
+    largest = commands.multisine(1e308, [1.0, 100.0], 1.0, PERIOD_S)
+    assert largest.highest_content(5000.0) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -141,12 +144,6 @@ def test_a_number_beyond_all_bounds_is_one_line(given: str, cli) -> None:
     line = cli.refused("simulate", "--command", "stepped-sine", *option.split())
     assert given.split()[0].partition("=")[0] in line
     assert ("finite" if "9" not in given else "2^63") in line
-
-
-def test_a_command_as_large_as_a_double_has_no_warning() -> None:
-    """Warnings are errors here: its spectrum is of its shape."""
-    largest = commands.multisine(1e308, [1.0, 100.0], 1.0, PERIOD_S)
-    assert largest.highest_content(5000.0) < 1e-3
 
 
 def test_a_batch_that_would_take_days() -> None:
@@ -183,15 +180,12 @@ GRID = '[study]\nbase = "ilr33-amber"\n[[grid]]\naxes = [{}]\n'
 AXIS = '{ parameter = "motor.resistance", from = "50 mohm", to = "60 mohm", points = 1000 }'
 
 
-def test_a_grid_of_a_thousand_to_the_sixty(tmp_path) -> None:
+def test_a_grid_of_a_thousand_to_the_sixty_and_sweeps_of_a_variant_too_many(tmp_path, monkeypatch) -> None:
     path = tmp_path / "s.toml"
     path.write_text(GRID.format(", ".join([AXIS] * 60)))
     refused(lambda: load_study(path), "grid[1].axes", "60 axes", "at most 20")
     path.write_text(GRID.format(", ".join([AXIS] * 20)))
     refused(lambda: load_study(path), "grid[1]", "1e+60 variants", "at most 10000")
-
-
-def test_sweeps_stop_at_the_first_variant_too_many(tmp_path, monkeypatch) -> None:
     path = tmp_path / "s.toml"
     sweep = AXIS.replace("1000", "20")[2:-2].replace(", ", "\n")
     path.write_text('[study]\nbase = "ilr33-amber"\n' + f"[[sweep]]\n{sweep}\n" * 500)

@@ -69,9 +69,16 @@ def test_a_coupling_after_a_gear_that_is_none(design: str, known: str) -> None:
     assert known in line
 
 
-def test_numbers_of_samples_beyond_floats() -> None:
+def test_numbers_beyond_floats_names_that_cannot_be_read_and_a_status_twice() -> None:
     line = refused("samples", b"motor.resistance,motor.inductance\n%b,1e-5\n" % (b"9" * 400))
     assert "no number" in line
+    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
+    assert column in parquet_file()
+    broken = parquet_file().replace(column, unreadable)
+    assert "is no Parquet file" in refused("parquet", broken)
+    made = json.loads(small_report())
+    first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
+    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 
 @pytest.mark.parametrize("written_id", ["{}", "[1]", "3", "true"])
@@ -99,19 +106,6 @@ def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     made = json.loads(small_report())
     change(made)
     assert words in refused("report", json.dumps(made).encode())
-
-
-def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:
-    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
-    assert column in parquet_file()
-    broken = parquet_file().replace(column, unreadable)
-    assert "is no Parquet file" in refused("parquet", broken)
-
-
-def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
-    made = json.loads(small_report())
-    first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
-    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 
 @pytest.mark.parametrize("rows", [1, 2])

@@ -149,7 +149,7 @@ def test_a_pipe_gets_everything_or_is_refused_at_once(tmp_path) -> None:
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
-def test_a_socket_and_a_name_with_a_zero_are_refused(tmp_path) -> None:
+def test_links_are_followed_and_stay_links_and_a_socket_and_a_name_with_a_zero_are_refused(tmp_path) -> None:
     name = tmp_path / "s"
     with socket.socket(socket.AF_UNIX) as server:
         server.bind(str(name))
@@ -157,9 +157,6 @@ def test_a_socket_and_a_name_with_a_zero_are_refused(tmp_path) -> None:
             atomic.write_text(name, "x")
     with pytest.raises(InputError, match="null"):
         atomic.write_text(tmp_path / "a\0b", "x")
-
-
-def test_links_are_followed_and_stay_links(tmp_path) -> None:
     (tmp_path / "real").mkdir()
     file, link, dangling = tmp_path / "real" / "a", tmp_path / "link", tmp_path / "dangling"
     file.write_text("old")

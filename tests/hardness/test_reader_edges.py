@@ -44,16 +44,13 @@ def test_depth() -> None:
         assert "nested too deeply" in refused(read, text)
 
 
-def test_values() -> None:
+def test_values_texts_keys_and_size() -> None:
     def text(count: int) -> str:  # with the file and the list there are two more
         return f"a = [{'1,' * (count - 2)}]"
 
     assert parse_toml(text(TOML_VALUES.most), "f")
     assert f"at most {TOML_VALUES.most}" in refused(parse_toml, text(TOML_VALUES.most + 1))
     assert "more values" in refused(parse_toml, "\n".join(f"k{k} = 1" for k in range(TOML_VALUES.most + 1)))
-
-
-def test_texts_keys_and_size() -> None:
     most = TEXT_CHARACTERS.most
     assert parse_toml(f'a = "{"x" * most}"', "f")
     assert f"{most + 1} characters" in refused(parse_toml, f'a = "{"x" * (most + 1)}"')

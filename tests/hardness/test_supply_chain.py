@@ -67,6 +67,11 @@ def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> Non
         name = canonicalize_name(wanted.name)
         assert name in LOCKED, f"{name}: make lock"
         assert wanted.specifier.contains(LOCKED[name], prereleases=True), words
+    for words in PROJECT["build-system"]["requires"]:
+        assert [one.operator for one in Requirement(words).specifier] == ["=="]
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").split():
+        name, _, version = line.partition("==")
+        assert LOCKED.get(canonicalize_name(name), version) == version, f"{name}: make lock"
 
 
 def test_the_extra_all_has_what_the_commands_ask_for() -> None:
@@ -78,17 +83,6 @@ def test_the_extra_all_has_what_the_commands_ask_for() -> None:
         for path in (ROOT / top).rglob("*.py"):
             named.update(re.findall(r'\bneed\("?[\w.]+"?, "(\w+)"', path.read_text(encoding="utf-8")))
     assert {"cluster", "nightly", "pdf", "plot", "tables"} <= named <= extras
-
-
-def test_the_build_back_end_is_pinned() -> None:
-    for words in PROJECT["build-system"]["requires"]:
-        assert [one.operator for one in Requirement(words).specifier] == ["=="]
-
-
-def test_lock_and_constraints_say_the_same() -> None:
-    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").split():
-        name, _, version = line.partition("==")
-        assert LOCKED.get(canonicalize_name(name), version) == version, f"{name}: make lock"
 
 
 def test_every_promise_of_the_security_note_names_a_test_that_is_there() -> None:

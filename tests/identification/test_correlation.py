@@ -22,9 +22,7 @@ def emps(emps_file: Path) -> CorrelationResult:
     ("signal", "published", "reached"),
     [("position", 0.013752, 0.001089), ("velocity", 0.22911, 0.1272), ("force", 5.848, 4.593)],
 )
-def test_emps_is_met_within_the_published_errors(
-    emps: CorrelationResult, signal: str, published: float, reached: float
-) -> None:
+def test_emps_is_met_within_the_published_errors(emps, signal, published, reached) -> None:
     """Janot, Gautier, Brunot 2019: closed-loop simulation, relative errors in percent.
 
     Their loop is not sampled: what is reached here is held, so that it does not get worse unseen.

@@ -85,9 +85,7 @@ def _swing(peak: float, hz: float = 3.0) -> Command:
         "sloped load",
     ],
 )  # fmt: skip
-def test_a_record_meets_the_drive_that_made_it(
-    design: Design, column: str, command: Command, factor: float, tmp_path
-) -> None:
+def test_a_record_meets_the_drive_that_made_it(design, column, command, factor, tmp_path) -> None:
     """Every signal to rounding, as the command is recorded at each tick; another friction is seen."""
     run = simulate(design, command, 0.5)
     _record(tmp_path / "r.csv", run, ROTARY, **{column: factor * run.reference_rad})

@@ -125,9 +125,7 @@ def test_ticks_that_wrap_around(tmp_path) -> None:
         ("disorder", "0,1\n2,1\n1,1\n3,1\n", 4, "whose time does not increase"),
     ],
 )
-def test_rows_are_dropped_only_on_demand_and_counted(
-    what: str, text: str, rows: int, reason: str, tmp_path
-) -> None:
+def test_rows_are_dropped_only_on_demand_and_counted(what, text, rows, reason, tmp_path) -> None:
     counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), _spec(**{what: "drop"})).counts
     assert (counts.rows_in, counts.rows_out, counts.dropped) == (rows, 3, {reason: rows - 3})
 

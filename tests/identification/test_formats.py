@@ -168,9 +168,7 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) 
         (', value = "rms", between = "phase"', np.sqrt(6.0)),
     ],
 )
-def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
-    options: str, factor: float, tmp_path
-) -> None:
+def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(options, factor, tmp_path) -> None:
     (tmp_path / "s.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
     voltage = f'signals.voltage = {{ column = "u", unit = "V"{options} }}'
     _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', voltage)
@@ -190,15 +188,12 @@ def _errors(record: Record) -> tuple[float, float]:
     return float(np.max(np.abs(record["angle"] - 3.0 * np.sin(5.0 * record.time_s))) / 6.0), stated
 
 
-def test_jitter_is_resampled_with_an_error_that_holds() -> None:
+def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_tolerance() -> None:
     """The stated error bounds that of linear interpolation: h^2/8 of the curvature, here 0.3 per mille."""
     record = _uneven(np.ones(len(TIME), dtype=bool), 2e-3).resampled()
     real, stated = _errors(record)
     assert 0.5 * real < stated < 5.0 * real
     assert stated < 1e-3
-
-
-def test_a_gap_is_bridged_only_within_the_tolerance() -> None:
     keep = np.ones(len(TIME), dtype=bool)
     keep[80:120] = False
     with pytest.raises(InputError, match=r"longest step 0\.41 s at 0\.79 s.*allowed: 5 %"):

@@ -77,9 +77,7 @@ def test_the_virtual_bench_writes_54_runs(tmp_path, capsys, monkeypatch) -> None
         (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
     ],
 )
-def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(
-    arguments: tuple[str, ...], reason: str, tmp_path, capsys
-) -> None:
+def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(arguments, reason, tmp_path, capsys) -> None:
     (tmp_path / "campaign.toml").touch()
     with pytest.raises(SystemExit, match="2"):
         simulate([str(tmp_path), *arguments])
@@ -104,9 +102,7 @@ def test_the_example_is_a_campaign_file(tmp_path, cli) -> None:
         (("identify", "r.csv", "--design", "emps", "--cutoff", "0"), "0 Hz: must be between 0 and 50 Hz"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(
-    arguments: tuple[str, ...], reason: str, tmp_path, monkeypatch, cli
-) -> None:
+def test_bad_input_is_one_line_and_status_2(arguments, reason, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99))
     Path("r.csv").write_text(f"time_s,position_m,force_N\n{rows}")
@@ -125,9 +121,7 @@ def test_bad_input_is_one_line_and_status_2(
         ("[campaign]", "[campaign", "not TOML"),
     ],
 )
-def test_a_bad_campaign_file_is_one_line_with_its_key(
-    old: str, new: str, reason: str, campaign: Path, tmp_path, cli
-) -> None:
+def test_a_bad_campaign_file_is_one_line_with_its_key(old, new, reason, campaign, tmp_path, cli) -> None:
     text = campaign.read_text()
     assert old in text
     path = tmp_path / "bad.toml"

@@ -49,17 +49,14 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
         assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
-def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_path, cli) -> None:
+def test_a_held_out_record_is_filtered_and_that_of_another_drive_fails(files, tmp_path, cli) -> None:
     other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
     path = str(write(tmp_path / "other.csv", columns_of(motion(6, design=other), 7)))
     told = cli.data("identify", files["a"], "--validate", path, "--design", "ilr33-amber", status=1)
     checks = {check["id"]: check for check in told["items"]}
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
-
-
-def test_a_held_out_record_is_filtered_as_those_of_the_fit(files: dict[str, str], tmp_path, cli) -> None:
-    """The same record again has the residual of the fit, less what its own bias is."""
+    # the same record again has the residual of the fit, less what its own bias is
     again = shutil.copy(files["a"], tmp_path / "again.csv")
     words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
     told = cli.data(*words)

@@ -147,9 +147,7 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path, identify, cli) -
 
 @pytest.mark.parametrize("name", ["ballscrew", "fin"])
 @pytest.mark.parametrize("clock", [1.05, 0.95])
-def test_a_clock_that_is_off_shows_in_the_following_error(
-    name: str, clock: float, tmp_path, identify
-) -> None:
+def test_a_clock_that_is_off_shows_in_the_following_error(name, clock, tmp_path, identify) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
     table = _logged(next(case for case in CASES if case.name == name))
     first = next(iter(table))
@@ -168,9 +166,7 @@ def test_a_clock_that_is_off_shows_in_the_following_error(
         ("time [ms]", "time [ms]", 1e-3, 2, "is the unit of the time right?"),
     ],
 )
-def test_a_fault_on_a_linear_axis_is_named(
-    was: str, column: str, factor: float, status: int, reason: str, tmp_path, identify
-) -> None:
+def test_a_fault_on_a_linear_axis_is_named(was, column, factor, status, reason, tmp_path, identify) -> None:
     """Friction behind the coupling counts in the common factor of a wrong scale of the current."""
     table = _logged(CASES[0])
     table[column] = factor * table.pop(was)

@@ -117,9 +117,7 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
     assert spread.slopes[0] == pytest.approx(slope, rel=0.05)
 
 
-def test_the_determinant_is_served_by_extreme_points_and_what_no_run_reduces_is_named(
-    fit: SurfaceFit,
-) -> None:
+def test_the_determinant_is_served_by_extreme_points_and_what_no_run_reduces_is_named(fit) -> None:
     result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
     assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
     assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}

@@ -46,6 +46,8 @@ def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
     for name, value in truth.items():
         found = model["parameters"][name]
         assert abs(found["value"] - value) < 4.0 * found["standard_error"] + 1e-3 * value, name
+    records = open_records(sixteen)
+    assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4
 
 
 def test_each_record_is_simulated_with_its_own_settings(sixteen: Path, cli, tmp_path) -> None:
@@ -118,8 +120,3 @@ def test_a_design_in_the_place_of_a_record_is_named(words: tuple[str, ...], sixt
     status, _, err = cli("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
     assert status == 2
     assert "a table of numbers, TOML is wanted: a record, and no design?" in err
-
-
-def test_a_list_of_records_names_them(sixteen: Path) -> None:
-    records = open_records(sixteen)
-    assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4

@@ -30,27 +30,22 @@ def test_the_window_lies_on_the_plateau(noise: float, side: float) -> None:
     assert window.largest_acceleration_rad_s2 <= window.limit_rad_s2
 
 
-def test_the_limit_is_the_stated_one() -> None:
+def test_the_limit_is_the_stated_one_and_a_run_that_never_settles_is_refused() -> None:
     time, speed = _run(0.0)
     window = find_steady_window(time, speed, SteadyCriterion(relative_per_s=0.01))
     assert window.limit_rad_s2 == pytest.approx(4.0, rel=1e-3)
-
-
-def test_a_run_that_never_settles_is_refused_with_its_acceleration() -> None:
     time = np.arange(0.0, 10.0, 1e-3)
     with pytest.raises(InputError, match=r"no steady part .* the limit"):
         find_steady_window(time, 300.0 + 40.0 * time)
 
 
-def test_correlation_time_of_an_autoregressive_series() -> None:
+def test_correlation_time_of_an_autoregressive_series_and_error_of_its_mean() -> None:
     rng = np.random.default_rng(2)
     a = 0.9
     x = lfilter([1.0], [1.0, -a], rng.standard_normal(200_000))
     assert correlation_time(x) == pytest.approx((1.0 + a) / (1.0 - a), rel=0.1)
     assert correlation_time(rng.standard_normal(50_000)) == pytest.approx(1.0, abs=0.1)
-
-
-def test_the_standard_error_of_a_correlated_mean_is_that_of_many_repetitions() -> None:
+    # that of many repetitions
     rng = np.random.default_rng(4)
     a, n, repeats = 0.95, 5000, 300
     series = lfilter([np.sqrt(1.0 - a**2)], [1.0, -a], rng.standard_normal((repeats, n)), axis=1)
@@ -126,15 +121,12 @@ def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> N
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
 
 
-def test_a_single_event_tells_no_rate() -> None:
+def test_a_single_event_tells_no_rate_and_a_given_offset_is_used_as_it_is() -> None:
     first, second = _pair(0.5, 1.0)
     early = second.slice(0, 3000)
     _, join = JOIN(first, early, method="event")
     assert join.rate_std is None
     assert "rate not estimable" in str(join)
-
-
-def test_the_given_offset_is_used_as_it_is() -> None:
     first, second = _pair(0.5, 1.0)
     joined, join = JOIN(first, second, method="given", offset_s=0.5)
     assert join.offset_s == 0.5

@@ -79,9 +79,7 @@ def test_every_column_is_accounted_for(right: Columns, identify) -> None:
         ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
     ],
 )
-def test_a_signal_that_nothing_reads_is_refused(
-    signal: str, reason: str, right: Columns, tmp_path, cli
-) -> None:
+def test_a_signal_that_nothing_reads_is_refused(signal, reason, right, tmp_path, cli) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
     (tmp_path / "r.toml").write_text(text)

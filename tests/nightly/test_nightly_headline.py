@@ -27,16 +27,13 @@ COMPARISON = Comparison(
 )
 
 
-def test_the_cause_comes_first_then_the_required_figure_in_words() -> None:
+def test_the_cause_comes_first_then_the_required_figure_in_words_and_distances_before_others() -> None:
     first = changes.main_changes(COMPARISON)[0]
     assert changes.cause_words(COMPARISON.cause) == "control.position.gain 90 → 120 1/s"
     words = changes.change_words(first, COMPARISON, [PHASE])
     assert words == "phase margin of the position loop 62.10 → 55.30 deg"
     of_a_table = changes.change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
     assert of_a_table == "gain margin of Position loop 20.00 → 5.000 dB"
-
-
-def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> None:
     many = Comparison(changes=(*COMPARISON.changes, *(change(f"x{k}", 2.0, 1.0) for k in range(49))))
     assert [c.kind for c in changes.main_changes(many)] == ["distance", *["figure"] * 4]
 
@@ -66,12 +63,17 @@ def nights(tmp_path_factory):
     return night, site
 
 
-def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
+def test_designs_with_the_same_cause_are_one_line_and_what_came_closer_to_a_limit_is_marked(nights) -> None:
     night, _ = nights
     first, second = changes.headlines(night.designs)
     assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
     assert first.cause == "control.position.gain 12 → 10 1/s"
     assert first.effect == "gain margin 12.00 → 10.00 dB"
+    night, _ = nights
+    strips = {d.name: [state for _, state in d.strip] for d in night.designs}
+    closer, steady = ["pass", "regressed"], ["pass", "pass"]
+    assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
+    assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4
 
 
 def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
@@ -82,11 +84,3 @@ def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
     page = sorted(Path(site).glob("nights/*/one-*.html"))[-1]
     text = re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8"))
     assert "control.position.gain 12 → 10 1/s: gain margin 12.00 → 10.00 dB" in " ".join(text.split())
-
-
-def test_a_night_that_came_closer_to_a_limit_is_marked_and_counted(nights) -> None:
-    night, _ = nights
-    strips = {d.name: [state for _, state in d.strip] for d in night.designs}
-    closer, steady = ["pass", "regressed"], ["pass", "pass"]
-    assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
-    assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4

@@ -65,7 +65,7 @@ def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) 
     assert nights(job("good", 12.0)).passed
 
 
-def test_a_change_is_told_with_the_parameter_behind_it(nights) -> None:
+def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -> None:
     nights(job("a", 10.0))
     (design,) = nights(job("a", 9.0)).designs
     first, cause = design.last_night.changes[0], design.last_night.cause
@@ -73,9 +73,6 @@ def test_a_change_is_told_with_the_parameter_behind_it(nights) -> None:
     assert cause.parameters == (("control.position.gain", "10 1/s", "9 1/s"),)
     assert not cause.code
     assert "parameter control.position.gain: 10 1/s → 9 1/s" in (nights.site / "summary.md").read_text()
-
-
-def test_libraries_and_code_behind_a_change_are_told(nights) -> None:
     nights(job("a", 10.0, limit=6.0))
     newer = replace(CODE, sources="t", libraries={"numpy": "3"})
     changed = replace(job("a", 10.0), payload={"name": "a", "margin": 9.0})
@@ -228,23 +225,17 @@ def test_a_study_that_cannot_be_is_refused_with_the_limit(tmp_path, jobs: list[J
     assert not (tmp_path / "s").exists()
 
 
-def test_change_points_of_known_steps_are_found_to_the_night() -> None:
+def test_change_points_of_known_steps_are_found_to_the_night_and_noise_has_none() -> None:
     rng = np.random.default_rng(3)
     clean = np.concatenate([np.full(40, 9.4), np.full(30, 8.1), np.full(30, 8.6)])
     assert [p.index for p in change_points(clean, 0.05)] == [40, 70]
     for values, wanted in ((clean + 0.1 * rng.standard_normal(100), [40, 70]), (clean[:41], [40])):
         assert [p.index for p in change_points(values, 0.05)] == wanted
-
-
-def test_noise_and_small_steps_have_no_change_point() -> None:
     rng = np.random.default_rng(4)
     result = [change_points(rng.standard_normal(200), 0.05) for _ in range(20)]
     assert sum(map(len, result)) <= 4
     for values in ([1.0, 1.0, 1.04, 1.04], [np.nan, 1.0]):
         assert change_points(np.array(values), 0.05) == ()
-
-
-def test_a_single_step_does_not_flap_and_several_runs_a_day_are_no_missing_nights() -> None:
     courses = ([1.0] * 5 + [2.0] * 5, np.arange(10.0), [1.0, 2.0, 1.0, np.nan, 2.0, 1.0])
     assert [flaps(np.array(course), 0.1) for course in courses] == [False, False, True]
     assert missing_nights([f"2026-01-01T{h:02d}:0{m}:00Z" for h in range(3) for m in range(3)]) == ()

@@ -34,7 +34,7 @@ def troubled(tmp_path_factory):
     return site, run_night(made, site, settings, **how), seen
 
 
-def test_every_design_gets_its_own_end(troubled) -> None:
+def test_every_design_gets_its_own_end_and_the_page_says_why(troubled) -> None:
     _, night, _ = troubled
     ends = {d.name: d.result.status for d in night.designs}
     took_s = {d.name: d.result.seconds for d in night.designs}
@@ -43,9 +43,6 @@ def test_every_design_gets_its_own_end(troubled) -> None:
     good = dict.fromkeys(("first", *(f"good {k}" for k in range(4))), "pass")
     assert ends == {**bad, "fails": "fail", **good}
     assert workers_left() == []
-
-
-def test_the_page_names_who_failed_and_why_and_progress_counts_to_the_end(troubled) -> None:
     site, night, seen = troubled
     assert [seen[0], seen[-1]] == [(0, 10), (10, 10)]
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
@@ -68,14 +65,11 @@ def ends_of(build: str, tasks: list[Task]) -> dict[str, Answer]:
     return ends
 
 
-def test_a_build_that_cannot_be_imported_fails_every_task_and_ends() -> None:
+def test_a_build_that_cannot_be_imported_fails_and_a_process_goes_from_job_to_job(tmp_path) -> None:
     ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)])
     assert [d.status for d in ends.values()] == ["crash"] * 3
     assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends.values())
     assert ends_of("no_such_module:build", []) == {}
-
-
-def test_a_process_goes_from_job_to_job(tmp_path) -> None:
     tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode="pid").payload) for k in range(6)]
     ends = ends_of(BUILD, tasks)
     assert {answer.status for answer in ends.values()} == {"done"}

@@ -74,13 +74,27 @@ def refused(run, words: str) -> str:
     return made.said
 
 
-def test_a_record_with_a_hole(run, tmp_path) -> None:
+def test_a_record_is_a_command_from_its_start_and_a_log_of_events_is_held(run, tmp_path) -> None:
     times = [0.0, 0.1, 0.2, 0.5, 0.6]
     path = table(tmp_path / "record.csv", "t,angle", times, times)
     assert "hole in time from 0.2 s to 0.5 s" in refused(run, f"--record {path}")
     table(path, "t,angle", 0.1 * np.arange(11), np.arange(11) / 10)
     facts = run(f"--record {path} --duration 1.5").facts
     assert np.degrees(facts["final_output_rad"]) == pytest.approx(1.0, abs=1e-3)
+    path = table(tmp_path / "record.csv", "t,angle", [0, 1], [0, 1])
+    assert "--record and --command sine: one of them" in refused(run, f"--record {path} --command sine")
+    assert run(f"--record {path} --command recorded --duration 0.1").status == 0
+    k = np.arange(11)
+    path = table(tmp_path / "record.csv", "t,angle", 7.0 + 0.01 * k, 0.1 + 0.01 * k)
+    reference = np.degrees(run(f"--record {path} --start 0.05").rows["reference_rad"])
+    assert not reference[:500].any()
+    assert reference[500] == pytest.approx(0.1, rel=1e-12)
+    assert reference[-1] == pytest.approx(0.2, rel=1e-3)
+    path = table(tmp_path / "log.csv", "t,angle", [0, 0.01, 0.013, 0.1], [0, 0.1, 0.05, 0.2])
+    assert "--held" in refused(run, f"--record {path}")
+    reference = np.degrees(run(f"--record {path} --held --duration 0.12").rows["reference_rad"])
+    wanted = [0, 0.1, 0.1, 0.05, 0.05, 0.2, 0.2]
+    assert reference[[99, 100, 129, 130, 999, 1000, 1199]] == pytest.approx(wanted)
 
 
 def test_linear_axis_speaks_millimetres(run) -> None:
@@ -113,21 +127,6 @@ def test_every_command_begins_at_its_start(kind: str, run) -> None:
     assert np.abs(reference[1000:1200]).max() > 0.0
 
 
-def test_a_record_begins_at_its_start(run, tmp_path) -> None:
-    k = np.arange(11)
-    path = table(tmp_path / "record.csv", "t,angle", 7.0 + 0.01 * k, 0.1 + 0.01 * k)
-    reference = np.degrees(run(f"--record {path} --start 0.05").rows["reference_rad"])
-    assert not reference[:500].any()
-    assert reference[500] == pytest.approx(0.1, rel=1e-12)
-    assert reference[-1] == pytest.approx(0.2, rel=1e-3)
-
-
-def test_a_record_is_a_command(run, tmp_path) -> None:
-    path = table(tmp_path / "record.csv", "t,angle", [0, 1], [0, 1])
-    assert "--record and --command sine: one of them" in refused(run, f"--record {path} --command sine")
-    assert run(f"--record {path} --command recorded --duration 0.1").status == 0
-
-
 @pytest.mark.parametrize(
     ("words", "seconds", "rising"),
     [
@@ -143,7 +142,7 @@ def test_cycles_are_those_played(words: str, seconds: float, rising: int, run) -
     assert np.flatnonzero((reference[:-1] < 0.0) & (reference[1:] >= 0.0)).size == rising
 
 
-def test_a_load_keeps_its_own_clock(run, tmp_path) -> None:
+def test_a_load_keeps_its_own_clock_or_that_of_the_record(run, tmp_path) -> None:
     """Rows from 0.1 s on: until then there is no load, at 0.15 s half of what it grows to."""
     path = table(tmp_path / "load.csv", "t,M", [0.1, 0.2], [2, 4])
     load = run(f"--command hold --amplitude 0 --load-file {path} --duration 0.3").rows["load_Nm"]
@@ -151,10 +150,7 @@ def test_a_load_keeps_its_own_clock(run, tmp_path) -> None:
     assert load[[1000, 1500, 2000, 2999]] == pytest.approx([2.0, 3.0, 4.0, 4.0], rel=1e-12)
     with pytest.raises(InputError, match="must be 0 or later"):
         loads.series([-2.0, -1.0], [1.0, 1.0])
-
-
-def test_a_load_file_is_on_the_clock_of_the_record(run, tmp_path) -> None:
-    """A record from 5 s on, held at zero, and a load from 5.5 s on, of the same clock: half a second late."""
+    # a record from 5 s on, held at zero, and a load from 5.5 s on, of the same clock: half a second late
     record = table(tmp_path / "record.csv", "t,deg", 5.0 + 0.1 * np.arange(11), [0] * 11)
     load = table(tmp_path / "load.csv", "t,Nm", [5.5, 5.6, 5.7], [2] * 3)
     early = table(tmp_path / "early.csv", "t,Nm", [0.5, 0.6, 0.7], [2] * 3)
@@ -177,14 +173,6 @@ def test_content_above_nyquist_is_refused(run, tmp_path) -> None:
         made = run(f"ilr33-amber-multirate --record {table(tmp_path / 'record.csv', 't,angle', t, angle)}")
         assert made.status == status
         assert ("above the Nyquist frequency" in made.said) == (status == 2)
-
-
-def test_an_event_log_is_held(run, tmp_path) -> None:
-    path = table(tmp_path / "log.csv", "t,angle", [0, 0.01, 0.013, 0.1], [0, 0.1, 0.05, 0.2])
-    assert "--held" in refused(run, f"--record {path}")
-    reference = np.degrees(run(f"--record {path} --held --duration 0.12").rows["reference_rad"])
-    wanted = [0, 0.1, 0.1, 0.05, 0.05, 0.2, 0.2]
-    assert reference[[99, 100, 129, 130, 999, 1000, 1199]] == pytest.approx(wanted)
 
 
 AMBER = load_design("ilr33-amber")

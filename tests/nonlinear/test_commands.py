@@ -85,21 +85,6 @@ def test_cells_that_are_no_numbers(tmp_path) -> None:
         read_columns(path, ("b",))
 
 
-def test_loads_act_as_friction_or_as_torque() -> None:
-    kM, CM = AMBER.motor.torque_constant_Nm_A, AMBER.friction.load_coefficient
-    free, six = changed(AMBER, load={"path": "back-drivable"}), np.full(11, 6.0)
-    held = ((AMBER, loads.series(np.linspace(0.0, 1.0, 11), six)), (free, loads.constant(6.0)), (AMBER, 0.0))
-    locked_A, driven_A, none_A = (
-        simulate(design, commands.ramp(0.15), 1.0, load).current_A[-1] for design, load in held
-    )
-    assert locked_A - none_A == pytest.approx(6.0 * CM / kM, rel=1e-6)
-    assert driven_A - none_A == pytest.approx((6.0 * CM - 6.0 / AMBER.total_ratio) / kM, rel=1e-6)
-    slope = simulate(AMBER, commands.step(0.02), 0.5, loads.proportional(-300.0))
-    still = simulate(AMBER, commands.step(0.02), 0.5)
-    assert slope.output_angle_rad[-1] == pytest.approx(0.02, rel=0.02)
-    assert slope.motor_speed_rad_s.max() < still.motor_speed_rad_s.max()
-
-
 def test_extra_torque_and_initial_state() -> None:
     start, hold = State(motor_angle_rad=10.0), commands.hold(10.0 / AMBER.total_ratio)
     run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=1e-3)

@@ -36,12 +36,24 @@ def twist_of(run: Run) -> np.ndarray:
     return run.states[:, 3] / N - run.states[:, 4]
 
 
-def test_free_vibration_of_two_masses() -> None:
+def test_free_vibrations_of_both_masses_of_the_motor_and_of_the_load() -> None:
     design, ticks = two_mass(1e-3, source=True, coupling=TIGHT), np.arange(201)
     run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, 0.5, 0.0))
     np.testing.assert_allclose(twist_of(run), 0.05 * np.cos(RESONANCE * ticks * 1e-3), atol=1e-13)
     common = J_M * N * run.states[:, 3] + J_L * run.states[:, 4]
     np.testing.assert_allclose(common, common[0], rtol=1e-13)
+    # the load sticks
+    design = two_mass(1e-3, source=True, coupling=TIGHT, load_friction={"dry_torque_Nm": 50.0})
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
+    w0 = np.sqrt(K / (J_M * N * N))
+    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
+    assert not run.states[:, 4].any()
+    # behind a self-locking stage
+    design = two_mass(1e-3, coupling=TIGHT, path="self-locking", friction={"load_coefficient": 0.2})
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
+    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
+    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
+    assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
 def bounce(t: np.ndarray, v: float) -> np.ndarray:
@@ -92,22 +104,6 @@ def test_damped_contact_parts_at_no_torque() -> None:
     assert run.states[90, 1] / N - run.states[90, 2] == pytest.approx(rate, rel=1e-11)
 
 
-def test_motor_swings_on_its_spring_while_the_load_sticks() -> None:
-    design = two_mass(1e-3, source=True, coupling=TIGHT, load_friction={"dry_torque_Nm": 50.0})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
-    w0 = np.sqrt(K / (J_M * N * N))
-    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
-    assert not run.states[:, 4].any()
-
-
-def test_load_swings_behind_a_self_locking_stage() -> None:
-    design = two_mass(1e-3, coupling=TIGHT, path="self-locking", friction={"load_coefficient": 0.2})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
-    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
-    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
-    assert np.abs(run.states[:, 3]).max() < 1e-18
-
-
 def quarter(x: float, bends: list[tuple[float, float, float]]) -> list[tuple[float, ...]]:
     """Free swing of the reduced inertia from rest at a twist to zero, by piece: (t, w, centre, size, phase).
 
@@ -150,17 +146,14 @@ def rms_differences(limit: dict[str, float] | None, couplings: list[dict[str, fl
     return [float(np.sqrt(np.mean((angle - last) ** 2))) for angle in angles]
 
 
-def test_stiff_coupling_tends_to_the_rigid_drive() -> None:
+def test_stiff_tends_to_rigid_and_little_play_to_none() -> None:
     """The difference falls with 1/k, to where rounding of a vibration of 1e6 rad/s is."""
     stiff = [{"stiffness_Nm_rad": k, "damping_Nms_rad": 1e-4 * k, "play_rad": 0.0} for k in (1e4, 1e5, 1e6)]
     differences = rms_differences(None, stiff)
     assert differences[0] < 1e-3
     assert differences[1] == pytest.approx(differences[0] / 10, rel=0.1)
     assert differences[2] == pytest.approx(differences[1] / 10, rel=0.1)
-
-
-def test_no_play_is_the_limit_of_little_play() -> None:
-    """Without damping; the difference falls with b."""
+    # without damping the difference falls with b
     differences = rms_differences(TIGHT, [IDEAL | {"play_rad": play} for play in (1e-6, 1e-8)])
     assert differences[0] < 1e-4
     assert differences[1] < 0.02 * differences[0]

@@ -105,15 +105,12 @@ def test_start_from_rest_without_friction() -> None:
     assert_same(bare_drive(Friction(), 1e-4), np.sin(0.3 * np.arange(100.0)), State(), 0)
 
 
-def test_friction_above_the_stall_torque_never_moves() -> None:
+def test_friction_above_the_stall_torque_never_moves_and_a_coasting_drive_comes_to_rest() -> None:
     run = drive_open(bare_drive(Friction(dry_torque_Nm=2.0), 1e-4), np.full(2000, 12.0), State())
     assert run.current_A[-1] == pytest.approx(12.0 / 0.055, rel=1e-12)  # stall current, 1.29 N m
     assert not run.motor_speed_rad_s.any()
     assert not run.motor_angle_rad.any()
     assert (run.events, run.stick_fraction) == (0, 1.0)
-
-
-def test_comes_to_rest_and_stays() -> None:
     run = drive_open(bare_drive(DRY, 1e-4), np.zeros(3000), State(motor_speed_rad_s=300.0))
     assert run.motor_speed_rad_s[-1] == 0.0
     assert np.ptp(run.motor_angle_rad[-100:]) == 0.0

@@ -54,13 +54,16 @@ def test_scaling_of_torque_current_and_voltage() -> None:
     np.testing.assert_allclose(b.voltage_V, a.voltage_V, rtol=0, atol=1e-9)
 
 
-def test_a_narrow_tanh_tends_to_coulomb() -> None:
+def test_a_narrow_tanh_tends_to_coulomb_but_knows_no_rest() -> None:
     drives = (AMBER, *map(smooth, (4.0, 0.4, 0.04)))
     exact, *runs = (simulate(one, commands.sine(0.01, 2.0), 0.5, 8.0).output_angle_rad for one in drives)
     errors = [np.abs(run - exact).max() for run in runs]
     assert errors[1] < errors[0] / 5.0
     assert errors[2] < errors[1] / 5.0
     assert errors[2] < 2e-7
+    run = simulate(smooth(), commands.hold(), 0.01)
+    assert run.stick_fraction == 0.0
+    assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
 
 
 def test_fourth_order() -> None:
@@ -100,12 +103,6 @@ def test_tanh_against_an_integrator(tolerance: float) -> None:
     assert np.abs(run.motor_speed_rad_s - speeds).max() < 10.0 * tolerance * f.smoothing_speed_rad_s + 1e-9
 
 
-def test_the_smoothed_law_knows_no_rest() -> None:
-    run = simulate(smooth(), commands.hold(), 0.01)
-    assert run.stick_fraction == 0.0
-    assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
-
-
 BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, seconds, load, what happens in it
     ("ilr33-amber", 0.0002, 3.0, 1.0, 8.0, "stick"),
     ("ilr33-amber", 0.0873, 1.0, 1.0, 4.0, "speed"),
@@ -116,9 +113,7 @@ BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, secon
 
 
 @pytest.mark.parametrize(("name", "size", "frequency", "seconds", "load", "what"), BALANCED)
-def test_balance(
-    name: str, size: float | None, frequency: float, seconds: float, load: float, what: str
-) -> None:
+def test_balance(name, size, frequency, seconds, load, what) -> None:
     """And what is asked of the energies does not change the motion."""
     design = load_design(name)
     size = size or design.validation.full_deflection_rad / 4
@@ -133,7 +128,7 @@ def test_balance(
         assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
 
 
-def test_asymmetric_back_drivable_with_fractional_delay() -> None:
+def test_balance_with_every_feature_and_every_loss_of_a_steady_speed() -> None:
     friction = {
         "breakaway_ratio": 1.3, "dry_torque_reverse_Nm": 4e-3, "viscous_reverse_Nms_rad": 1e-5,
         "offset_torque_Nm": 5e-4,
@@ -147,9 +142,6 @@ def test_asymmetric_back_drivable_with_fractional_delay() -> None:
     assert abs(run.energy.conversion_J) > 1e-3
     assert abs(run.energy.output_work_J) > 1e-6
     assert run.events > 5
-
-
-def test_every_loss_of_a_steady_speed() -> None:
     run = simulate(AMBER, commands.ramp(600.0 / AMBER.total_ratio), 2.0, 8.0, energy=True)
     energy, turned = run.energy, run.final.motor_angle_rad
     assert energy.dry_friction_J == pytest.approx((2.25e-3 + 8 * 1.34e-3) * turned, rel=1e-9)

@@ -94,7 +94,7 @@ def test_h3_an_unsteady_point_shows() -> None:
     assert late < 1e-6
 
 
-def test_sawtooth_of_the_paper() -> None:
+def test_sawtooth_of_the_paper_and_a_step_on_3_V_without_windup() -> None:
     """5 deg at 1 Hz asks for 31 deg/s, the drive gives 22.7: straight flanks at the speed limit."""
     run = simulate(AMBER, commands.sine(radians(5.0), 1.0), 3.0)
     flank = run.limit_active("speed")
@@ -103,6 +103,12 @@ def test_sawtooth_of_the_paper() -> None:
     assert np.median(speed) == pytest.approx(942.5, rel=2e-3)
     rate = degrees(np.median(speed)) / AMBER.total_ratio
     assert rate == pytest.approx(22.7, abs=0.05)
+    # saturated half of the way, no more overshoot than the braking costs
+    run = simulate(changed(AMBER, limits={"voltage_V": 3.0}), commands.step(0.1), 1.0)
+    assert run.limits["voltage"].fraction > 0.2
+    assert np.abs(run.voltage_V).max() <= 3.0
+    assert run.output_angle_rad.max() < 0.1 * 1.01
+    assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -124,15 +130,6 @@ def test_conditional_integration(e: float, integral: float, output: float, kept:
     assert drive.control(e, 0.0, 0.0, 0.0) == output
     assert drive.value("current_integrator") == kept
     assert (drive.value("flags_current") == 8.0) == acts
-
-
-def test_voltage_saturation_leaves_no_windup() -> None:
-    """A step on 3 V of supply: saturated half of the way, no more overshoot than the braking costs."""
-    run = simulate(changed(AMBER, limits={"voltage_V": 3.0}), commands.step(0.1), 1.0)
-    assert run.limits["voltage"].fraction > 0.2
-    assert np.abs(run.voltage_V).max() <= 3.0
-    assert run.output_angle_rad.max() < 0.1 * 1.01
-    assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
 
 
 def test_flag_bits_are_those_of_the_limiters() -> None:

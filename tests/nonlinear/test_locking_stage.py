@@ -85,7 +85,7 @@ def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], step * np.cumsum(voltage_V)[:-1]])
 
 
-def test_the_bus_limits_the_voltage_at_each_tick() -> None:
+def test_the_bus_limits_the_voltage_at_each_tick_and_a_constant_one_changes_nothing() -> None:
     design = _integrator(None)
     wanted = 9.0 * np.sin(6.0 * TIME)
     run = simulate(design, commands.sampled(TIME, wanted), 1.0, supply=commands.sampled(TIME, BUS))
@@ -94,6 +94,10 @@ def test_the_bus_limits_the_voltage_at_each_tick() -> None:
     np.testing.assert_allclose(run.voltage_V, applied, rtol=0, atol=1e-12)
     np.testing.assert_allclose(run.motor_speed_rad_s, _sampled_motion(design, applied), atol=1e-9)
     assert run.limits["voltage"].fraction == pytest.approx(np.mean(applied != wanted))
+    command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
+    plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)
+    np.testing.assert_array_equal(plain.output_angle_rad, supplied.output_angle_rad)
+    np.testing.assert_array_equal(plain.limit_flags, supplied.limit_flags)
 
 
 def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> None:
@@ -113,13 +117,6 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     assert run.limits["voltage"].fraction > 0.0
     np.testing.assert_allclose(run.voltage_V, expected, rtol=0, atol=1e-9)
     assert run.final.motor_angle_rad == pytest.approx(angle, rel=1e-9)
-
-
-def test_a_constant_supply_at_the_nominal_voltage_changes_nothing() -> None:
-    command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
-    plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)
-    np.testing.assert_array_equal(plain.output_angle_rad, supplied.output_angle_rad)
-    np.testing.assert_array_equal(plain.limit_flags, supplied.limit_flags)
 
 
 def test_a_supply_that_cannot_be_is_refused() -> None:

@@ -207,7 +207,7 @@ def test_profile_keeps_its_limits_and_arrives() -> None:
             assert np.abs(third).max() < 200.0 * (1 + 1e-4)
 
 
-def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
+def test_profile_leaves_a_command_within_its_limits_untouched_and_holds_that_of_a_speed() -> None:
     """A cosine from its crest, where the start keeps the limits as well."""
     slow = replace(AMBER, command=model.Command(rate_rad_s=0.06))
     shaped = replace(AMBER, command=model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0))
@@ -218,9 +218,6 @@ def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
         assert np.array_equal(run.output_angle_rad, free.output_angle_rad)
         assert run.limits["profile"].fraction == 0.0
     assert simulate(shaped, commands.step(0.1), 0.3).limits["profile"].active
-
-
-def test_the_command_of_a_speed_drive_keeps_its_acceleration() -> None:
     design = changed(AMBER, friction=FREE, controller={"position": None})
     slow = replace(design, command=model.Command(acceleration_rad_s2=2.0))
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio

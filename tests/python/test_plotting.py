@@ -94,7 +94,7 @@ def test_the_border_and_the_map() -> None:
         LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map()
 
 
-def test_cells_keep_their_colours_when_some_are_missing() -> None:
+def test_cells_keep_their_colours_when_some_are_missing_and_pages_have_the_same() -> None:
     kind = np.array([[0, 2], [2, 3]])
     panel = plot_map(np.array([1.0, 10.0]), np.array([1.0, 2.0]), kind, ("none", "a", "b", "c"))
     drawn = panel.collections[0]
@@ -102,9 +102,6 @@ def test_cells_keep_their_colours_when_some_are_missing() -> None:
     assert [tuple(np.round(drawn.cmap(k)[:3], 2)) for k in (1, 2)] == [
         tuple(round(int(COLOURS[k][i : i + 2], 16) / 255, 2) for i in (1, 3, 5)) for k in (2, 3)
     ]
-
-
-def test_pages_and_notebooks_have_the_same_colours() -> None:
     assert set(COLOURS) == {paint.COLOURS[name] for name in (*style.SERIES, "ink", "muted")}
 
 

@@ -49,13 +49,10 @@ def many(one) -> Comparison:
     return replace(one, variants=tuple(variants))
 
 
-def test_few_designs_are_all_shown(many) -> None:
+def test_few_are_all_shown_and_of_many_best_and_worst_of_everything_with_their_marks(many) -> None:
     few = replace(many, variants=many.variants[:MANY])
     assert choice(few) is few
     assert few.everything is few
-
-
-def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> None:
     shown = choice(many)
     assert 2 * len(many.base.verdicts) <= len(shown.variants) <= MANY
     assert shown.everything is many
@@ -68,9 +65,6 @@ def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> No
             assert {min(distances, key=distances.get), max(distances, key=distances.get)} <= names
     order = [one.variant.name for one in many.variants if one.variant.name in names]
     assert order == [one.variant.name for one in shown.variants]
-
-
-def test_marks_of_best_and_worst_are_those_of_all_designs(many) -> None:
     shown = choice(many)
     for name in many.names:
         assert shown.ends(name) == many.ends(name)

@@ -30,14 +30,11 @@ def sampler(*factors, correlation=None, seed=0, table=None):
     return Sampler(tuple(factors), matrix, table, seed)
 
 
-def test_a_sample_is_the_same_alone_and_in_any_chunk():
+def test_a_sample_is_the_same_alone_and_in_any_chunk_and_seed_zero_is_a_seed():
     study = sampler(BOX, BELL, correlation=0.5, seed=7)
     whole = study.draw(0, 1000)
     assert np.array_equal(np.vstack([study.draw(0, 1), study.draw(1, 332), study.draw(333, 667)]), whole)
     assert np.array_equal(study.draw(777, 1)[0], whole[777])
-
-
-def test_seed_zero_is_a_seed():
     zero, again, one = (sampler(BOX, seed=s).draw(0, 8) for s in (0, 0, 1))
     assert np.array_equal(zero, again)
     assert not np.array_equal(zero, one)
@@ -45,14 +42,11 @@ def test_seed_zero_is_a_seed():
         sampler(BOX, seed=-1)
 
 
-def test_uniform_fills_its_width_evenly():
+def test_uniform_is_even_and_normals_have_their_moments_and_coefficient():
     values = sampler(BOX).draw(0, 4096)[:, 0]
     assert 8.0 <= values.min() < values.max() <= 12.0
     counts, _ = np.histogram(values, bins=64, range=(8, 12))
     assert np.all(counts == 64)  # what a Sobol sequence promises and random numbers do not
-
-
-def test_normal_and_truncated_normal_have_their_moments():
     values = sampler(BELL).draw(0, 8192)[:, 0]
     assert values.mean() == pytest.approx(5.0, abs=1e-3)
     assert values.std() == pytest.approx(1.0, abs=2e-3)
@@ -62,9 +56,6 @@ def test_normal_and_truncated_normal_have_their_moments():
     # variance of a standard normal cut at +-1: 1 - 2 phi(1)/(2 Phi(1) - 1)
     phi, mass = np.exp(-0.5) / np.sqrt(2 * np.pi), 0.6826894921370859
     assert kept.var() == pytest.approx(1 - 2 * phi / mass, rel=2e-3)
-
-
-def test_correlated_normals_have_their_coefficient():
     pair = sampler(normal(R, 5.0), normal(L, 5.0), correlation=-0.8).draw(0, 8192)
     assert np.corrcoef(pair.T)[0, 1] == pytest.approx(-0.8, abs=2e-3)
 

@@ -113,14 +113,11 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
     assert (phase >= 62.0, width >= 50.0) == (True, True)
 
 
-def test_a_design_that_meets_all_is_left_as_it_is():
+def test_a_design_that_meets_all_is_left_as_it_is_and_neutral_elements_change_nothing():
     design = servo(need("phase_margin", 30.0))
     tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
     assert (tuned.feasible, tuned.placed, tuned.design.controller) == (True, (), design.controller)
-
-
-def test_neutral_elements_change_nothing():
-    """A notch of depth 1 is a factor 1; feed-forward starts at what the design has."""
+    # a notch of depth 1 is a factor 1; feed-forward starts at what the design has
     design = servo(stiffness=RESONANT, position=PositionLoop(gain=20.0, feedforward=0.4))
     placed, variables = place(design, ("notch", "feedforward"))
     starts = {v.path: v.start for v in variables}
