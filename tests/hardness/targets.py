@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,7 @@ from analyses.records.open_record import open_record
 from analyses.records.readers import read_mat_record, read_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
+from analyses.studies import study
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
@@ -55,33 +57,14 @@ class Target:
     fault: Fault = damaged
 
 
+def example(module: ModuleType) -> bytes:
+    """The file that a command prints with --example."""
+    return (module.__doc__ or "").split("::", 1)[1].replace("\n    ", "\n").encode()
+
+
 SETTINGS = b'[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
-STUDY = b"""[study]
-name = "s"
-base = "ctms-motor-position"
-[[variant]]
-name = "v"
-override = { "control.position.gain" = "12 V/rad" }
-[[sweep]]
-parameter = "motor.resistance"
-from = "1 ohm"
-to = "2 ohm"
-points = 3
-[[grid]]
-axes = [{ parameter = "motor.inductance", values = ["0.5 H", "0.6 H"] }]
-[[requirement]]
-id = "b"
-quantity = "bandwidth"
-loop = "position"
-minimum = "1 Hz"
-[monte_carlo]
-samples = 10
-seed = 3
-[nightly]
-pdf = false
-tolerance = { "*margin*" = "0.5 deg" }
-"""
-CAMPAIGN = (campaign_file.__doc__ or "").split("::", 1)[1].replace("\n    ", "\n").encode()
+STUDY = example(study) + b'tolerance = { "*margin*" = "0.5 deg" }\n'
+CAMPAIGN = example(campaign_file)
 RECORD = b"""file = "log.csv"
 separator = ","
 time = { column = "t", unit = "ms" }
@@ -311,13 +294,14 @@ def parquet_file() -> bytes:
 def history_files() -> dict[str, bytes]:
     import tempfile
 
-    from nightly_fakes import CODE, INLINE, job, study
+    from nightly_fakes import CODE, INLINE, job
+    from nightly_fakes import study as of
 
     from reports.nightly.night import run_night
 
     with tempfile.TemporaryDirectory() as folder:
         for margin in (10.0, 11.0):
-            run_night(study(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
+            run_night(of(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
         return {path.name: path.read_bytes() for path in (Path(folder) / "s.state").rglob("*.json")}
 
 

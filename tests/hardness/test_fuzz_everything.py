@@ -9,7 +9,6 @@ from fuzz import attack, written
 from targets import Target, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
-from actuator_lti.errors import InputError
 from analyses.estimation.least_squares import solve
 from analyses.records.differentiation import filtered_motion
 from tests import refusals
@@ -108,14 +107,11 @@ def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     assert words in refused("report", json.dumps(made).encode())
 
 
-@pytest.mark.parametrize("rows", [1, 2])
-def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
-    with pytest.raises(InputError, match=rf"{rows} sample\(s\) are left to fit 2 parameter"):
-        solve(np.eye(3)[:rows, :2], np.ones(rows))
+def test_a_fit_of_too_few_samples_and_rows_too_close_for_the_filter() -> None:
+    for rows in (1, 2):
+        words = f"{rows} sample(s) are left to fit 2 parameter"
+        refusals.refused(solve, np.eye(3)[:rows, :2], np.ones(rows), words=words)
     assert solve(np.eye(3)[:, :2], np.ones(3)).values == pytest.approx([1.0, 1.0])
-
-
-@pytest.mark.parametrize("period_s", [5e-324, 1e-300, 1e-9])
-def test_rows_too_close_for_the_filter(period_s: float) -> None:
-    with pytest.raises(InputError, match="too low for rows"):
-        filtered_motion(np.linspace(0.0, 1.0, 100), period_s, cutoff_hz=50.0, order=4)
+    for period_s in (5e-324, 1e-300, 1e-9):
+        asked = {"cutoff_hz": 50.0, "order": 4, "words": "too low for rows"}
+        refusals.refused(filtered_motion, np.linspace(0.0, 1.0, 100), period_s, **asked)

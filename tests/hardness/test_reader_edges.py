@@ -35,7 +35,7 @@ def lists(levels: int) -> str:
     return "[" * levels + "]" * levels
 
 
-def test_depth() -> None:
+def test_depth_values_texts_keys_and_size() -> None:
     assert parse_toml(tables(TOML_DEPTH.most), "f")
     assert "nested too deeply" in refused(parse_toml, tables(TOML_DEPTH.most + 1))
     assert parse_json(lists(JSON_DEPTH.most + 1), "f")  # the innermost holds nothing
@@ -43,8 +43,6 @@ def test_depth() -> None:
     for read, text in ((parse_toml, "a = " + "[" * 10_000), (parse_json, "[" * 10_000)):
         assert "nested too deeply" in refused(read, text)
 
-
-def test_values_texts_keys_and_size() -> None:
     def text(count: int) -> str:  # with the file and the list there are two more
         return f"a = [{'1,' * (count - 2)}]"
 
@@ -157,6 +155,13 @@ def test_twenty_thousand_runs_are_read_and_one_more_is_not(tmp_path) -> None:
         (b'separator = ";"', b"separator = { a = 1 }", "separator"),
         (b"[campaign]", b"[campaign]\n" + b"a." * 100 + b"b = 1", "nested too deeply"),
         (b'name = "Bench, March"', b'name = "' + b"x" * 20_000 + b'"', "20000 characters"),
+        (b'"correlation"', b'"guess"', "join.method = 'guess': one of correlation, event, given"),
+        (b'signals.current = { column = "I", unit = "mA" }', b"", "drive.signals.current: is needed"),
+        (b'unit = "rpm"', b'unit = "kg"', "must be a unit like rad/s"),
+        (b"torque_accuracy =", b"torque_acuracy =", 'did you mean "torque_accuracy"'),
+        (b'speed = "104.7 rad/s"', b'speed = "105 N"', "run[1].speed"),
+        (b"[[run]]", b"[[run]]" + CAMPAIGN.partition(b"[[run]]")[2] + b"[[run]]", "given twice"),
+        (b"[campaign]", b"[campaign", "not TOML"),
     ],
 )
 def test_a_campaign_is_read_as_strictly_as_a_design(tmp_path, old, new, words) -> None:

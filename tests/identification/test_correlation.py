@@ -31,23 +31,17 @@ def test_emps_is_met_within_the_published_errors(emps, signal, published, reache
     assert 100.0 * emps[signal].relative_error <= published
 
 
-def test_emps_begins_in_motion_and_so_does_the_model(emps: CorrelationResult) -> None:
+def test_emps_begins_in_motion_and_a_late_design_or_another_axis_is_seen(emps, emps_file) -> None:
     assert abs(emps["position"].delay_s or 1.0) < 1e-4
     assert all(share == 0.0 for share in emps.limits.values())
-
-
-def test_one_sample_more_of_delay_in_the_design_is_seen(emps_file: Path) -> None:
-    """The comparison can tell a wrong model: 1 ms of computing delay makes the force 40 % worse."""
+    # 1 ms of computing delay makes the force 40 % worse
     late = with_values(load_design("emps"), {"control.computing_delay": 1e-3})
     assert 100.0 * correlate_record(late, open_record(emps_file))["force"].relative_error > 7.0
-
-
-def test_a_record_of_another_axis_is_refused(emps_file: Path) -> None:
     with pytest.raises(InputError, match='the signal "reference" is needed for a rotary axis'):
         correlate_record(load_design("ilr33-amber"), open_record(emps_file))
 
 
-def test_figures_of_likeness_by_construction() -> None:
+def test_figures_of_likeness_by_construction_and_of_flat_signals() -> None:
     time = np.linspace(0.0, 1.0, 1001)
     measured = 2.0 + np.sin(20.0 * time)
     result = compare_signals("speed", "rad/s", time, measured, measured + 0.1)
@@ -55,6 +49,10 @@ def test_figures_of_likeness_by_construction() -> None:
     about_mean = np.linalg.norm(measured - measured.mean())
     assert result.fit_percent == pytest.approx(100.0 * (1.0 - 0.1 * np.sqrt(1001) / about_mean), rel=1e-9)
     assert result.max_error == pytest.approx(0.1)
+    time = np.arange(0.0, 1.0, 0.01)
+    assert compare_signals("x", "1", time, np.ones(100), np.sin(time)).delay_s is None
+    with pytest.raises(InputError, match="zero throughout"):
+        compare_signals("x", "1", time, np.zeros(100), np.ones(100))
 
 
 def test_a_fit_below_zero_does_not_pass(tmp_path, cli) -> None:
@@ -78,10 +76,3 @@ def test_the_delay_is_found_to_a_fraction_of_a_sample(delay: float) -> None:
 
     result = compare_signals("speed", "rad/s", time, signal(time - delay), signal(time))
     assert result.delay_s == pytest.approx(delay, abs=2e-6)
-
-
-def test_flat_signals_have_no_delay_and_zero_is_refused() -> None:
-    time = np.arange(0.0, 1.0, 0.01)
-    assert compare_signals("x", "1", time, np.ones(100), np.sin(time)).delay_s is None
-    with pytest.raises(InputError, match="zero throughout"):
-        compare_signals("x", "1", time, np.zeros(100), np.ones(100))

@@ -107,25 +107,3 @@ def test_bad_input_is_one_line_and_status_2(arguments, reason, tmp_path, monkeyp
     rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99))
     Path("r.csv").write_text(f"time_s,position_m,force_N\n{rows}")
     assert reason in cli.refused(*arguments)
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "reason"),
-    [
-        ('"correlation"', '"guess"', "join.method = 'guess': one of correlation, event, given"),
-        ('signals.current = { column = "Current", unit = "mA" }', "", "drive.signals.current: is needed"),
-        ('unit = "rpm"', 'unit = "kg"', "must be a unit like rad/s"),
-        ("torque_accuracy = 0.005", "torque_acuracy = 0.005", 'did you mean "torque_accuracy"'),
-        ('speed = "105 rad/s"', 'speed = "105 N"', "run[1].speed"),
-        ('id = "02"', 'id = "01"', "given twice"),
-        ("[campaign]", "[campaign", "not TOML"),
-    ],
-)
-def test_a_bad_campaign_file_is_one_line_with_its_key(old, new, reason, campaign, tmp_path, cli) -> None:
-    text = campaign.read_text()
-    assert old in text
-    path = tmp_path / "bad.toml"
-    path.write_text(text.replace(old, new, 1))
-    err = cli.refused("identify", path)
-    assert "bad.toml" in err
-    assert reason in err

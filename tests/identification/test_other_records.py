@@ -1,23 +1,16 @@
 """Published: Janot, Gautier, Brunot 2019 (EMPS), to the printed digits; and a gimbal of large inductance."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from actuator_lti import load_design
 from analyses.identification.inverse import fit_records
 from analyses.records.open_record import open_record
-from analyses.records.record import Record
 
 
-@pytest.fixture(scope="module")
-def emps(emps_file: Path) -> Record:
-    return open_record(emps_file)
-
-
-def test_friction_meets_the_published_digits(emps: Record) -> None:
+def test_friction_meets_the_published_digits(emps_file) -> None:
     """Standard errors: those of white residuals, as published; `covariance` counts their correlation."""
+    emps = open_record(emps_file)
     model, other = (
         fit_records(load_design("emps"), [emps], form=form) for form in ("symmetric", "per-direction")
     )

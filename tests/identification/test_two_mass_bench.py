@@ -13,6 +13,7 @@ from analyses.identification.frequency_bench import FrequencyResult, identify_fr
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 from examples.virtual_bench.__main__ import main as simulate
 from tests.identification.bench_records import HALF_PLAY, two_mass_design
+from tests.refusals import refused
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -82,10 +83,8 @@ def test_where_the_bench_cannot_measure_and_its_record_does_not_tell() -> None:
             _guess(), sweep_record(design, seed=0), play_record=reversal_record(design, seed=0).slice(0, 200)
         )
     design = two_mass_design()
-    with pytest.raises(InputError, match="leaves its flank"):
-        sweep_record(design, TwoMassPlan(moment_Nm=0.05))
-    with pytest.raises(InputError, match="current loop and a coupling"):
-        sweep_record(replace(design, coupling=None))
+    refused(sweep_record, design, TwoMassPlan(moment_Nm=0.05), words="leaves its flank")
+    refused(sweep_record, replace(design, coupling=None), words="current loop and a coupling")
 
 
 def test_a_small_friction_is_not_held_at_zero() -> None:

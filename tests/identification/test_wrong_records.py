@@ -133,12 +133,18 @@ def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, cli
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, cli) -> None:
+def test_a_right_campaign_is_simulated_again_and_a_coefficient_can_be_fixed(bench, cli, tmp_path) -> None:
     told = cli.data("identify", bench / "campaign.toml", "--suggest", "0")
     checks = {check["id"]: check for check in told["items"]}
     assert checks["written-the runs"]["value"] < 0.005
     inputs = {(row["file"], row["column"]) for row in told["result"]["inputs"]}
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
+    words = ("identify", bench / "campaign.toml", "--fix")
+    fit = cli.data(*words, "friction.viscous=5.25 uN*m*s/rad", "--out", tmp_path)["result"]["fit"]
+    assert fit["fixed"]["Cv"]["reason"] == "fixed as asked"
+    assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
+    assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
+    assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")
 
 
 def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, cli) -> None:
@@ -153,12 +159,3 @@ def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, cli) -> 
     assert kept == {"CM": "no run is loaded: the design's value kept"}
     assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
     assert fit["parameters"]["CM"]["value"] == 1.34e-3
-
-
-def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path, cli) -> None:
-    words = ("identify", bench / "campaign.toml", "--fix")
-    fit = cli.data(*words, "friction.viscous=5.25 uN*m*s/rad", "--out", tmp_path)["result"]["fit"]
-    assert fit["fixed"]["Cv"]["reason"] == "fixed as asked"
-    assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
-    assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
-    assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from site_checks import check_whole
 
-from reports.cli.main import main
 from reports.nightly.source import read_study
 from tests.refusals import refused
 
@@ -54,16 +53,12 @@ def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -
     check_whole(folder / "site")
 
 
-def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) -> None:
+def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, cli) -> None:
     folder, _ = built
-    words = ["nightly", str(folder / "study.toml"), "--site", str(folder / "site"), "--no-validation"]
-    assert main([*words, "--workers", "1"]) == 1
-    assert "(3 unchanged)" in capsys.readouterr().out
-    main(["nightly", "approve", *words[1:], "--by", "A. Engineer", "--reason", "review 3"])
-    capsys.readouterr()
-    main([*words, "--json"])
-    summary = json.loads(capsys.readouterr().out)
-    good = [d for d in summary["designs"] if d["state"] != "broken"]
+    words = [folder / "study.toml", "--site", folder / "site", "--no-validation"]
+    assert "(3 unchanged)" in cli.text("nightly", *words, "--workers", 1, status=1)
+    cli("nightly", "approve", *words, "--by", "A. Engineer", "--reason", "review 3")
+    good = [d for d in cli("nightly", *words, "--json").data["designs"] if d["state"] != "broken"]
     assert {d["approved_by"] for d in good} == {"A. Engineer"}
 
 
@@ -78,12 +73,9 @@ def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) ->
         (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "inf"], "--time-limit"),
     ],
 )
-def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, words, expected) -> None:
+def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, cli, words, expected) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(words) == 2
-    line = capsys.readouterr().err
-    assert expected in line
-    assert line.count("\n") == 1
+    assert expected in cli.refused(*words)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -103,11 +95,10 @@ def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expecte
     refused(read_study, str(path), words=("s.toml", expected))
 
 
-def test_any_report_becomes_a_pdf(built, capsys) -> None:
+def test_any_report_becomes_a_pdf(built, cli) -> None:
     folder, _ = built
     report = next((folder / "site" / "reports").glob("slower-*/*/report.json"))
-    assert main(["pdf", str(report), "--out", str(folder / "r.pdf")]) == 0
+    cli.text("pdf", report, "--out", folder / "r.pdf")
     assert (folder / "r.pdf").read_bytes().startswith(b"%PDF")
     (folder / "no.json").write_text("{}")
-    assert main(["pdf", str(folder / "no.json")]) == 2
-    capsys.readouterr()
+    cli.refused("pdf", folder / "no.json")

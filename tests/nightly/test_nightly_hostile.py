@@ -16,10 +16,8 @@ from site_checks import Page, check_whole
 
 from reports.nightly.night import approve, run_night
 from reports.nightly.pages import line_chart
-from reports.nightly.source import read_study
 from reports.nightly.text import one_line
 from reports.visible import visible
-from tests.refusals import refused
 
 HOSTILE = (
     "<script>window.hacked=1</script>",
@@ -123,12 +121,3 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     root = ElementTree.fromstring(line_chart(visible(title), visible(title), nights, values, (), 1.5))
     drawn = {"svg", "path", "text", "tspan", "g", "rect", "clipPath", "use", "defs"}
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
-
-
-@pytest.mark.parametrize(
-    "data", [b"", b"\xff\xfe", b"[study", b"\x00" * 100, b"[study]\nbase='x'\n" * 2, b"#" * 2_000_000]
-)
-def test_what_is_no_study_is_refused_in_one_line(tmp_path, data: bytes) -> None:
-    path = tmp_path / "study.toml"
-    path.write_bytes(data)
-    refused(read_study, str(path))

@@ -16,6 +16,7 @@ from reports.nightly.figures import Figure
 from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
 from reports.nightly.night import approve, run_night
 from reports.nightly.source import Job
+from tests.refusals import refused
 
 
 class Nights:
@@ -119,13 +120,10 @@ def test_one_design_can_be_approved_alone(nights) -> None:
 
 
 def test_an_approval_needs_a_name_a_reason_and_a_result(nights) -> None:
-    with pytest.raises(InputError, match="no night has been built"):
-        nights.approve(job("a"))
+    refused(nights.approve, job("a"), words="no night has been built")
     nights(job("a"), job("b", mode="raise"))
-    with pytest.raises(InputError, match="needs a name and a reason"):
-        nights.approve(job("a"), reason=" ")
-    with pytest.raises(InputError, match="'b' has no result"):
-        nights.approve(job("a"), names=["b"])
+    refused(nights.approve, job("a"), reason=" ", words="needs a name and a reason")
+    refused(nights.approve, job("a"), names=["b"], words="'b' has no result")
 
 
 def test_a_requirement_that_fails_now_is_the_first_change(nights) -> None:
@@ -204,8 +202,7 @@ def test_old_reports_go_and_old_figures_stay(nights) -> None:
 
 def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
     (tmp_path / "thesis.tex").write_text("x")
-    with pytest.raises(InputError, match="not empty and no site"):
-        run_night(study(job("a")), tmp_path, INLINE, code=CODE)
+    refused(run_night, study(job("a")), tmp_path, INLINE, code=CODE, words="not empty and no site")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["thesis.tex"]
 
 

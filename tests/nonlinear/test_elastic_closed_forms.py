@@ -7,7 +7,7 @@ from actuator_lti.design.model import Design
 from nonlinear import commands, simulate
 from nonlinear._kernels import elastic_layout, layout
 from tests.changed import changed
-from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, stribeck, two_mass
+from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, two_mass
 
 K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
 REDUCED = 1.0 / (1.0 / J_L + 1.0 / (J_M * N * N))  # inertia of the relative motion
@@ -157,19 +157,6 @@ def test_stiff_tends_to_rigid_and_little_play_to_none() -> None:
     differences = rms_differences(TIGHT, [IDEAL | {"play_rad": play} for play in (1e-6, 1e-8)])
     assert differences[0] < 1e-4
     assert differences[1] < 0.02 * differences[0]
-
-
-def test_map_of_one_line_is_c0_and_cv() -> None:
-    points = stribeck((0.0, 0.02), (50.0, 0.02 + 50 * 1e-4))
-    plain = {"dry_torque_Nm": 0.02, "viscous_Nms_rad": 1e-4, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
-    mapped = {"points": points, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
-    voltages = 4.0 * np.sign(np.sin(0.2 * np.arange(80) + 0.1))
-    rigid = two_mass(1e-3, coupling=None, friction=mapped)
-    with_map = run_plant(rigid, voltages, 0.5)
-    without = run_plant(changed(rigid, friction={"points": (), **plain}), voltages, 0.5)
-    seen, wanted = (run.states[:, [0, 1, 3]] for run in (with_map, without))
-    np.testing.assert_allclose(seen, wanted, atol=1e-11 * np.abs(without.states).max())
-    assert sum(with_map.events) == sum(without.events) >= 5
 
 
 SPENT = [getattr(layout, f"ENERGY_{name}") for name in (

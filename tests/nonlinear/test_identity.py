@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import inf
 
 import control
 import numpy as np
 import pytest
-from test_running_controller import some_drive
 
 from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.model import Command, Design, Friction, Limits, LoadFriction
-from nonlinear import Rows, State, Trajectory, commands, simulate
+from actuator_lti.design.model import Design, Friction, LoadFriction
+from nonlinear import State, Trajectory, commands, simulate
 from tests.changed import changed
 from tests.nonlinear.elastic_drive import drive_f
 
@@ -168,47 +166,3 @@ def test_behind_a_coupling_between_its_events(point: Point, delay: float, rates:
     linear = linear_run(design, run, known, -DRY, point.moment_Nm - LOAD_DRY, **at)
     assert set(linear) == {*SIGNALS, "phi"}
     assert_identical(run, linear, 5.0, off=bent - twist)
-
-
-def linear_drive(case: int) -> Design:
-    """A random drive with all that is linear, back-drivable against a spring, at any computing delay."""
-    rng = np.random.default_rng(case)
-    design = some_drive(rng)
-    delay = float(rng.choice([0.0, 0.5, 1.0, 1.5, 2.7])) * design.controller.period_s
-    slope, damping = float(rng.choice([0.0, -200.0])), float(rng.choice([0.0, 3.0]))
-    plain = {"friction_feedforward": 0.0} if design.controller.position is not None else None
-    command, sharp = design.command, {"counts_per_rev": None}
-    return changed(
-        design,
-        controller={"computing_delay_s": delay, "position": plain},
-        friction=Friction(viscous_Nms_rad=2e-6),
-        limits=Limits(voltage_V=1e12),
-        load={"path": "back-drivable", "moment_slope_Nm_rad": slope, "moment_damping_Nms_rad": damping},
-        encoder=sharp,
-        output_encoder=sharp,
-        command=Command(filter_time_s=command.filter_time_s, filter_order=command.filter_order),
-    )
-
-
-@pytest.mark.parametrize("part", range(4))
-def test_random_linear_drives(part: int) -> None:
-    ticks = 300
-    for case in range(1000 + 20 * part, 1020 + 20 * part):
-        design = linear_drive(case)
-        assert design.limits.speed_rad_s == inf
-        rng, t = np.random.default_rng(case), np.arange(ticks)
-        command = np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t
-        rows = Rows.of(design, limits_on=False)
-        rows["ticks"], rows["load"] = ticks, 3.0
-        rows.series("command", command)
-        system = assemble_loops(design).tick_system
-        # the linear writing takes the command of a speed drive at the motor
-        scale = design.total_ratio if design.controller.outermost == "velocity" else 1.0
-        with np.errstate(over="ignore", invalid="ignore"):
-            run, linear = rows.trajectory(), system.respond(scale * command, 0.0, None, 3.0)
-        # a loop may grow: as long as both are far from the end of the numbers
-        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
-        for name in ("th", "w", "i", "u"):
-            result, expected = getattr(run, SIGNALS[name])[some], linear[name][some]
-            error = np.abs(result - expected).max() / np.abs(expected).max()
-            assert error < 1e-9, (case, name, error, design.controller)

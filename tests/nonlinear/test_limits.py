@@ -11,7 +11,7 @@ from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design, Motor
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
-from nonlinear import Drive, Reducers, Run, State, commands, loads, simulate, simulate_many
+from nonlinear import Reducers, Run, State, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
 from tests.changed import changed
 from tests.validation.random_drives import full_drive
@@ -109,27 +109,6 @@ def test_sawtooth_of_the_paper_and_a_step_on_3_V_without_windup() -> None:
     assert np.abs(run.voltage_V).max() <= 3.0
     assert run.output_angle_rad.max() < 0.1 * 1.01
     assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("e", "integral", "output", "kept", "acts"),
-    [
-        (1.0, 2.0, 4.5, 2.5, False),  # free: v = 2 e + I'
-        (1.0, 4.0, 5.0, 4.0, True),  # v = 6.5 beyond 5, same sign as e: the old I is kept
-        (1.0, -9.0, -5.0, -8.5, True),  # v = -6.5, e pulls back: I' is kept
-        (2.0, 0.8, 4.8, 0.8, True),  # v = 5.8 with I', 4.8 with the old I
-        (-1.0, -4.0, -5.0, -4.0, True),
-    ],
-)
-def test_conditional_integration(e: float, integral: float, output: float, kept: float, acts: bool) -> None:
-    """Kp = 2, Kp T/Tn = 0.5, limit 5 (model.md section 2)."""
-    current = model.CurrentLoop(gain_V_A=2.0, integral_time_s=4.0 * AMBER.controller.period_s)
-    control = {"position": None, "velocity": None, "current": current}
-    design = changed(AMBER, controller=control, limits=model.Limits(voltage_V=5.0))
-    drive = Drive(design, State(current_integral_V=integral))
-    assert drive.control(e, 0.0, 0.0, 0.0) == output
-    assert drive.value("current_integrator") == kept
-    assert (drive.value("flags_current") == 8.0) == acts
 
 
 def test_flag_bits_are_those_of_the_limiters() -> None:

@@ -117,9 +117,6 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     assert run.limits["voltage"].fraction > 0.0
     np.testing.assert_allclose(run.voltage_V, expected, rtol=0, atol=1e-9)
     assert run.final.motor_angle_rad == pytest.approx(angle, rel=1e-9)
-
-
-def test_a_supply_that_cannot_be_is_refused() -> None:
     series = commands.sampled([0.0, 0.1], [12.0, 11.0])
     with pytest.raises(InputError, match="without a current loop"):
         simulate(AMBER, commands.hold(0.0), 0.1, supply=series, supply_scales=True)

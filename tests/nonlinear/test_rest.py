@@ -34,7 +34,7 @@ def plain_run(design: Design, step: float, ticks: float, window: float, load_Nm:
     return rows.run()
 
 
-def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
+def test_pieces_of_a_run_are_the_run_and_the_same_state_has_the_same_end() -> None:
     whole = simulate(JOINT, commands.step(0.02), 0.1)
     rows = Rows.of(JOINT)
     rows.step("command", 0.02)
@@ -42,6 +42,10 @@ def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
     pieces = [drive.advance(n) for n in (8, 1000, whole.time_s.size - 1008)]
     output = np.concatenate([piece.columns[1] for piece in pieces])
     assert (output == whole.output_angle_rad).all()
+    start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
+    rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
+    assert rest.comes_to_rest
+    assert rest.error == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -121,7 +125,7 @@ def test_overload_acts_when_its_own_recursion_does(current_A: float, start: floa
     assert ticks_until_it_acts(p, s) == max(ticks - 1, 0)
 
 
-def test_overload_on_its_way_is_leapt_over() -> None:
+def test_overload_on_its_way_is_leapt_over_and_not_waited_for_where_it_stays() -> None:
     """The joint holds 60 N m for half a minute before the protection trips: the plain run says when."""
     rest, Ts = settle(QUIET, 60.0, 0.1309).rest, QUIET.controller.period_s
     assert rest.verdict == "at rest"
@@ -130,6 +134,14 @@ def test_overload_on_its_way_is_leapt_over() -> None:
     trips_s = Ts * float(run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")])
     assert trips_s < rest.after_s < 1.1 * trips_s
     assert rest.work < 200_000
+    # 60 N m ask for more than the continuous current: the protection trips and never releases
+    rest = settle(QUIET, 60.0, 1e-3 * FULL).rest
+    assert rest.verdict == "at rest"
+    assert "overload" in rest.limited
+    after = rest.after_s / QUIET.controller.period_s
+    run = plain_run(QUIET, 1e-3 * FULL, 2.0 * after, 1.2 * after, 60.0)
+    assert np.ptp(run.span("output_angle_rad")) < 1e-12
+    assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
 
 
 def test_a_drive_that_its_load_carries_off_diverges() -> None:
@@ -184,17 +196,6 @@ def test_a_filter_s_rounding_ends_no_leap() -> None:
     assert rest.work < 1_800_000
 
 
-def test_overload_that_stays_is_not_waited_for() -> None:
-    """60 N m ask for more than the continuous current: the protection trips and never releases."""
-    rest = settle(QUIET, 60.0, 1e-3 * FULL).rest
-    assert rest.verdict == "at rest"
-    assert "overload" in rest.limited
-    after = rest.after_s / QUIET.controller.period_s
-    run = plain_run(QUIET, 1e-3 * FULL, 2.0 * after, 1.2 * after, 60.0)
-    assert np.ptp(run.span("output_angle_rad")) < 1e-12
-    assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
-
-
 def test_hops_of_a_billionth_of_the_step_are_rest() -> None:
     """An integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands."""
     design = full_drive(2000019)
@@ -231,13 +232,6 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
 def test_all_who_ask_get_one_answer(seed: int) -> None:
     """`cycles`, `validate`, `failures`, `simulate` after two lengths."""
     assert not list(contradictions(stable_position_drive(seed)))
-
-
-def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
-    start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
-    rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
-    assert rest.comes_to_rest
-    assert rest.error == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(("part", "period_s", "amplitude_deg"), [(0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)])

@@ -13,6 +13,7 @@ from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_survey import LoopSurvey
 from nonlinear import commands, simulate
 from reports.charts import paint, style
+from tests.refusals import refused
 
 
 @pytest.fixture(autouse=True)
@@ -47,8 +48,7 @@ def test_all_loops_in_one_figure_and_axes_of_ones_own() -> None:
     figure, own = plt.subplots(2, 1)
     assert loops.position.plot_bode(own)[0] is own[0]
     assert loops.velocity.plot_nyquist().figure is not figure
-    with pytest.raises(InputError, match="allowed: 2 of matplotlib's axes"):
-        loops.position.plot_bode(axes=own[0])
+    refused(loops.position.plot_bode, axes=own[0], words="allowed: 2 of matplotlib's axes")
 
 
 def test_steps_of_sampled_and_continuous_loops_end_at_one() -> None:
@@ -90,8 +90,7 @@ def test_the_border_and_the_map() -> None:
     frame = map_.to_pandas()
     assert set(frame["cause"]) == present
     assert len(frame) == 20
-    with pytest.raises(InputError, match="nothing limits"):
-        LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map()
+    refused(LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map, words="nothing limits")
 
 
 def test_cells_keep_their_colours_when_some_are_missing_and_pages_have_the_same() -> None:
@@ -112,5 +111,4 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     with pytest.raises(InputError, match=told):
         run.to_pandas()
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
-    with pytest.raises(InputError, match=r"plotting needs matplotlib"):
-        plot_bode(assemble_loops("ilr33-amber").velocity.open_loop)
+    refused(plot_bode, assemble_loops("ilr33-amber").velocity.open_loop, words="plotting needs matplotlib")

@@ -23,11 +23,6 @@ COUNT = 3_000
 FAILING = "variant 1717"
 
 
-@pytest.fixture(scope="module")
-def one() -> Comparison:
-    return compare(study_of(load_design("ilr33-amber")))
-
-
 def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
     of = verdict.requirement
     value = of.maximum - distance if of.minimum is None else of.minimum + distance
@@ -35,9 +30,9 @@ def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
 
 
 @pytest.fixture(scope="module")
-def many(one) -> Comparison:
+def many() -> Comparison:
     """Thousands of designs with the figures of one, scaled at random; one of them fails a requirement."""
-    draw, variants = random.Random(18), []
+    draw, variants, one = random.Random(18), [], compare(study_of(load_design("ilr33-amber")))
     for k in range(COUNT):
         name, factor, own = f"variant {k}", draw.uniform(0.9, 1.1), one.base.figures
         figures = {key: None if v is None else v * draw.uniform(0.5, 2.0) for key, v in own.items()}

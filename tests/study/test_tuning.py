@@ -51,14 +51,6 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
     assert gains[0] == pytest.approx(integrator_gain(margin), rel=1e-3)
 
 
-def test_the_closed_form_of_the_integrator_is_the_margin_engine_s():
-    gain = integrator_gain(60.0)
-    design = integrator()
-    changed = replace(design, controller=replace(design.controller, position=PositionLoop(gain=gain)))
-    result = stability_margins(assemble_loops(changed).position.open_loop)
-    assert result.phase_margin_deg == pytest.approx(60.0, abs=1e-4)
-
-
 def test_what_cannot_be_met_is_refused_with_its_distance():
     """A phase margin of 60 deg and a bandwidth of 60 Hz exclude each other behind 3.5 ms of delay."""
     phase = need("phase_margin", 60.0, loop="position")

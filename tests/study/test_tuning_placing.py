@@ -113,7 +113,7 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
     assert (phase >= 62.0, width >= 50.0) == (True, True)
 
 
-def test_a_design_that_meets_all_is_left_as_it_is_and_neutral_elements_change_nothing():
+def test_what_meets_all_is_left_neutral_elements_are_neutral_and_ranges_are_of_the_drive():
     design = servo(need("phase_margin", 30.0))
     tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
     assert (tuned.feasible, tuned.placed, tuned.design.controller) == (True, (), design.controller)
@@ -126,6 +126,13 @@ def test_a_design_that_meets_all_is_left_as_it_is_and_neutral_elements_change_no
         loops = (getattr(assemble_loops(one), name).open_loop for one in (design, placed))
         before, after = ((m.gain_margin_db, m.phase_margin_deg) for m in map(stability_margins, loops))
         assert after == pytest.approx(before, rel=1e-9)
+    # 0x2348.01 holds 1 to 250 1/s in whole steps; another drive may have any gain
+    baseline = load_design("ilr33-amber")
+    assert baseline.objects.named
+    assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
+    other = replace(baseline, objects=model.ControllerObjects())
+    assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
+    assert step_of_gain(load_design("joint"), "control.position.gain") is None
 
 
 def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
@@ -138,16 +145,6 @@ def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
     assert (tuned.feasible, tuned.placed) == (True, ("feedforward",))
     position = tuned.design.controller.position
     assert position.feedforward > 0.0 or position.acceleration_feedforward > 0.0
-
-
-def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
-    """0x2348.01 holds 1 to 250 1/s in whole steps; another drive may have any gain."""
-    baseline = load_design("ilr33-amber")
-    assert baseline.objects.named
-    assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
-    other = replace(baseline, objects=model.ControllerObjects())
-    assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
-    assert step_of_gain(load_design("joint"), "control.position.gain") is None
 
 
 @pytest.mark.parametrize(("words", "design", "message"), [

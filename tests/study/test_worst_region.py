@@ -141,7 +141,7 @@ def test_tuning_looks_at_no_corner_where_one_constant_is_two() -> None:
     assert {float(v) for v in np.round(corners[:, i], 8)} == {5.6e-3, 5.9e-3, 6.2e-3}
 
 
-def test_an_identified_covariance_comes_out_of_the_samples() -> None:
+def test_an_identified_covariance_comes_out_of_the_samples_cut_off_where_no_drive_is() -> None:
     """Three values with a nearly singular covariance: written, read, drawn, and found again."""
     paths = ("friction.dry_torque", "friction.viscous", "friction.load_coefficient")
     values = np.array([2.25e-3, 5.25e-6, 1.34e-3])
@@ -154,10 +154,7 @@ def test_an_identified_covariance_comes_out_of_the_samples() -> None:
     sampler = sampler_of(design)
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
     assert np.cov(draws.T) == pytest.approx(covariance, rel=0.03)
-
-
-def test_a_value_poorly_known_is_cut_off_where_no_drive_is() -> None:
-    """A friction of 2 +- 1.5 would be negative in one draw of eleven: its distribution ends at zero."""
+    # a friction of 2 +- 1.5 would be negative in one draw of eleven: its distribution ends at zero
     fit = Fit(names=("friction.viscous",), values=np.array([2e-6]), covariance=np.array([[2.25e-12]]))
     design = read_design_text(write_design(design_with_fit(load_design("ilr33-amber"), fit, "test")))
     tolerance = design.parameters["friction.viscous"].tolerance
