@@ -306,18 +306,11 @@ def history_files() -> dict[str, bytes]:
 
 
 @cache
-def entry_file() -> bytes:
-    return sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
-
-
-def xml_seed() -> bytes:
-    return write_settings_xml(read_settings_toml(SETTINGS.decode(), "f")).encode()
-
-
-@cache
 def targets() -> tuple[Target, ...]:
     designs = tuple(design_text(name).encode() for name in shipped_designs())
     to_pdf = command("pdf", "FILE", "--out", "FOLDER/x.pdf")
+    kept = sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
+    xml = write_settings_xml(read_settings_toml(SETTINGS.decode(), "f"))
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
     return (
         Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),
@@ -326,7 +319,7 @@ def targets() -> tuple[Target, ...]:
         Target("design", designs, design_round),
         Target("extreme design", designs, design_round, fault=extreme),
         Target("settings", (SETTINGS,), settings),
-        Target("settings xml", (xml_seed(),), settings, ".xml"),
+        Target("settings xml", (xml.encode(),), settings, ".xml"),
         Target("controller file", CONTROLLERS, controller_file, ".xml"),
         Target("response", (RESPONSE,), read_response, ".csv"),
         Target("response in mat", mat_files(), read_response, ".mat"),
@@ -345,7 +338,7 @@ def targets() -> tuple[Target, ...]:
         Target("report", (small_report(),), report, ".json", tree_fault),
         Target("site", (SUMMARY,), summary, ".json", tree_fault),
         Target("history", (history_files()[INDEX],), history, ".json", tree_fault),
-        Target("cache entry", (entry_file(),), entry, ".entry"),
+        Target("cache entry", (kept,), entry, ".entry"),
         Target("command line", seeds(), command_line, ".json", hostile),
         Target("command margins", designs, command("margins", "FILE", "--json"), fault=extreme),
         Target("command simulate", designs, command(*move), fault=extreme),

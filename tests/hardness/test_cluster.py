@@ -2,6 +2,7 @@
 
 import contextlib
 import gc
+import http.client
 import os
 import signal
 import socket
@@ -45,14 +46,11 @@ def pages(port: int) -> list[str]:
     """What a browser is given that does not speak TLS."""
     given = []
     for path in ("/", "/status", "/info/main/workers.html", "/metrics", "/json/identity.json", "/health"):
-        try:
-            with socket.create_connection(("127.0.0.1", port), timeout=5) as link:
-                link.sendall(f"GET {path} HTTP/1.0\r\n\r\n".encode())
-                answer = link.recv(65536).partition(b"\r\n")[0].decode("latin-1")
-        except OSError:
-            continue
-        if answer.startswith("HTTP") and " 404 " not in f"{answer} ":
-            given.append(f"{path}: {answer}")
+        with contextlib.suppress(OSError, http.client.HTTPException):
+            link = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+            link.request("GET", path)
+            status = link.getresponse().status
+            given += [f"{path}: {status}"] if status != 404 else []
     return given
 
 

@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.compiled import emit_c
-from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from nonlinear import Probe, Rows, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh
@@ -35,23 +34,6 @@ def test_odd_symmetry(law: str) -> None:
     for name in ("output_angle_rad", "motor_speed_rad_s", "current_A", "voltage_V"):
         assert np.array_equal(getattr(runs[0], name), -getattr(runs[1], name)), name
     assert runs[0].events == runs[1].events
-
-
-def test_scaling_of_torque_current_and_voltage() -> None:
-    """Twice R and L, half of every inertia and torque: the same motion with half the current."""
-    base, c = AMBER, 2.0  # currents and torques become 1/c, voltages and speeds stay
-    gears = [f"gear.{gear.name}.{side}_inertia" for gear in base.gears for side in ("input", "output")]
-    friction = [f"friction.{name}" for name in ("dry_torque", "viscous", "load_coefficient")]
-    less = ["motor.rotor_inertia", *gears, "load.inertia", *friction, "control.velocity.gain"]
-    factors = dict.fromkeys([*less, "limits.peak_current"], 1.0 / c)
-    factors |= dict.fromkeys(("motor.resistance", "motor.inductance", "control.current.gain"), c)
-    values = {path: parameter_value(base, path) * factor for path, factor in factors.items()}
-    scaled = with_values(base, values, check=False)
-    a, b = (simulate(d, commands.sine(0.05, 3.0), 0.8, 6.0) for d in (base, scaled))
-    assert a.limits["current"].active
-    np.testing.assert_allclose(b.current_A * c, a.current_A, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(b.motor_speed_rad_s, a.motor_speed_rad_s, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(b.voltage_V, a.voltage_V, rtol=0, atol=1e-9)
 
 
 def test_a_narrow_tanh_tends_to_coulomb_but_knows_no_rest() -> None:
