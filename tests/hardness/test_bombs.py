@@ -150,7 +150,7 @@ def test_a_number_beyond_all_bounds_is_one_line(given: str, cli) -> None:
     assert ("finite" if "9" not in given else "2^63") in line
 
 
-def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
+def test_commands_and_samples_of_many_rows_are_counted_before_they_are_read(tmp_path, monkeypatch) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,x\n" + "0,1\n" * 200)
     small = bounds.Bound(what="rows", most=100, reason="", asked_by="--record")
@@ -161,9 +161,6 @@ def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
     tracemalloc.stop()  # reading up to the bound is allowed
     refused(lambda: commands.recorded(path), "r.csv", "at most 256 MiB")
     tracemalloc.start()
-
-
-def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path, monkeypatch) -> None:
     path = tmp_path / "s.parquet"
     table = pa.table({"motor.resistance": np.zeros(bounds.TABLE_ROWS.most + 1)})
     pq.write_table(table, path, compression="zstd")

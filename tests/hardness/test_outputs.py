@@ -62,7 +62,7 @@ def test_a_mark_of_direction_is_shown_not_obeyed(mark, capsys) -> None:
     assert mark not in escape(words)
 
 
-def test_names_of_records_may_hold_anything(tmp_path, monkeypatch, cli) -> None:
+def test_names_of_records_and_lines_on_standard_error(tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     name = "a\x1b[31mb\u202ec\x85d"
     record, judged = f"{name}.csv", ("correlate", "identify", "margins")
@@ -79,9 +79,6 @@ def test_names_of_records_may_hold_anything(tmp_path, monkeypatch, cli) -> None:
         assert cli(*words).status in (0, int(words[0] in judged)), words
     for page in (*Path().glob("?/*.html"), *Path().glob("?/*.json"), *Path().glob("?/*.toml")):
         assert set("\x1b\u202e\x85").isdisjoint(page.read_text(encoding="utf-8")), page
-
-
-def test_a_line_on_standard_error_is_one_that_can_be_read(cli) -> None:
     obeyed = "\x1b[31m\u202e\x85"
     long, options = "9" * 5000, ("--x" + "y" * 9000, "--no" + obeyed)
     files = (("init", long), ("margins", "--load", long), ("margins", "no" + obeyed))

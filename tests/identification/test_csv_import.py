@@ -50,13 +50,24 @@ def test_layouts(tmp_path, text: str, layout: CsvFormat) -> None:
     assert record.counts.rows_in == record.counts.rows_out == 2
 
 
-def test_every_line_is_accounted_for(tmp_path) -> None:
+def test_every_line_counts_ticks_wrap_around_and_careful_reading_is_fast_reading(tmp_path) -> None:
     text = "# log\nt,n\n0,1\n\n1,nan\n# pause\n2,3\n3,4\n"
     counts = read_csv_record(_write(tmp_path, text), _spec()).counts
     assert (counts.lines, counts.comments, counts.blanks, counts.header) == (8, 2, 1, 1)
     assert (counts.rows_in, counts.rows_out) == (4, 3)
     assert counts.dropped == {"with a missing value": 1}
     assert counts.first_dropped == {"with a missing value": "line 5"}
+    rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
+    time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
+    record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
+    assert np.diff(record.time_s) == pytest.approx(3.0)
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal(500)
+    plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))
+    with_comment = plain + "# the end\n"
+    fast = read_csv_record(_write(tmp_path, plain), _spec())
+    careful = read_csv_record(_write(tmp_path, with_comment), _spec())
+    assert np.array_equal(fast["speed"], careful["speed"])
 
 
 CELLS = st.one_of(
@@ -83,9 +94,7 @@ LAYOUTS = st.sampled_from(
     held=TABLES | BYTES, layout=LAYOUTS, policy=st.sampled_from(["error", "drop"]),
     end=st.sampled_from(["\n", "\r\n"]),
 )  # fmt: skip
-def test_whatever_a_file_holds_every_row_and_line_is_accounted_for(
-    held, layout, policy, end, tmp_path_factory
-) -> None:
+def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path_factory) -> None:
     """Tables of odd cells, and any bytes; or it is refused in one line."""
     content = held
     if isinstance(held, list):
@@ -109,13 +118,6 @@ def test_whatever_a_file_holds_every_row_and_line_is_accounted_for(
     assert counts.rows_out == len(record)
     lines = content.removesuffix(b"\n").count(b"\n") + 1
     assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
-
-
-def test_ticks_that_wrap_around(tmp_path) -> None:
-    rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
-    time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
-    record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
-    assert np.diff(record.time_s) == pytest.approx(3.0)
 
 
 @pytest.mark.parametrize(
@@ -176,16 +178,6 @@ def test_the_checksum_is_that_of_what_was_read_with_a_byte_order_mark(tmp_path, 
 
     monkeypatch.setattr(BoundedRows, "array", and_a_row_comes)
     assert read_csv_record(path, _spec()).sha256 == digest
-
-
-def test_careful_and_fast_reading_agree(tmp_path) -> None:
-    rng = np.random.default_rng(3)
-    values = rng.standard_normal(500)
-    plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))
-    with_comment = plain + "# the end\n"
-    fast = read_csv_record(_write(tmp_path, plain), _spec())
-    careful = read_csv_record(_write(tmp_path, with_comment), _spec())
-    assert np.array_equal(fast["speed"], careful["speed"])
 
 
 def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:

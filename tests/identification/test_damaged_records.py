@@ -196,11 +196,21 @@ def test_a_scale_of_the_current_is_in_what_the_constant_moves(signals, scale, co
         assert right == pytest.approx(truth, rel=0.005)
 
 
-def test_a_voltage_tells_the_torque_constant(columns: Columns) -> None:
+def test_a_voltage_tells_the_constant_a_drift_widens_and_a_load_not_recorded_is_named(columns) -> None:
     """By its kE w, unless that is not closely told, as of a voltage of another run."""
     assert "torque_constant" not in identify_bench(BASE, [_record(columns, WHOLE)]).model.fixed
     other = {**columns, "voltage": np.roll(columns["voltage"], 1000)}
     assert "torque_constant" in identify_bench(BASE, [_record(other, WHOLE)]).model.fixed
+    # all torques grow by 20 % along the record: the intervals about their mean hold the truth
+    rise = 1.0 + 0.2 * columns["time"] / columns["time"][-1]
+    result = identify_bench(BASE, [_record({**columns, "current": rise * columns["current"]})])
+    assert "drift along the record: all torques change by +1" in _said(result)
+    low, high = result.model.interval("dry")
+    assert low < WANTED["dry"] < high
+    loaded = _columns(motion(2, load_Nm=6.0, design=DRIVE), 1)
+    result = identify_bench(DRIVE, [_record(loaded, BARE)])
+    assert not result.passed
+    assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
 
 
 STRONG = {"motor.torque_constant": 7.08e-3, "motor.back_emf_constant": 7.08e-3}
@@ -272,13 +282,6 @@ def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns) 
     assert ("times the design's: factor 1000" in reason) == (factor < 1.0)
 
 
-def test_a_load_that_was_not_recorded_is_named_with_its_size() -> None:
-    loaded = _columns(motion(2, load_Nm=6.0, design=DRIVE), 1)
-    result = identify_bench(DRIVE, [_record(loaded, BARE)])
-    assert not result.passed
-    assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
-
-
 @pytest.mark.parametrize("added_N", [0.0, 20.0, -5.0])
 def test_a_constant_force_beside_the_one_stated_is_said(added_N: float, emps_file: Path) -> None:
     """The published axis states -3.16 N; a load that was not recorded comes on top."""
@@ -303,15 +306,6 @@ def test_what_is_neither_met_nor_failed_says_why(columns: Columns) -> None:
     item = kept["kept-load_coefficient"]
     assert item.passed is None
     assert item.reason == "is not excited at all: the design's value kept"
-
-
-def test_a_drift_widens_the_intervals(columns: Columns) -> None:
-    """All torques grow by 20 % along the record: the intervals about their mean hold the truth."""
-    rise = 1.0 + 0.2 * columns["time"] / columns["time"][-1]
-    result = identify_bench(BASE, [_record({**columns, "current": rise * columns["current"]})])
-    assert "drift along the record: all torques change by +1" in _said(result)
-    low, high = result.model.interval("dry")
-    assert low < WANTED["dry"] < high
 
 
 @pytest.mark.parametrize("signals", [ALL, BARE], ids=["all", "bare"])

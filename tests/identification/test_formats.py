@@ -169,9 +169,7 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) 
         ("rms", "phase", np.sqrt(6.0), 3.0),
     ],
 )
-def test_ac_voltages_and_currents_are_those_of_the_equivalent_dc_motor(
-    value: str, between: str, factor: float, power: float | None, tmp_path
-) -> None:
+def test_ac_values_are_those_of_the_equivalent_dc_motor(value, between, factor, power, tmp_path) -> None:
     """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
     rows, value = np.arange(1.0, 10.0), f', value = "{value}"' if value else ""
     (tmp_path / "s.csv").write_text("t,i,u\n" + "".join(f"{k - 1},{k},{k}\n" for k in range(1, 10)))

@@ -19,7 +19,7 @@ def campaign(bench: Path, tmp_path_factory) -> Path:
     return folder / "campaign.toml"
 
 
-def test_a_campaign_as_json(campaign: Path, cli) -> None:
+def test_a_campaign_as_json_and_the_example_of_one(campaign: Path, cli, tmp_path) -> None:
     result = cli.data("identify", campaign, "--suggest", "2")
     found = result["result"]
     assert found["runs_listed"] == len(found["fit"]["points"]) + len(found["set_aside"]) == 9
@@ -29,6 +29,10 @@ def test_a_campaign_as_json(campaign: Path, cli) -> None:
     assert low < 1.34e-3 < high
     assert [term["name"] for term in result["shares"]] == ["C0", "Cv", "CM"]
     assert len(result["suggestion"]["runs"]) == 2
+    from analyses.records.campaign_file import load_campaign
+
+    (tmp_path / "c.toml").write_text(cli.text("identify", "--example"))
+    assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
 
 
 def test_a_campaign_on_paper_as_a_design_and_in_the_report(campaign: Path, tmp_path, cli) -> None:
@@ -82,13 +86,6 @@ def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(arguments, reason,
     with pytest.raises(SystemExit, match="2"):
         simulate([str(tmp_path), *arguments])
     assert reason in capsys.readouterr().err
-
-
-def test_the_example_is_a_campaign_file(tmp_path, cli) -> None:
-    from analyses.records.campaign_file import load_campaign
-
-    (tmp_path / "c.toml").write_text(cli.text("identify", "--example"))
-    assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
 
 
 @pytest.mark.parametrize(

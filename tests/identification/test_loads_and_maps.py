@@ -103,12 +103,19 @@ def _axis_record(law: str, seed: int = 0) -> Record:
     return _record(position=_waves(0, 0.05), force=force)
 
 
-def test_a_plain_law_needs_no_map() -> None:
+def test_a_plain_law_needs_no_map_and_a_design_with_one_is_moved_like_any_other() -> None:
     """Over five draws of noise the criterion never takes a map for a drive that has none."""
     for seed in range(5):
         model = fit_map(load_design("emps"), [_axis_record("plain", seed)])
         assert model.knots_rad_s is None
         assert next(law for law in model.laws if law.taken).name.startswith("plain")
+    record = _axis_record("map")
+    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
+    result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))
+    assert result.design.friction.points
+    outcome = correlate_record(result.design, record)
+    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
+    assert "torque needed for its motion" not in result.resimulated[0].how
 
 
 def test_a_friction_map_is_found_with_its_break_points_and_goes_into_the_design() -> None:
@@ -144,16 +151,6 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
     whole, part = fit_records(design, [told]), fit_records(design, [cut])
     assert whole.values == pytest.approx(part.values, rel=1e-12)
     assert any("enabled from 0 s" in note for note in whole.records[0].notes)
-
-
-def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() -> None:
-    record = _axis_record("map")
-    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
-    result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))
-    assert result.design.friction.points
-    outcome = correlate_record(result.design, record)
-    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
-    assert "torque needed for its motion" not in result.resimulated[0].how
 
 
 def _voltage_record(noise: float, *, fast: bool) -> Record:

@@ -70,9 +70,6 @@ def test_half_the_interval_takes_four_times_the_motion() -> None:
     rest = plan_motions(BASE, within=0.001, noise=NOISE_A, measured=model)
     assert rest.measured == 1
     assert len(rest.segments) == pytest.approx(len(fine.segments) - some, abs=2)
-
-
-def test_what_cannot_be_planned_is_refused() -> None:
     refused(plan_motions, BASE, within=0.01, noise=0.0, words="the noise of the recorded current")
     bare = replace(BASE, controller=replace(BASE.controller, position=None))
     refused(plan_motions, bare, within=0.01, noise=NOISE_A, words="needs a position loop")

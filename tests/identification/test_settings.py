@@ -37,7 +37,7 @@ def sixteen(tmp_path_factory) -> Path:
     return folder / "runs.toml"
 
 
-def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
+def test_sixteen_records_of_four_gains_are_one_fit(sixteen, cli, tmp_path) -> None:
     """The inertia at the output is known of each: what is found is the motor's own, from all sixteen."""
     design = load_design("ilr33-amber")
     model = cli.data("identify", sixteen, "--design", "ilr33-amber")["model"]
@@ -48,9 +48,6 @@ def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
         assert abs(found["value"] - value) < 4.0 * found["standard_error"] + 1e-3 * value, name
     records = open_records(sixteen)
     assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4
-
-
-def test_each_record_is_simulated_with_its_own_settings(sixteen: Path, cli, tmp_path) -> None:
     records = cli.data("correlate", "ilr33-amber", sixteen, "--error-limit", "3")["records"]
     told = [note for record in records for note in record["notes"]]
     assert [told.count(f"set: control.position.gain = {gain} 1/s") for gain in GAINS] == [4] * 4

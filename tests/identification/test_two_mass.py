@@ -95,15 +95,12 @@ def test_intervals_hold_the_truth_at_their_rate_over_100_seeds() -> None:
     assert all(88 <= count <= 100 for count in held.values()), held
 
 
-def test_the_motors_angle_alone_tells_the_drive_too() -> None:
+def test_the_motors_angle_alone_tells_the_drive_and_the_command_its_period() -> None:
     lines = _lines(1, "angle")
     fit = fit_two_mass(lines, start_of(lines, N), N)
     for name in ("motor_inertia", "load_inertia", "stiffness"):
         assert fit[name] == pytest.approx(TRUTH[name], abs=4.0 * fit.std(name))
         assert fit[name] == pytest.approx(TRUTH[name], rel=0.01)
-
-
-def test_the_period_is_found_from_the_command() -> None:
     assert period_of_excitation(_record(0), "current_reference") == pytest.approx(0.5)
     noise = np.random.default_rng(0).standard_normal(4000)
     record = replace(_record(0).slice(0, 4000), signals={"current_reference": noise})

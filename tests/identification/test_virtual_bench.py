@@ -109,7 +109,7 @@ def test_files_give_true_values_clocks_and_law(from_files: CampaignResult, runs:
     assert impossible == ["per direction"]
 
 
-def test_contributions_are_those_of_the_paper_and_shared_errors_count(from_files) -> None:
+def test_contributions_are_those_of_the_paper_and_go_into_a_design(from_files, design: Design) -> None:
     exact = [round(100.0 * term.share, 1) for term in contributions(TABLE_1)]
     assert exact == [12.6, 27.6, 59.8]
     result = contributions(from_files.fit.values, from_files.fit.covariance)
@@ -121,6 +121,14 @@ def test_contributions_are_those_of_the_paper_and_shared_errors_count(from_files
     assert np.all(fit.standard_errors > 3.0 * random)
     blind = fit_surface(fit.points, replace(INSTRUMENTS.bounds, current_gain=0.0), 5.9e-3)
     assert np.all(blind.half_widths[1:] < fit.half_widths[1:])
+    identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
+    back = read_design_text(write_design(identified))
+    for k, path in enumerate(PATHS):
+        tolerance = back.parameters[path].tolerance
+        assert tolerance.std == pytest.approx(from_files.fit.standard_errors[k], rel=1e-5)
+        assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
+    result = {(c.first, c.second): c.coefficient for c in back.correlations}
+    assert result[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
 
 
 def _mirrored(run: TrueRun) -> TrueRun:
@@ -128,7 +136,7 @@ def _mirrored(run: TrueRun) -> TrueRun:
     return replace(run, **reverse) if int(run.id) % 2 else run
 
 
-def test_a_richer_law_is_found_where_there_is_one(design: Design, runs: tuple[TrueRun, ...]) -> None:
+def test_a_richer_law_is_found_and_an_outlier_named(design, runs) -> None:
     """3 % more friction in reverse, which the offset of the current measurement (2 mA) cannot explain."""
     bent = [replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs]
     more = [replace(r, current_A=r.current_A * (1.03 if int(r.id) % 2 else 1.0)) for r in runs]
@@ -140,9 +148,6 @@ def test_a_richer_law_is_found_where_there_is_one(design: Design, runs: tuple[Tr
     per_direction = next(score for score in result.laws.scores if score.name == "per direction")
     assert per_direction.possible
     assert not per_direction.warranted
-
-
-def test_an_outlier_is_named_and_set_aside_on_demand(design: Design, runs: tuple[TrueRun, ...]) -> None:
     strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
     imported = _imported(strange, 5)
     kept = identify_campaign(imported, design, richer=False).fit
@@ -150,17 +155,6 @@ def test_an_outlier_is_named_and_set_aside_on_demand(design: Design, runs: tuple
     aside = fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside")
     assert len(aside.points) == 53
     assert aside.outliers[0].set_aside
-
-
-def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
-    identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
-    back = read_design_text(write_design(identified))
-    for k, path in enumerate(PATHS):
-        tolerance = back.parameters[path].tolerance
-        assert tolerance.std == pytest.approx(from_files.fit.standard_errors[k], rel=1e-5)
-        assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
-    result = {(c.first, c.second): c.coefficient for c in back.correlations}
-    assert result[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
 
 
 def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path) -> None:

@@ -46,9 +46,7 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
-def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path, identify, cli
-) -> None:
+def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_path, identify, cli) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
     for accepted in ((), ("--accept",)):
@@ -133,7 +131,7 @@ def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, cli
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_right_campaign_is_simulated_again_and_a_coefficient_can_be_fixed(bench, cli, tmp_path) -> None:
+def test_a_right_campaign_is_simulated_again_and_says_what_is_fixed_or_not_told(bench, cli, tmp_path) -> None:
     told = cli.data("identify", bench / "campaign.toml", "--suggest", "0")
     checks = {check["id"]: check for check in told["items"]}
     assert checks["written-the runs"]["value"] < 0.005
@@ -145,10 +143,7 @@ def test_a_right_campaign_is_simulated_again_and_a_coefficient_can_be_fixed(benc
     assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
     assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
     assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")
-
-
-def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, cli) -> None:
-    """The commonest friction test: no load, so CM stays the design's, and that is said."""
+    # the commonest friction test: no load, so CM stays the design's, and that is said
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
     head, *runs = (bench / "campaign.toml").read_text().split("[[run]]")

@@ -63,7 +63,7 @@ def nights(tmp_path_factory):
     return night, site
 
 
-def test_designs_with_the_same_cause_are_one_line_and_what_came_closer_to_a_limit_is_marked(nights) -> None:
+def test_designs_with_the_same_cause_are_one_line_with_which_index_and_page_open(nights) -> None:
     night, _ = nights
     first, second = changes.headlines(night.designs)
     assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
@@ -74,9 +74,6 @@ def test_designs_with_the_same_cause_are_one_line_and_what_came_closer_to_a_limi
     closer, steady = ["pass", "regressed"], ["pass", "pass"]
     assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
     assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4
-
-
-def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
     _, site = nights
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "control.position.gain 12 → 10 1/s" in index

@@ -5,7 +5,7 @@ import pytest
 
 from actuator_lti.design.model import Design
 from nonlinear import commands, simulate
-from nonlinear._kernels import elastic_layout, layout
+from nonlinear._kernels import layout
 from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, two_mass
 
 K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
@@ -176,7 +176,3 @@ def test_balance_passivity_and_the_same_motion_without(seed: int) -> None:
         scale = np.abs(without.states).max(axis=0)
         assert np.all(np.abs(run.states - without.states) <= 1e-10 * scale)
         assert run.events == without.events
-
-
-def test_state_fits_its_place() -> None:
-    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE

@@ -189,15 +189,12 @@ def test_the_joint_crosses_its_friction_every_209_s() -> None:
 PLAIN_TICKS = 300_000
 
 
-def test_a_filter_s_rounding_ends_no_leap() -> None:
+def test_a_filter_s_rounding_ends_no_leap_and_hops_of_a_billionth_are_rest() -> None:
     """A notch at 37 Hz sums up rounding at 8 kHz; errors are integrated for minutes between slips."""
     rest = settle(QUIET, 0.0, 1e-3 * FULL).rest
     assert rest.verdict == "limit cycle"
     assert rest.work < 1_800_000
-
-
-def test_hops_of_a_billionth_of_the_step_are_rest() -> None:
-    """An integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands."""
+    # an integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands
     design = full_drive(2000019)
     step = design.validation.full_deflection_rad
     assert settle(design, 0.0, step).rest.verdict == "at rest"

@@ -41,7 +41,7 @@ def test_a_bode_figure_shows_the_loop_and_its_margins(form: str) -> None:
             assert x.max() <= 0.5 / loop.period_s
 
 
-def test_all_loops_in_one_figure_and_axes_of_ones_own() -> None:
+def test_all_loops_in_one_figure_axes_of_ones_own_and_steps_that_end_at_one() -> None:
     loops = assemble_loops("ilr33-amber")
     both = loops.plot_bode()
     assert [text.get_text() for text in both[0].get_legend().get_texts()] == list(loops.present)
@@ -49,9 +49,6 @@ def test_all_loops_in_one_figure_and_axes_of_ones_own() -> None:
     assert loops.position.plot_bode(own)[0] is own[0]
     assert loops.velocity.plot_nyquist().figure is not figure
     refused(loops.position.plot_bode, axes=own[0], words="allowed: 2 of matplotlib's axes")
-
-
-def test_steps_of_sampled_and_continuous_loops_end_at_one() -> None:
     for form in ("sampled", "continuous", "ideal"):
         line = assemble_loops("ilr33-amber", form=form).velocity.plot_step(0.1).lines[0]
         assert line.get_ydata()[-1] == pytest.approx(1.0, abs=2e-2)

@@ -59,7 +59,7 @@ def test_odds_of_a_current_limit_are_the_closed_form(study, design):
     assert all(one.swing <= first.swing for one in rest)
 
 
-def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(searched, design):
+def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(searched, design, tmp_path):
     case = next(w for w in searched.worst if w.requirement == "motor-current")
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3
     assert case.sampled < case.value == pytest.approx(corner, rel=1e-9)
@@ -69,9 +69,6 @@ def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(searched, des
     assert saved.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
     margin = next(w for w in searched.worst if w.requirement == "gain-margin/position")
     assert margin.value <= margin.sampled
-
-
-def test_same_bits_whatever_the_chunks_and_threads(searched, design, tmp_path):
     settings = replace(PLAIN, chunk=77, worst_cases=True)
     other = monte_carlo(design, tmp_path, settings, engine=Engine(threads=1))
     assert other.columns == searched.columns

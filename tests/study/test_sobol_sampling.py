@@ -60,7 +60,7 @@ def test_uniform_is_even_and_normals_have_their_moments_and_coefficient():
     assert np.corrcoef(pair.T)[0, 1] == pytest.approx(-0.8, abs=2e-3)
 
 
-def test_identified_samples_keep_their_rows_together(tmp_path):
+def test_identified_samples_keep_their_rows_and_impossible_tolerances_are_refused(tmp_path):
     path = tmp_path / "friction.csv"
     path.write_text("friction.viscous,friction.dry_torque\n1e-6,1e-3\n2e-6,2e-3\n4e-6,4e-3\n8e-6,8e-3\n")
     design = load_design("ilr33-amber")
@@ -70,6 +70,10 @@ def test_identified_samples_keep_their_rows_together(tmp_path):
     viscous, dry = (drawn[:, study.paths.index(p)] for p in table.paths)
     assert np.array_equal(dry, viscous * 1000)
     assert np.unique(viscous, return_counts=True)[1].tolist() == [1024] * 4
+    refused(sampler_of, load_design("ctms-motor-position"), words="tolerance")
+    wide = 'tolerance = { kind = "normal", std = "50 %" }'
+    text = write_design(load_design("ilr33-amber")).replace('tolerance = "50 %"', wide)
+    refused(sampler_of, read_design_text(text), words="truncated-normal")
 
 
 @pytest.mark.parametrize(("text", "message"), [
@@ -81,13 +85,6 @@ def test_bad_tables_are_refused(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(InputError, match=message):
         read_table(path, ["motor.resistance"])
-
-
-def test_tolerances_that_are_none_or_reach_a_negative_inertia_are_refused():
-    refused(sampler_of, load_design("ctms-motor-position"), words="tolerance")
-    wide = 'tolerance = { kind = "normal", std = "50 %" }'
-    text = write_design(load_design("ilr33-amber")).replace('tolerance = "50 %"', wide)
-    refused(sampler_of, read_design_text(text), words="truncated-normal")
 
 
 def merged(parts):

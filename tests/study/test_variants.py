@@ -230,15 +230,12 @@ def test_the_checks_of_every_design_stands_side_by_side(tmp_path):
     assert ledger(compare(study_of(load_design("ilr33-amber")))) == []
 
 
-def test_the_printed_example_is_a_study(cli, tmp_path):
+def test_the_printed_example_is_a_study_and_23_s_stand_in_a_row_of_seconds(cli, tmp_path):
     path = tmp_path / "study.toml"
     path.write_text(cli.text("compare", "--example"))
     assert len(load_study(path).variants) == 10
     assert "--example" in cli.refused("compare")
-
-
-def test_a_settling_of_23_s_stands_in_a_row_of_seconds(cli, tmp_path):
-    """A position gain of 0.17 1/s alone settles to 2 % in ln(50)/0.17 s, the base in some 30 ms."""
+    # a position gain of 0.17 1/s alone settles to 2 % in ln(50)/0.17 s, the base in some 30 ms
     slow = ("--set", "control.position.gain=0.17 1/s", "--no-validate", "--quiet", "--out", tmp_path)
     said = cli("compare", "ilr33-amber", *slow).out
     row = next(line.split() for line in said.splitlines() if "settling time" in line)

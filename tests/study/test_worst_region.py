@@ -121,16 +121,7 @@ def test_one_constant_is_drawn_as_one_and_opposite_ones_opposite(sign: float) ->
     assert np.std(draws[KM]) == pytest.approx(1e-4, rel=0.05)
 
 
-def test_three_that_are_one_and_what_contradicts() -> None:
-    """L L' gives the matrix back for singular ones; an indefinite one is refused."""
-    for matrix in (np.ones((3, 3)), np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 1.0]])):
-        root = semidefinite_root(matrix)
-        assert root @ root.T == pytest.approx(matrix, abs=1e-12)
-    with pytest.raises(InputError, match="contradict"):
-        semidefinite_root(np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5], [0.5, -0.5, 1.0]]))
-
-
-def test_tuning_looks_at_no_corner_where_one_constant_is_two() -> None:
+def test_three_that_are_one_what_contradicts_and_no_corner_where_one_constant_is_two() -> None:
     design = _tied()
     problem = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
     names = [factor.path for factor in problem.factors]
@@ -139,6 +130,12 @@ def test_tuning_looks_at_no_corner_where_one_constant_is_two() -> None:
     assert corners[:, i] == pytest.approx(corners[:, j], rel=1e-12)
     assert len(corners) == 1 + 2 ** (len(names) - 1)
     assert {float(v) for v in np.round(corners[:, i], 8)} == {5.6e-3, 5.9e-3, 6.2e-3}
+    # L L' gives the matrix back for singular ones; an indefinite one is refused
+    for matrix in (np.ones((3, 3)), np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 1.0]])):
+        root = semidefinite_root(matrix)
+        assert root @ root.T == pytest.approx(matrix, abs=1e-12)
+    with pytest.raises(InputError, match="contradict"):
+        semidefinite_root(np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5], [0.5, -0.5, 1.0]]))
 
 
 def test_an_identified_covariance_comes_out_of_the_samples_cut_off_where_no_drive_is() -> None:
