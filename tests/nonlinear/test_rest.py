@@ -1,5 +1,6 @@
 """The judge of rest, against closed forms, plain long runs, and drives described in words."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -7,16 +8,21 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design import Design, with_values
+from analyses.failures import Asked, failures
 from analyses.friction_effects import friction_effects
-from analyses.motion.settling import conduct, settle
+from analyses.limit_cycles.run import limit_cycles
+from analyses.motion.settling import Settling, conduct, counted, ending_of, settle, words
+from analyses.validation import validate
+from analyses.validation.settings import QUICK
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import quiet
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
+from reports.sections.cycles import summary
+from reports.sections.names import fine_unit
 from tests.changed import changed
-from tests.nonlinear.rest_agreement import contradictions
 from tests.validation.random_drives import full_drive, is_stable
 
 HERE = Path(__file__).parent
@@ -225,10 +231,34 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
         assert span == pytest.approx(2.0 * rest.amplitude, rel=0.25)
 
 
+def ends_alike(design: Design, settlings: Iterable[Settling]) -> None:
+    """Whether steps end as runs of `simulate` of two lengths do."""
+    full, tick_s = design.validation.full_deflection_rad, design.controller.period_s
+    for one in settlings:
+        for ticks in (1_000, 20_000):
+            asked = (commands.step(one.amplitude_rad), ticks * tick_s, one.load_Nm)
+            run = simulate(design, *asked, raise_on_failure=False)
+            rest = None if run.running is None else judge(run.running)
+            verdict = "none" if rest is None else counted(rest, full).verdict
+            assert verdict == one.rest.verdict, (one, ticks)
+
+
 @pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
 def test_all_who_ask_get_one_answer(seed: int) -> None:
-    """`cycles`, `validate`, `failures`, `simulate` after two lengths."""
-    assert not list(contradictions(stable_position_drive(seed)))
+    """`cycles`, `validate`, `failures`, `simulate` after two lengths; the words of the report."""
+    design = stable_position_drive(seed)
+    waited, checked = limit_cycles(design), validate(design, QUICK)
+    assert checked.settlings == waited.rests
+    assert (waited.verdict, waited.hunting) == (checked.rest, checked.hunting)
+    ends_alike(design, waited.rests)
+    watched = 1_000 * design.controller.period_s
+    ends_alike(design, failures(design, Asked.of(design, watched_s=watched, detection_s=watched)).before)
+    swing, said = waited.hunting, (summary(waited), checked.words)
+    if swing is None:
+        assert not any("not come to rest" in text for text in said)
+    else:
+        wanted = (words(swing.rest, *fine_unit(design.axis)), ending_of(design, swing))
+        assert all(part in text for text, part in zip(said, wanted, strict=True))
 
 
 @pytest.mark.parametrize(("part", "period_s", "amplitude_deg"), [(0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)])
