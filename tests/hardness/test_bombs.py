@@ -180,7 +180,6 @@ def test_a_grid_of_a_thousand_to_the_sixty_and_sweeps_of_a_variant_too_many(tmp_
     refused(lambda: load_study(path), "grid[1].axes", "60 axes", "at most 20")
     path.write_text(GRID.format(", ".join([AXIS] * 20)))
     refused(lambda: load_study(path), "grid[1]", "1e+60 variants", "at most 10000")
-    path = tmp_path / "s.toml"
     sweep = AXIS.replace("1000", "20")[2:-2].replace(", ", "\n")
     path.write_text('[study]\nbase = "ilr33-amber"\n' + f"[[sweep]]\n{sweep}\n" * 500)
     small = bounds.Bound(what="variants", most=25, reason="", asked_by="[[sweep]]")

@@ -157,7 +157,6 @@ def test_refinement_on_emps_lowers_the_force_error_and_every_result_is_what_is_w
         assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)
     assert result.refined["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
     assert result.resimulated[0].relative_error == pytest.approx(result.refined.error_after, rel=1e-4)
-    design, record = load_design("emps"), open_record(emps_file)
     for form in ("symmetric", "per-direction"):
         model = fit_records(design, [record], form=form)
         identified = design_with_fit(design, joint_values(design, model), "EMPS")

@@ -128,7 +128,6 @@ def test_one_event_tells_no_rate_a_given_offset_is_kept_and_strangers_are_refuse
     _, join = JOIN(first, early, method="event")
     assert join.rate_std is None
     assert "rate not estimable" in str(join)
-    first, second = _pair(0.5, 1.0)
     joined, join = JOIN(first, second, method="given", offset_s=0.5)
     assert join.offset_s == 0.5
     assert joined.time_s[0] >= 0.5

@@ -82,7 +82,6 @@ def test_where_the_bench_cannot_measure_and_its_record_does_not_tell() -> None:
         identify_frequency(
             _guess(), sweep_record(design, seed=0), play_record=reversal_record(design, seed=0).slice(0, 200)
         )
-    design = two_mass_design()
     refused(sweep_record, design, TwoMassPlan(moment_Nm=0.05), words="leaves its flank")
     refused(sweep_record, replace(design, coupling=None), words="current loop and a coupling")
 

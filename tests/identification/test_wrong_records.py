@@ -18,7 +18,9 @@ def right() -> Columns:
     return columns_of(motion(2))
 
 
-def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, identify, cli) -> None:
+def test_the_right_record_gives_its_drive_and_accounts_for_every_column(
+    right: Columns, tmp_path, identify, cli
+) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     data, written = identify(right).data, tmp_path / "o" / "ilr33-amber-identified.toml"
     truth, result = load_design("ilr33-amber"), load_design(written)
@@ -31,6 +33,13 @@ def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path,
     assert again["relative_error"] < 0.03
     own = cli.data("correlate", written, tmp_path / "r.csv")["records"][0]["signals"]["current"]
     assert own["relative_error"] == pytest.approx(again["relative_error"], rel=1e-9)
+    more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
+    inputs = {row["column"]: row["use"] for row in identify(more).data["inputs"]["r.csv"]}
+    assert set(inputs) == set(more)
+    assert inputs["current_A"].startswith("drive")
+    assert inputs["temperature_C"] == "no: no name that is known"
+    assert inputs["current_mA"] == "no: motor current is read from current_A"
+    assert inputs["motor_speed_rpm"].startswith("no: ")
 
 
 @pytest.mark.parametrize("key", ["motor.rotor_inertia", "load.inertia"])
@@ -56,16 +65,6 @@ def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_pa
     assert words in (tmp_path / "o" / "identification.html").read_text()
     asked = ("--design", "ilr33-amber", "--cutoff", "400", "--accept", "--out", tmp_path / "o")
     assert words in " ".join(cli.text("identify", tmp_path / "r.csv", *asked, status=1).split())
-
-
-def test_every_column_is_accounted_for(right: Columns, identify) -> None:
-    more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
-    inputs = {row["column"]: row["use"] for row in identify(more).data["inputs"]["r.csv"]}
-    assert set(inputs) == set(more)
-    assert inputs["current_A"].startswith("drive")
-    assert inputs["temperature_C"] == "no: no name that is known"
-    assert inputs["current_mA"] == "no: motor current is read from current_A"
-    assert inputs["motor_speed_rpm"].startswith("no: ")
 
 
 @pytest.mark.parametrize(

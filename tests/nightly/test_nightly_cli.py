@@ -30,36 +30,31 @@ tolerance = { "*phase margin*" = "0.5 deg" }
 """
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """A first night of a small study, on real worker processes."""
-    folder = tmp_path_factory.mktemp("cli")
-    (folder / "study.toml").write_text(STUDY)
-    command = [str(Path(sys.executable).with_name("actuator-lti")), "nightly", str(folder / "study.toml")]
-    command += ["--site", str(folder / "site"), "--no-validation"]
-    return folder, subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-
-
-def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -> None:
-    folder, done = built
+def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli) -> None:
+    """The first one on worker processes; it names the broken variant and builds the others."""
+    (tmp_path / "study.toml").write_text(STUDY)
+    words = [tmp_path / "study.toml", "--site", tmp_path / "site", "--no-validation"]
+    command = [Path(sys.executable).with_name("actuator-lti"), "nightly", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 1, done.stderr
     assert done.stdout.startswith("FAIL  night 1: 1 no result")
     said = " ".join(done.stdout.split())  # where a cell is wrapped depends on the length of the folder's name
     assert all(words in said for words in ("no <b>motor</b>", "motor.resistance = ", "allowed: above 0"))
-    summary = json.loads((folder / "site" / "summary.json").read_text())
+    summary = json.loads((tmp_path / "site" / "summary.json").read_text())
     names = {"ctms-motor-position", "slower", "no <b>motor</b>", "Comparison of all variants"}
     assert {d["name"] for d in summary["designs"]} == names
     assert summary["counts"]["broken"] == 1
-    check_whole(folder / "site")
-
-
-def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, cli) -> None:
-    folder, _ = built
-    words = [folder / "study.toml", "--site", folder / "site", "--no-validation"]
+    check_whole(tmp_path / "site")
     assert "(3 unchanged)" in cli.text("nightly", *words, "--workers", 1, status=1)
     cli("nightly", "approve", *words, "--by", "A. Engineer", "--reason", "review 3")
     good = [d for d in cli("nightly", *words, "--json").data["designs"] if d["state"] != "broken"]
     assert {d["approved_by"] for d in good} == {"A. Engineer"}
+    # any report becomes a PDF
+    report = next((tmp_path / "site" / "reports").glob("slower-*/*/report.json"))
+    cli.text("pdf", report, "--out", tmp_path / "r.pdf")
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
+    (tmp_path / "no.json").write_text("{}")
+    cli.refused("pdf", tmp_path / "no.json")
 
 
 @pytest.mark.parametrize(
@@ -93,12 +88,3 @@ def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expecte
     path = tmp_path / "s.toml"
     path.write_text(f'{table}\n[study]\nbase = "emps"\n')
     refused(read_study, str(path), words=("s.toml", expected))
-
-
-def test_any_report_becomes_a_pdf(built, cli) -> None:
-    folder, _ = built
-    report = next((folder / "site" / "reports").glob("slower-*/*/report.json"))
-    cli.text("pdf", report, "--out", folder / "r.pdf")
-    assert (folder / "r.pdf").read_bytes().startswith(b"%PDF")
-    (folder / "no.json").write_text("{}")
-    cli.refused("pdf", folder / "no.json")

@@ -53,28 +53,20 @@ def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
     assert changes.cause_words(cause) == words
 
 
-@pytest.fixture(scope="module")
-def nights(tmp_path_factory):
+def test_designs_with_the_same_cause_are_one_line_with_which_index_and_page_open(tmp_path) -> None:
     """Two nights: one gain falls in two designs alike, one rises, one stays."""
-    site, clock = tmp_path_factory.mktemp("headline") / "site", Calendar()
+    site, clock = tmp_path / "site", Calendar()
     for k in range(2):
         jobs = [job("one", 12.0 - 2 * k), job("two", 12.0 - 2 * k), job("better", 9.0 + k), job("same", 20.0)]
         night = run_night(study(*jobs), site, INLINE, code=CODE, clock=clock.next())
-    return night, site
-
-
-def test_designs_with_the_same_cause_are_one_line_with_which_index_and_page_open(nights) -> None:
-    night, _ = nights
     first, second = changes.headlines(night.designs)
     assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
     assert first.cause == "control.position.gain 12 → 10 1/s"
     assert first.effect == "gain margin 12.00 → 10.00 dB"
-    night, _ = nights
     strips = {d.name: [state for _, state in d.strip] for d in night.designs}
     closer, steady = ["pass", "regressed"], ["pass", "pass"]
     assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
     assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4
-    _, site = nights
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "control.position.gain 12 → 10 1/s" in index
     assert index.index("What changed since last night") < index.index('id="designs"')

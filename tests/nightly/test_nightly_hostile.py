@@ -61,7 +61,7 @@ def pages(site: Path) -> list[Path]:
     return [site / "index.html", *site.glob("nights/*/*.html")]
 
 
-def test_no_markup_of_a_name_becomes_markup_or_a_path_and_no_template_of_it_is_run(hostile_site) -> None:
+def test_no_name_becomes_markup_a_path_a_template_or_a_mark_of_direction(hostile_site) -> None:
     """Every page is whole and asks nobody."""
     assert "<script>window.hacked=1</script>" in check_whole(hostile_site).text
     texts = {path: path.read_text(encoding="utf-8") for path in pages(hostile_site)}
@@ -74,14 +74,11 @@ def test_no_markup_of_a_name_becomes_markup_or_a_path_and_no_template_of_it_is_r
     assert "{{ 7*7 }}" in "".join(texts.values())
     assert sorted(p.name for p in hostile_site.parent.iterdir()) == ["site", "site.state"]
     assert all(path.name.isascii() and len(path.name) < 100 for path in hostile_site.rglob("*"))
+    for path in [*pages(hostile_site), hostile_site / "junit.xml", hostile_site / "summary.md"]:
+        assert not set(path.read_text(encoding="utf-8")) & set(OBEYED)
 
 
 OBEYED = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f\x00\x07\x1b"
-
-
-def test_direction_marks_and_control_signs_are_shown_not_obeyed(hostile_site) -> None:
-    for path in [*pages(hostile_site), hostile_site / "junit.xml", hostile_site / "summary.md"]:
-        assert not set(path.read_text(encoding="utf-8")) & set(OBEYED)
 
 
 def test_junit_and_summary_name_every_design_no_cell_is_a_formula_and_no_line_a_link(hostile_site) -> None:

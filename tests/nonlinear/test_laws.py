@@ -36,7 +36,7 @@ def test_odd_symmetry(law: str) -> None:
     assert runs[0].events == runs[1].events
 
 
-def test_a_narrow_tanh_tends_to_coulomb_but_knows_no_rest() -> None:
+def test_a_narrow_tanh_tends_to_coulomb_knows_no_rest_and_is_of_fourth_order() -> None:
     drives = (AMBER, *map(smooth, (4.0, 0.4, 0.04)))
     exact, *runs = (simulate(one, commands.sine(0.01, 2.0), 0.5, 8.0).output_angle_rad for one in drives)
     errors = [np.abs(run - exact).max() for run in runs]
@@ -46,10 +46,7 @@ def test_a_narrow_tanh_tends_to_coulomb_but_knows_no_rest() -> None:
     run = simulate(smooth(), commands.hold(), 0.01)
     assert run.stick_fraction == 0.0
     assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
-
-
-def test_fourth_order() -> None:
-    """Of runs with 2**level sub-steps in every tick."""
+    # runs with 2**level sub-steps in every tick
     rows = Rows.of(smooth(2.0), 4)
     rows["ticks"], rows["tanh_level"] = 120, [7, 2, 3, 4]
     rows.sine("command", 0.002, 100.0)

@@ -71,7 +71,7 @@ def test_h1_onset(frequency: float, reached: bool) -> None:
     assert run.limit_active("speed")[near_top].any() == reached
 
 
-def test_h2_pure_acceleration_limit() -> None:
+def test_h2_pure_acceleration_limit_and_h3_an_unsteady_point_shows() -> None:
     """20 000 deg/s2 at 20 Hz: parabola train of 1.5625 deg, fundamental 1.6126 deg."""
     Ts, f, a = 1e-6, 20.0, radians(20_000.0)
     design = ideal_drive(Ts, model.Limits(voltage_V=inf, acceleration_rad_s2=a))
@@ -84,9 +84,6 @@ def test_h2_pure_acceleration_limit() -> None:
     assert degrees(high[0] - low[0]) / 2.0 == pytest.approx(1.5625, abs=5e-4)
     assert degrees(abs(result.phasor("output_angle_rad", last=1)[0])) == pytest.approx(1.6126, abs=5e-4)
     assert result.distortion("output_angle_rad", last=1)[0] == pytest.approx(0.038, abs=1e-3)
-
-
-def test_h3_an_unsteady_point_shows() -> None:
     asked = {"design": AMBER, "command": commands.sine(0.002, 10.0), "reducers": Reducers(window_ticks=1000)}
     runs = [Run(**asked, duration_s=duration_s) for duration_s in (0.2, 2.0)]
     early, late = simulate_many(runs).unsteadiness("output_angle_rad")

@@ -72,7 +72,7 @@ def test_only_what_stays_is_judged(command: commands.Command, held: bool) -> Non
         assert rest.verdict == "at rest"
 
 
-def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
+def test_a_slow_stick_slip_cycle_and_waiting_take_their_own_time_and_little_work() -> None:
     """Breakaway 1.5, an integral of 100 s: the closed form of the stick foresees some hours a period."""
     values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 100.0}
     design = with_values(AMBER, values)
@@ -83,10 +83,7 @@ def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
     assert rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
     assert rest.amplitude == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
     assert rest.work < 1e-3 * rest.after_s / design.controller.period_s
-
-
-def test_waiting_is_that_of_the_closed_form() -> None:
-    """A step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work."""
+    # a step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work
     design = with_values(AMBER, {"control.velocity.integral_time": 600.0})
     threshold = friction_effects(AMBER).points[0].threshold
     size = 0.1 * threshold.static.forward_rad

@@ -22,7 +22,7 @@ def _cube(region: Region, count: int = 4000) -> np.ndarray:
     return np.random.default_rng(1).uniform(size=(count, region.dimensions))
 
 
-def test_without_correlations_it_is_the_box_and_its_corners() -> None:
+def test_without_correlations_it_is_the_box_and_samples_of_a_table_are_taken_whole() -> None:
     sampler = Sampler((normal("a", 1.0, 0.1), uniform("b", 5.0, 2.0)), np.eye(2))
     region = Region(sampler)
     assert region.dimensions == 2
@@ -30,6 +30,15 @@ def test_without_correlations_it_is_the_box_and_its_corners() -> None:
     drawn = sampler.draw(0, 50)
     inside = np.clip(drawn, *sampler.box)
     np.testing.assert_allclose(region.values(region.cube(inside)), inside, rtol=1e-12)
+    # a table whose columns sum to one: no point of the region breaks that
+    first = np.random.default_rng(3).uniform(size=40)
+    table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
+    region = Region(Sampler((normal("a"),), np.eye(1), table))
+    assert region.dimensions == 2
+    values = region.values(_cube(region, 500))
+    np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)
+    rows = np.column_stack([np.zeros(40), table.rows])
+    np.testing.assert_allclose(region.values(region.cube(rows)), rows, atol=1e-12)
 
 
 @pytest.mark.parametrize("r", [-0.97, -0.4, 0.2, 0.8, 0.999])
@@ -71,18 +80,6 @@ def test_tied_parameters_move_as_one_and_reach_the_edges(sign: float) -> None:
         np.testing.assert_allclose(shares[:, 0], sign * shares[:, 1], atol=1e-9)
         ends = region.values(np.array([[0.0], [1.0]]))[:, 0]
         assert sorted(ends) == pytest.approx([2.0 - width[0], 2.0 + width[0]], rel=1e-9)
-
-
-def test_samples_of_a_table_are_taken_whole() -> None:
-    """A table whose columns sum to one: no point of the region breaks that."""
-    first = np.random.default_rng(3).uniform(size=40)
-    table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
-    region = Region(Sampler((normal("a"),), np.eye(1), table))
-    assert region.dimensions == 2
-    values = region.values(_cube(region, 500))
-    np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)
-    rows = np.column_stack([np.zeros(40), table.rows])
-    np.testing.assert_allclose(region.values(region.cube(rows)), rows, atol=1e-12)
 
 
 def test_a_worst_case_of_correlated_parameters_is_one_that_occurs(tmp_path) -> None:
