@@ -56,16 +56,18 @@ def first(kind: str, made: dict) -> dict:
     return next(block for block in made["sections"][0]["blocks"] if block["kind"] == kind)
 
 
-@pytest.mark.parametrize(
-    ("design", "known"), [("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")]
-)
-def test_a_coupling_after_a_gear_that_is_none(design: str, known: str) -> None:
-    text = design_text(design)
-    changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
-    assert changed != text
-    line = refused("design", changed.encode())
-    assert 'coupling.after = "wor[["' in line
-    assert known in line
+def test_a_coupling_after_a_gear_that_is_none_and_an_id_that_is_no_text() -> None:
+    for design, known in (("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")):
+        text = design_text(design)
+        changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
+        assert changed != text
+        line = refused("design", changed.encode())
+        assert 'coupling.after = "wor[["' in line
+        assert known in line
+    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
+    for written_id in ("{}", "[1]", "3", "true"):
+        study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
+        assert "id" in refused("study", (study + limit).encode())
 
 
 def test_numbers_beyond_floats_names_that_cannot_be_read_and_a_status_twice() -> None:
@@ -78,13 +80,6 @@ def test_numbers_beyond_floats_names_that_cannot_be_read_and_a_status_twice() ->
     made = json.loads(small_report())
     first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
     BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
-
-
-@pytest.mark.parametrize("written_id", ["{}", "[1]", "3", "true"])
-def test_an_id_of_a_requirement_that_is_no_text(written_id: str) -> None:
-    study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
-    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
-    assert "id" in refused("study", (study + limit).encode())
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 
 from reports.nightly import changes
@@ -27,30 +26,27 @@ COMPARISON = Comparison(
 )
 
 
+PHRASES = (
+    (Cause(parameters=(("a", "1 V", "2 mV"),)), "a 1 V → 2 mV"),
+    (Cause(parameters=tuple((f"k{n}", "1", "2") for n in range(4))), "k0 1 → 2; k1 1 → 2; 2 more values"),
+    (Cause(commits=(("code", "abc fix"), ("code", "def more"))), "commit abc fix and 1 more"),
+    (Cause(libraries=(("numpy", "1", "2"),)), "numpy 1 → 2"),
+    (Cause(code=True), "sources of actuator-lti changed without a commit"),
+    (Cause(), "no input differs"),
+)
+
+
 def test_the_cause_comes_first_then_the_required_figure_in_words_and_distances_before_others() -> None:
     first = changes.main_changes(COMPARISON)[0]
     assert changes.cause_words(COMPARISON.cause) == "control.position.gain 90 → 120 1/s"
+    for cause, said in PHRASES:
+        assert changes.cause_words(cause) == said
     words = changes.change_words(first, COMPARISON, [PHASE])
     assert words == "phase margin of the position loop 62.10 → 55.30 deg"
     of_a_table = changes.change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
     assert of_a_table == "gain margin of Position loop 20.00 → 5.000 dB"
     many = Comparison(changes=(*COMPARISON.changes, *(change(f"x{k}", 2.0, 1.0) for k in range(49))))
     assert [c.kind for c in changes.main_changes(many)] == ["distance", *["figure"] * 4]
-
-
-@pytest.mark.parametrize(
-    ("cause", "words"),
-    [
-        (Cause(parameters=(("a", "1 V", "2 mV"),)), "a 1 V → 2 mV"),
-        (Cause(parameters=tuple((f"k{n}", "1", "2") for n in range(4))), "k0 1 → 2; k1 1 → 2; 2 more values"),
-        (Cause(commits=(("code", "abc fix"), ("code", "def more"))), "commit abc fix and 1 more"),
-        (Cause(libraries=(("numpy", "1", "2"),)), "numpy 1 → 2"),
-        (Cause(code=True), "sources of actuator-lti changed without a commit"),
-        (Cause(), "no input differs"),
-    ],
-)
-def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
-    assert changes.cause_words(cause) == words
 
 
 def test_designs_with_the_same_cause_are_one_line_with_which_index_and_page_open(tmp_path) -> None:

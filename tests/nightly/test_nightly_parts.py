@@ -22,6 +22,7 @@ from reports.nightly.state import hold
 from reports.nightly.text import csv_cell, one_line
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
 from reports.sections.validation import table
+from tests.refusals import refused
 
 
 @given(st.text())
@@ -114,12 +115,6 @@ def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple
     assert found == [(pytest.approx(value, rel=1e-12), "s") for value in night]
 
 
-@pytest.mark.parametrize("value", ["-1 deg", "much", "nan", True, [1]])
-def test_a_tolerance_that_is_none_is_refused(value: object) -> None:
-    with pytest.raises(InputError, match=r"study.toml: tolerance 'x'"):
-        read_tolerances({"x": value}, "study.toml")
-
-
 def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(tmp_path) -> None:
     told = pytest.raises(InputError, match=r"process \d+ on .+ since 20\d\d-.*--wait")
     with hold(tmp_path), told, hold(tmp_path):  # by another handle, as another process has
@@ -173,11 +168,13 @@ def test_every_heading_is_a_column_of_the_report_with_its_tolerance(quantity) ->
     assert relative == 1e-3
 
 
-def test_quantities_of_loops_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_first() -> None:
+def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_first() -> None:
     assert all(q.heading for q in LOOP_QUANTITIES.values())
     pairs = {(quantity.unit, quantity.tolerance) for quantity in LOOP_QUANTITIES.values()}
     assert len(pairs) == len({unit for unit, _ in pairs}), pairs
     figure = Figure(name="margins / A table / Current loop / Gain margin", value=1.0, unit="dB")
+    for value in ("-1 deg", "much", "nan", True, [1]):
+        refused(read_tolerances, {"x": value}, "study.toml", words="study.toml: tolerance 'x'")
     assert read_tolerances({"*gain margin": "0.5 dB"}, "study.toml").pair(figure) == (0.5, 0.0)
     assert Tolerances().pair(Figure(name="x: met", value=1.0, kind="verdict")) == (0.5, 0.0)
 

@@ -75,6 +75,11 @@ def test_rules_of_gains_are_their_closed_forms():
     s = 3.0j
     loop = pi_behind(*magnitude_optimum(2.0, 0.05, 0.01), lambda s: 2.0 / (1 + 0.05 * s) / (1 + 0.01 * s), s)
     assert loop == pytest.approx(1 / (2 * 0.01 * s * (1 + 0.01 * s)))
+    for a, margin in ((2.0, 36.8699), (2 + math.sqrt(3), 60.0)):  # symmetric optimum: at its crossover
+        gains, crossover = symmetric_optimum(4.0, 0.01, a), 1j / (a * 0.01)
+        loop = pi_behind(*gains, lambda s: 4.0 / s / (1 + 0.01 * s), crossover)
+        assert abs(loop) == pytest.approx(1.0)
+        assert 180 + math.degrees(cmath.phase(loop)) == pytest.approx(margin, abs=1e-4)
     # R/(2 T_sigma) L/R = 20 mohm with T_sigma 150 us: the current gain that the baseline has
     rules = rule_gains(load_design("ilr33-amber")).values
     assert rules["control.current.gain"] == pytest.approx(0.02)
@@ -88,13 +93,6 @@ def test_rules_of_gains_are_their_closed_forms():
         gain = rule_gains(replace(base, controller=control)).values["control.position.gain"]
         loop = gain * (1 + 1j * w * (Td or 0.0)) * kM / (1j * w * (Cv + 1j * w * J))
         assert abs(loop) == pytest.approx(1.0)
-
-
-@pytest.mark.parametrize(("a", "margin"), [(2.0, 36.8699), (2 + math.sqrt(3), 60.0)])
-def test_symmetric_optimum_has_its_margin_at_its_crossover(a, margin):
-    loop = pi_behind(*symmetric_optimum(4.0, 0.01, a), lambda s: 4.0 / s / (1 + 0.01 * s), 1j / (a * 0.01))
-    assert abs(loop) == pytest.approx(1.0)
-    assert 180 + math.degrees(cmath.phase(loop)) == pytest.approx(margin, abs=1e-4)
 
 
 def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
