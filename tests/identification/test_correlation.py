@@ -15,14 +15,13 @@ from tests.refusals import refused
 def test_emps_is_met_within_the_published_errors(emps_file) -> None:
     """Janot, Gautier, Brunot 2019: closed-loop simulation, relative errors in percent.
 
-    Their loop is not sampled: what is reached here is held, so that it does not get worse unseen. It begins in
-    Their loop is not sampled: what is reached here is held, so that it does not get worse unseen. The model begins
-    in motion as the record does. A design that is 1 ms late makes the force 40 % worse.
+    Their loop is not sampled: what is reached here is held, so that it does not get worse unseen. The record
+    begins in motion, and so does the model. A design that is 1 ms late makes the force 40 % worse.
+    """
     record, design = open_record(emps_file), load_design("emps")
     emps = correlate_record(design, record)
-    for signal, published, reached in (
-        ("position", 0.013752, 0.001089), ("velocity", 0.22911, 0.1272), ("force", 5.848, 4.593)
-    ):  # fmt: skip
+    errors = {"position": (0.013752, 0.001089), "velocity": (0.22911, 0.1272), "force": (5.848, 4.593)}
+    for signal, (published, reached) in errors.items():
         assert 100.0 * emps[signal].relative_error == pytest.approx(reached, rel=0.02)
         assert 100.0 * emps[signal].relative_error <= published
     assert abs(emps["position"].delay_s or 1.0) < 1e-4
