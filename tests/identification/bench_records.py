@@ -1,6 +1,5 @@
 """Records whose truth is known: simulated motions, written as a recorder would."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,15 +48,8 @@ def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Recor
     return Record(name=name, time_s=time, signals=signals, units={}, counts=rows)
 
 
-def write(
-    path: Path,
-    columns: Columns,
-    change: Callable[[Columns], Columns] | None = None,
-    mark: str = ",",
-    fmt: str = "%.12g",
-) -> Path:
+def write(path: Path, columns: Columns, mark: str = ",", fmt: str = "%.12g") -> Path:
     """A CSV file with a header line."""
-    columns = columns if change is None else change(dict(columns))
     table = np.column_stack(list(columns.values()))
     np.savetxt(path, table, delimiter=mark, header=mark.join(columns), comments="", fmt=fmt)
     return path

@@ -30,8 +30,8 @@ WINDOW = SteadyWindow(
 )
 
 
-def _points(seed: int, noise: float = 2e-6) -> list[SteadyPoint]:
-    rng = np.random.default_rng(seed)
+def _points(seed: int) -> list[SteadyPoint]:
+    rng, noise = np.random.default_rng(seed), 2e-6
     grid = product((0.0, 2.0, 5.0, 8.9), np.linspace(105.0, 942.0, 6).tolist())
     return [
         SteadyPoint(

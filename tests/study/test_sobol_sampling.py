@@ -25,10 +25,10 @@ R, L = "motor.resistance", "motor.inductance"
 BOX, BELL = uniform(R, 10.0, 2.0), normal(L, 5.0)
 
 
-def sampler(*factors, correlation=None, seed=0, table=None):
+def sampler(*factors, correlation=None, seed=0):
     size = len(factors)
     matrix = np.eye(size) if correlation is None else np.array([[1.0, correlation], [correlation, 1.0]])
-    return Sampler(tuple(factors), matrix, table, seed)
+    return Sampler(tuple(factors), matrix, seed=seed)
 
 
 def test_a_sample_is_the_same_alone_and_in_any_chunk_and_seed_zero_is_a_seed():
