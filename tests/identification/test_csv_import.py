@@ -57,6 +57,14 @@ def test_every_line_counts_ticks_wrap_around_and_careful_reading_is_fast_reading
     assert (counts.rows_in, counts.rows_out) == (4, 3)
     assert counts.dropped == {"with a missing value": 1}
     assert counts.first_dropped == {"with a missing value": "line 5"}
+    # rows are dropped only on demand
+    for what, text, reason in (
+        ("bad_rows", "0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n", "not a row of numbers"),
+        ("disorder", "0,1\n2,1\n1,1\n3,1\n", "whose time does not increase"),
+    ):
+        spec, count = _spec(**{what: "drop"}), text.count("\n")
+        counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), spec).counts
+        assert (counts.rows_in, counts.rows_out, counts.dropped) == (count, 3, {reason: count - 3})
     rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
     time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
     record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
@@ -118,18 +126,6 @@ def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path
     assert counts.rows_out == len(record)
     lines = content.removesuffix(b"\n").count(b"\n") + 1
     assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
-
-
-@pytest.mark.parametrize(
-    ("what", "text", "rows", "reason"),
-    [
-        ("bad_rows", "0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n", 6, "not a row of numbers"),
-        ("disorder", "0,1\n2,1\n1,1\n3,1\n", 4, "whose time does not increase"),
-    ],
-)
-def test_rows_are_dropped_only_on_demand_and_counted(what, text, rows, reason, tmp_path) -> None:
-    counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), _spec(**{what: "drop"})).counts
-    assert (counts.rows_in, counts.rows_out, counts.dropped) == (rows, 3, {reason: rows - 3})
 
 
 @pytest.mark.parametrize(

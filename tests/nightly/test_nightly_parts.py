@@ -157,15 +157,19 @@ def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
     assert commits_between(tmp_path, "0" * 40, new) == ()
 
 
-@pytest.mark.parametrize("quantity", [q for q in QUANTITIES.values() if q.heading], ids=lambda q: q.name)
-def test_every_heading_is_a_column_of_the_report_with_its_tolerance(quantity) -> None:
-    (column,) = [c for c in (*MARGIN_COLUMNS, *RESPONSE_COLUMNS) if c["label"] == quantity.heading]
-    unit = column.get("unit") or ""
-    figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
-    absolute, relative = Tolerances().pair(figure)
-    factor = {"ms": 1e3}.get(unit, 1.0)
-    assert absolute == pytest.approx(quantity.tolerance * factor, rel=1e-12)
-    assert relative == 1e-3
+def test_every_heading_is_a_column_of_the_report_with_its_tolerance() -> None:
+    for quantity in (q for q in QUANTITIES.values() if q.heading):
+        (column,) = [c for c in (*MARGIN_COLUMNS, *RESPONSE_COLUMNS) if c["label"] == quantity.heading]
+        unit = column.get("unit") or ""
+        figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
+        factor = {"ms": 1e3}.get(unit, 1.0)
+        assert Tolerances().pair(figure) == (pytest.approx(quantity.tolerance * factor, rel=1e-12), 1e-3)
+    units = {"dB": 0.01, "deg": 0.05, "%": 0.05, "s": 1e-7, "samples": 0.01, "A": 1e-9}
+    for unit, absolute in units.items():  # a figure of another name has the tolerance of its unit
+        figure = Figure(name="drive / something else", value=1.0, unit=unit)
+        assert Tolerances().pair(figure) == (absolute, 1e-3)
+        allowed = Columns([figure], Tolerances()).allowed(np.array([1e6]), np.array([np.nan]))
+        assert allowed == pytest.approx([1e3])
 
 
 def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_first() -> None:
@@ -177,14 +181,3 @@ def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_firs
         refused(read_tolerances, {"x": value}, "study.toml", words="study.toml: tolerance 'x'")
     assert read_tolerances({"*gain margin": "0.5 dB"}, "study.toml").pair(figure) == (0.5, 0.0)
     assert Tolerances().pair(Figure(name="x: met", value=1.0, kind="verdict")) == (0.5, 0.0)
-
-
-@pytest.mark.parametrize(
-    ("unit", "absolute"),
-    [("dB", 0.01), ("deg", 0.05), ("%", 0.05), ("s", 1e-7), ("samples", 0.01), ("A", 1e-9)],
-)
-def test_a_figure_of_another_name_has_the_tolerance_of_its_unit(unit: str, absolute: float) -> None:
-    figure = Figure(name="drive / something else", value=1.0, unit=unit)
-    assert Tolerances().pair(figure) == (absolute, 1e-3)
-    allowed = Columns([figure], Tolerances()).allowed(np.array([1e6]), np.array([np.nan]))
-    assert allowed == pytest.approx([1e3])

@@ -9,10 +9,8 @@ from actuator_lti import load_design
 from actuator_lti.design import model
 from actuator_lti.design.checks import check_design
 from actuator_lti.design.model import Design, Motor
-from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from nonlinear import Reducers, Run, State, commands, loads, simulate, simulate_many
-from nonlinear._kernels import elastic_layout, layout
 from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
@@ -106,15 +104,6 @@ def test_sawtooth_of_the_paper_and_a_step_on_3_V_without_windup() -> None:
     assert np.abs(run.voltage_V).max() <= 3.0
     assert run.output_angle_rad.max() < 0.1 * 1.01
     assert run.output_angle_rad[-1] == pytest.approx(0.1, rel=1e-3)
-
-
-def test_flag_bits_are_those_of_the_limiters_and_the_elastic_state_fits_its_place() -> None:
-    """No bit stands for two things, and two limiters share a limit only where one clamps behind the other."""
-    assert len({*layout.LIMITER_BITS, layout.FLAG_STICK}) == len(LIMITERS) + 1
-    assert max(layout.LIMITER_BITS) < 2**16
-    shared = [name for name, place in layout.LIMIT.items() if list(layout.LIMIT.values()).count(place) > 1]
-    assert shared == ["current", "torque-command"]
-    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE
 
 
 def drive(seed: int) -> Design:

@@ -41,28 +41,24 @@ def test_a_worm_before_a_chain_is_accepted_and_the_last_gear_is_meant_where_noth
             with_overrides(AMBER, {**CHAIN, **wrong})
 
 
-@pytest.mark.parametrize("load_Nm", [4.0, -4.0])
-def test_the_motor_feels_the_load_as_friction_only(load_Nm: float) -> None:
-    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w."""
-    design = steering()
-    rate = radians(5.0)
+@pytest.mark.parametrize(("load_Nm", "point"), [(4.0, "driving"), (-4.0, "driven")])
+def test_the_motor_feels_the_load_as_friction_only(load_Nm: float, point: str) -> None:
+    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w.
+
+    Of the linear one dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed.
+    """
+    design, rate = steering(), radians(5.0)
     run = simulate(design, commands.ramp(rate_rad_s=rate), 1.0, load_Nm=load_Nm)
     friction, kM = design.friction, design.motor.torque_constant_Nm_A
-    w = rate * design.total_ratio
-    wanted = (friction.dry_torque_Nm + friction.load_coefficient * 4.0 + friction.viscous_Nms_rad * w) / kM
+    w, CM = rate * design.total_ratio, friction.load_coefficient
+    wanted = (friction.dry_torque_Nm + CM * 4.0 + friction.viscous_Nms_rad * w) / kM
     assert np.mean(run.current_A[int(0.8 * len(run.time_s)) :]) == pytest.approx(wanted, rel=1e-6)
     twist = run.motor_angle_rad[-1] / 2376.0 - 2.0 * run.output_angle_rad[-1]
     assert twist == pytest.approx(-load_Nm / 2.0 / 50.0, rel=1e-6)
-
-
-@pytest.mark.parametrize(("point", "sign"), [("driving", 1.0), ("driven", -1.0)])
-def test_the_linear_motor_feels_the_spring_through_its_friction_only(point: str, sign: float) -> None:
-    """dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed."""
-    design = steering()
     system = plant(design, "ideal", operating_point=point)
     entry = system.A[system.state_labels.index("w"), system.state_labels.index("twist")]
-    J_m, CM = design.motor_side_inertia_kgm2, design.friction.load_coefficient
-    assert entry == pytest.approx(-sign * CM * 2.0 * 50.0 / J_m, rel=1e-12)
+    felt = np.sign(load_Nm) * CM * 2.0 * 50.0 / design.motor_side_inertia_kgm2
+    assert entry == pytest.approx(-felt, rel=1e-12)
 
 
 TICK = 1e-3

@@ -102,30 +102,22 @@ def protected(current_A: float, memory: float, overloaded: float = 0.0) -> tuple
     return p, s
 
 
-def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
+def test_overload_over_a_leap_and_when_it_acts_are_those_of_its_own_recursion() -> None:
+    """It trips at 1, lets go below 0.9; one tick before it has not."""
     p, s = protected(-1.0, 0.3)
     x, n = 0.3, 5000
     for k in range(n):
         x += 3e-4 * (((-1.0 + 3.5 * k / n) / 5.0) ** 2 - x)
     assert overload(p, s, 2.5, n) == pytest.approx(x, rel=1e-9)
     assert overload(p, s, -1.0, 0) == 0.3
-
-
-@pytest.mark.parametrize(
-    ("current_A", "start", "overloaded"),
-    [
-        (6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0),
-        (4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0),  # never: the last values lie this side of it
-    ],
-)  # fmt: skip
-def test_overload_acts_when_its_own_recursion_does(current_A: float, start: float, overloaded: float) -> None:
-    """Trips at 1, lets go below 0.9; one tick before it has not."""
-    p, s = protected(current_A, start, overloaded)
-    x, last, ticks = start, (current_A / 5.0) ** 2, 0
-    acts = last < 0.9 if overloaded else last > 1.0
-    while acts and (x >= 0.9 if overloaded else x < 1.0):
-        x, ticks = x + 3e-4 * (last - x), ticks + 1
-    assert ticks_until_it_acts(p, s) == max(ticks - 1, 0)
+    never = [(4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0)]  # the last values lie this side of it
+    for begin in [(6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0), *never]:
+        (current_A, x, overloaded), (p, s), ticks = begin, protected(*begin), 0
+        last = (current_A / 5.0) ** 2
+        acts = last < 0.9 if overloaded else last > 1.0
+        while acts and (x >= 0.9 if overloaded else x < 1.0):
+            x, ticks = x + 3e-4 * (last - x), ticks + 1
+        assert ticks_until_it_acts(p, s) == max(ticks - 1, 0), begin
 
 
 def test_overload_on_its_way_is_leapt_over_and_not_waited_for_where_it_stays() -> None:

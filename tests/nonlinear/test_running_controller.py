@@ -177,6 +177,7 @@ def command(tick: int) -> float:
 
 def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space() -> None:
     """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
+    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE
     assert all(name in part.__annotations__ for part, name in NAMED)
     for design in drives():
         plain, spoilt = Drive(design), Drive(design)
