@@ -112,13 +112,13 @@ def test_a_regression_counts_until_it_is_approved_by_itself_however_slow_the_dri
     assert not nights(job("a", 8.0)).passed
     assert nights(job("a", 9.5)).passed
     for step in range(12):
-        night = nights(job("a", 10.0 - 0.008 * step))
+        night = nights(job("drifts", 10.0 - 0.008 * step))
         assert not night.designs[0].last_night.changes
     assert not night.passed
-    nights(job("a", 10.0), job("b", 10.0))
-    nights(job("a", 9.0), job("b", 9.0))
-    night = nights.approve(job("a", 9.0), job("b", 9.0), names=["a"])
-    assert {d.name: d.state for d in night.designs} == {"a": "pass", "b": "regression"}
+    nights(job("one", 10.0), job("two", 10.0))
+    nights(job("one", 9.0), job("two", 9.0))
+    night = nights.approve(job("one", 9.0), job("two", 9.0), names=["one"])
+    assert {d.name: d.state for d in night.designs} == {"one": "pass", "two": "regression"}
 
 
 def test_an_approval_needs_a_name_a_reason_and_a_result(nights) -> None:
