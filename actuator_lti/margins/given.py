@@ -92,7 +92,7 @@ def given_of(system: Any) -> Given:
         raise InputError(
             f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
         )
-    period_s = period_of(system)
+    period_s = float(system.dt) if system.dt else None  # dt=True: 1 s
     if hasattr(system, "num"):
         num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         if not den.size:
@@ -116,11 +116,6 @@ def _trimmed(coefficients: Any) -> Real:
     p = np.asarray(coefficients, dtype=float)
     used = p.nonzero()[0]
     return p[used[0] :] if used.size else p[:0]
-
-
-def period_of(system: Any) -> float | None:
-    """Sampling period, s; 1 where it is not stated (``True``), ``None`` where continuous."""
-    return float(system.dt) if system.dt else None
 
 
 def unwarped(w: float, period_s: float | None) -> float:
