@@ -8,11 +8,10 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from actuator_lti.types import Real
 
-Real = NDArray[np.floating[Any]]
 _MOST_SAMPLES = 100
 ULP = 8  # by how much the entries may be wrong: what this changes the data do not determine
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.types import Complex, Real
 
 CONFIDENCE = 0.99
 _GUESSED = "as points scatter about their neighbours; MeasuredResponse takes what is known"
