@@ -5,8 +5,6 @@ allocates asks the bound first (`Bound.check`); ``python -m actuator_lti.bounds`
 Markdown for the documentation.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 

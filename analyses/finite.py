@@ -1,7 +1,5 @@
 """A number, or ``None`` where there is none."""
 
-from __future__ import annotations
-
 from math import isfinite
 
 

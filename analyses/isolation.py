@@ -4,8 +4,6 @@
 elsewhere an error goes its way.
 """
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """Names from files as parts of file names."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 

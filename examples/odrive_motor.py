@@ -19,8 +19,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.types import Floats
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import by_record, correlated_covariance
 from analyses.records.open_record import open_record
@@ -49,7 +49,7 @@ class VoltageMotor:
     steady_speeds_rad_s: tuple[float, ...]
     relative_residual: float
 
-    def estimated_speed(self, time_s: FloatArray, voltage_V: FloatArray) -> FloatArray:
+    def estimated_speed(self, time_s: Floats, voltage_V: Floats) -> Floats:
         """Speed as the drive would log it, for a voltage on a regular grid, held between its points."""
         from scipy.signal import cont2discrete, lfilter
 
@@ -104,7 +104,7 @@ def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
 
     gain = float(np.mean([step.steady / step.level for step in steps]))
 
-    def motor(p: FloatArray) -> VoltageMotor:
+    def motor(p: Floats) -> VoltageMotor:
         return VoltageMotor(
             gain_rad_sV=float(p[0] * gain),
             gain_std=0.0,
@@ -115,7 +115,7 @@ def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
             relative_residual=0.0,
         )
 
-    def residual(p: FloatArray) -> FloatArray:
+    def residual(p: Floats) -> Floats:
         grid = np.arange(0.0, WINDOW_S + 0.1, GRID_S)
         unit = motor(p).estimated_speed(grid, np.ones(len(grid)))
         parts = [
@@ -144,8 +144,8 @@ def _fit(steps: Sequence[_Step], estimator_rad_s: float) -> VoltageMotor:
 class _Step:
     """Speed around a step; times from the last row without voltage, ``between`` is the gap to the next."""
 
-    time: FloatArray
-    speed: FloatArray
+    time: Floats
+    speed: Floats
     level: float
     steady: float
     between: float
@@ -182,7 +182,7 @@ class ChirpLaw:
     end_s: float
     relative_residual: float
 
-    def __call__(self, time_s: FloatArray) -> FloatArray:
+    def __call__(self, time_s: Floats) -> Floats:
         since = np.maximum(time_s - self.start_s, 0.0)
         phase = 2.0 * np.pi * self.start_hz * np.expm1(self.rate_per_s * since) / self.rate_per_s
         return np.asarray(self.amplitude * np.sin(phase))
@@ -201,7 +201,7 @@ class ChirpPrediction:
     bands: tuple[tuple[float, float, SignalComparison], ...]
 
 
-def find_chirp(time_s: FloatArray, signal: FloatArray) -> ChirpLaw:
+def find_chirp(time_s: Floats, signal: Floats) -> ChirpLaw:
     """Fit the law to the well-sampled beginning and follow it on as long as the samples agree.
 
     Raises
@@ -221,7 +221,7 @@ def find_chirp(time_s: FloatArray, signal: FloatArray) -> ChirpLaw:
     rate = float(np.log(halves[1] / halves[0]) / (0.5 * (crossing[2] - crossing[0])))
     p = np.array([halves[0] * np.exp(-rate * (0.5 * (crossing[0] + crossing[1]) - begin)), rate, 0.0, 1.0])
 
-    def law(p: FloatArray, end: float, residual: float = 0.0) -> ChirpLaw:
+    def law(p: Floats, end: float, residual: float = 0.0) -> ChirpLaw:
         return ChirpLaw(
             amplitude=float(p[3] * amplitude), start_hz=float(p[0]), rate_per_s=float(p[1]),
             start_s=begin + float(p[2]), end_s=end, relative_residual=residual,
@@ -270,7 +270,7 @@ def predict_chirp(motor: VoltageMotor, record: Record) -> ChirpPrediction:
     return ChirpPrediction(law=law, whole=whole, bands=tuple(bands))
 
 
-def _crossings(time_s: FloatArray, signal: FloatArray) -> FloatArray:
+def _crossings(time_s: Floats, signal: Floats) -> Floats:
     k = np.flatnonzero(signal[:-1] * signal[1:] < 0.0)
     return np.asarray(time_s[k] - signal[k] * (time_s[k + 1] - time_s[k]) / (signal[k + 1] - signal[k]))
 

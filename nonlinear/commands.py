@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, shown, whole_number
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 
 __all__ = [
@@ -35,7 +36,6 @@ __all__ = [
     "triangle",
 ]
 
-Floats = npt.NDArray[np.float64]
 LEAST_SPECTRUM = 16  # samples from which on a spectrum is looked at
 _ROWS = 1 << 16  # samples that are summed at a time
 UNEVEN = 1.5  # times the usual interval: a longer one is a hole

@@ -1,15 +1,13 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
-from __future__ import annotations
-
 from os import PathLike
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError, finite_number
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import numbers_of
 from nonlinear.native import control_tick, parameters, tick
@@ -17,7 +15,6 @@ from nonlinear.row.parameters import design_row
 from nonlinear.runs.setup import put_state
 from nonlinear.runs.trajectory import ADVICE, STATUS, State
 
-Floats = npt.NDArray[np.float64]
 STATE_NAMES = {name[2:].lower(): place for name, place in vars(at).items() if name in at.STATE_NAMES}
 """Numbers of the state by name."""
 NOTED_NAMES = {

@@ -4,8 +4,6 @@ The moment is held over each tick at its value at the tick.  Through a self-lock
 friction ``CM |M|``; through a back-drivable one it also turns the motor shaft with ``M/N``.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy.typing as npt

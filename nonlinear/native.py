@@ -4,8 +4,6 @@
 beside it; an installation does so (`actuator_lti.compiled.library`).
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -16,10 +14,10 @@ import numpy.typing as npt
 from actuator_lti.compiled.library import Entry, Library, source_files
 from actuator_lti.drive import signals
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.forms import forms
 
-Floats = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.uint16]
 
 _FOLDER = Path(__file__).parent

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.row.parameters import design_rows
@@ -34,7 +35,6 @@ from nonlinear.runs.setup import Tables
 from nonlinear.runs.simulation import run_row
 from nonlinear.runs.trajectory import Trajectory
 
-Floats = npt.NDArray[np.float64]
 LIMITERS = at.LIMITERS
 POINTS = at.POINTS
 

@@ -4,8 +4,6 @@ Linear algebra libraries read these settings once. Set later they would leave th
 only those that it starts, whose numbers would then be others than its own.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

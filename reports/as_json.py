@@ -1,7 +1,5 @@
 """A result as plain data: fields and properties by their Python names, SI, designs by name and hash."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees

@@ -1,7 +1,5 @@
 """From a design to the document of its report; drawing and writing come after."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
@@ -14,6 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Progress
 from analyses.corners.run import Corners, corners
 from analyses.isolation import attempt, isolated
 from analyses.linear.loop_survey import LoopSurvey, survey_loops
@@ -44,7 +43,6 @@ from reports.sections import (
 from reports.sections.names import load_unit
 from reports.study_pages import design_head, notices
 
-Progress = Callable[[int, int], None]
 Step = Callable[[str], AbstractContextManager[Progress | None]]
 
 

@@ -6,8 +6,6 @@ holds is rounded well above. Two results on either side of a rounding border sti
 about a million, which no rounding can help.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,18 +1,16 @@
 """All figures of a document as SVG; what of a document that somebody gives can be drawn."""
 
-from __future__ import annotations
-
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 from actuator_lti.errors import InputError
+from actuator_lti.types import Progress
 from analyses.isolation import caught, note
 from reports.charts.data import chart_of
 from reports.charts.svg import page_svg, paper_svg
 
-Progress = Callable[[int, int], None]
 PLACEHOLDER = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 420 60"><text x="10" y="36" font-size="12"'
     ' fill="currentColor">This figure could not be drawn; the exit status was 3.</text></svg>'

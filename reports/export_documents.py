@@ -1,7 +1,5 @@
 """Documents that go into an exported unit: margin report, margins of its code, design file, licence."""
 
-from __future__ import annotations
-
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The words of reports, one line each: the glossary and what a table's heading says are made of it."""
 
-from __future__ import annotations
-
 from functools import cache
 
 from actuator_lti.asked.quantities import QUANTITIES

@@ -4,8 +4,6 @@ Everything that comes from a file of the user is escaped by the templates; only 
 escape their own text, are put in as they are.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import itertools

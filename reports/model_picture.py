@@ -1,7 +1,5 @@
 """The picture of an exported unit: controller above, drive train below, drawn from the design."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from importlib.util import find_spec

@@ -1,14 +1,12 @@
 """Numbers as a reader wants them: few digits, no exponent where none is needed, a true minus sign."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable
 from typing import Any
 
 MISSING = "–"
-LONG_S = 10.0  # a time from which on a column of ms is not read any more
+LONG_S = 1.0  # a time from which on it is no longer told in ms
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 

@@ -3,8 +3,6 @@
 The template gets texts only: numbers in their format, figures as SVG, nothing that is markup.
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Where a report comes from: versions, commit, hash of the design, time."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

@@ -5,8 +5,6 @@ what it exports, in the order of the imports, which go one way. A module says th
 ``import { a, b } from "./name.js";`` and ``export const`` or ``export class``.
 """
 
-from __future__ import annotations
-
 import re
 from functools import cache
 

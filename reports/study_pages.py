@@ -1,7 +1,5 @@
 """Documents of studies (tolerances, variants, tuning), and what those of one design have as well."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from actuator_lti.design import design_hash

@@ -1,7 +1,5 @@
 """Texts of other people as signs that are seen: a page, a printer or a terminal obeys nothing in them."""
 
-from __future__ import annotations
-
 import html
 import re
 

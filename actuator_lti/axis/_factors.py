@@ -5,8 +5,6 @@ known at a frequency fills a slot of ``parts``: gain, turn and their rates of ev
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

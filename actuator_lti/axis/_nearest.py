@@ -7,8 +7,6 @@ method on its slope, and is an end of intervals.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

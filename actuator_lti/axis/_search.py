@@ -5,8 +5,6 @@ one way.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -1,7 +1,5 @@
 """The compiled search of the axis, by the library of this package's kernels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from actuator_lti.compiled.kinds import Kind

@@ -1,7 +1,5 @@
 """Bandwidths of a closed loop by both definitions, its resonance, and the peaks of S and T."""
 
-from __future__ import annotations
-
 import cmath
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What bandwidths and peaks are returned as: frozen results that print with their units."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

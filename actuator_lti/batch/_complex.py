@@ -1,8 +1,6 @@
 """Rows, and complex numbers as pairs of floats, so that the same text runs in Python and, emitted, in C."""
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

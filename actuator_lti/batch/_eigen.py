@@ -5,8 +5,6 @@ deflation, as in EISPACK's hqr (Wilkinson and Reinsch, Handbook II/14).
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -1,8 +1,6 @@
 """Margins, bandwidths and peaks of one sampled loop from its scanned response, compiled."""
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

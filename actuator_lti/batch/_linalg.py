@@ -6,8 +6,6 @@ of two after Parlett and Reinsch (1969).
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

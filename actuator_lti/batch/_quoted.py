@@ -1,8 +1,6 @@
 """The figures to quote from a row of figures, compiled: those of `LinearFigures.quantity` and of the page."""
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB

@@ -5,8 +5,6 @@ states are not mixed as a Hessenberg form would: the zeros of A keep them apart.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -6,8 +6,6 @@ Rows are flat; complex numbers are pairs (real part, imaginary part), in rows on
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -1,8 +1,6 @@
 """All figures of one loop, and of many loops of one structure, compiled."""
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

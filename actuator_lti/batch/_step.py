@@ -1,8 +1,6 @@
 """Step response of a sampled closed loop and its figures, compiled."""
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -9,8 +9,6 @@ scanned.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 import numpy as np

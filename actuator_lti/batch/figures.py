@@ -1,7 +1,5 @@
 """Margins, bandwidths and step figures of many designs at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

@@ -1,19 +1,15 @@
 """The compiled figures of many designs, by the library of this package's kernels."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.batch._figures import COLUMNS
 from actuator_lti.batch._quoted import QUOTED
 from actuator_lti.batch._run import room
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.library import Entry, Library, source_files
-
-Floats = npt.NDArray[np.float64]
+from actuator_lti.types import Floats
 
 _FOLDER = Path(__file__).parent
 _ROW: Kind = "row"

@@ -1,7 +1,5 @@
 """Figures of the whole drive for many drives at once, at a load torque."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from actuator_lti.asked.drive_figure import drive_figure

@@ -1,7 +1,5 @@
 """A C compiler for emitted code: gcc or clang of the machine, or the one that comes with ziglang."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 import platform

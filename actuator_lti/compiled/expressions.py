@@ -1,7 +1,5 @@
 """Expressions: their kind, and their text in C."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable

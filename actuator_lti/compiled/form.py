@@ -4,8 +4,6 @@ The function and all that it calls are emitted again with the known numbers in t
 branches that these rule out. The arithmetic is the same.
 """
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable, Mapping

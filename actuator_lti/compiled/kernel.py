@@ -3,8 +3,6 @@
 It runs in Python as it stands, slowly: for a debugger, and as the reference of the compiled form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

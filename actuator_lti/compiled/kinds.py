@@ -1,7 +1,5 @@
 """The kinds of values that the subset knows, and how C spells them."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import textwrap

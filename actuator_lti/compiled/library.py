@@ -5,8 +5,6 @@ made of, so that one of other sources is never loaded. Where it is missing and t
 that may be written, the first call compiles it. A call leaves the GIL to other threads.
 """
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import os

@@ -4,8 +4,6 @@ Each call is followed with what is known of its arguments, so that one kernel ma
 The arithmetic is the kernel's; only a known zero added, or multiplied by, and a limit at infinity go.
 """
 
-from __future__ import annotations
-
 import ast
 import inspect
 import math

@@ -1,7 +1,5 @@
 """Statements of one function: kinds of its variables first, then its text in C."""
 
-from __future__ import annotations
-
 import ast
 
 from actuator_lti.compiled.expressions import Expressions, bare, widened

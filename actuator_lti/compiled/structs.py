@@ -1,7 +1,5 @@
 """C of what is left of kernels, with structures of named members in place of rows."""
 
-from __future__ import annotations
-
 import ast
 import math
 import re

@@ -1,7 +1,5 @@
 """What nobody reads in functions left of kernels goes: stores, variables, arguments, empty functions."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Iterable
 

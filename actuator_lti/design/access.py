@@ -1,7 +1,5 @@
 """Values of a design by dotted path, and designs with some values changed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from math import inf

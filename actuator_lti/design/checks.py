@@ -1,7 +1,5 @@
 """Physics across keys: what cannot be is refused; what is only suspicious is warned of (`suspicions`)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace

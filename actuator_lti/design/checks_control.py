@@ -1,7 +1,5 @@
 """Relations between the keys of the controller, its sensors and its command."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf, pi
 from typing import Any, get_args

@@ -1,7 +1,5 @@
 """Relations between the keys of motor, gears, coupling, load, friction, supply and limits."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

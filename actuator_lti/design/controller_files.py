@@ -10,8 +10,6 @@ damped tracking loop (1000 rad/s where the file names no bandwidth), its current
 p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC fix no period here.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from contextlib import suppress

@@ -3,8 +3,6 @@
 Read into the keys of ``[friction]`` that follow from them, which is what a design has from there on.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """One registry of every key of a design file: unit, symbol, allowed range, what it means."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import MISSING, fields, replace
 from typing import Any, get_args

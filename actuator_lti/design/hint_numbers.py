@@ -1,7 +1,5 @@
 """What a hint about an unknown key ends with: the number that the right key would have in this file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from contextlib import suppress

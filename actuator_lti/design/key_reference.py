@@ -1,7 +1,5 @@
 """Every key of a design file as a list to read, and how the numbers of one file are read."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Matrices of a law of one's own from a .mat or JSON file."""
 
-from __future__ import annotations
-
 from math import isqrt
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Read a design by name or path, or from a text."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

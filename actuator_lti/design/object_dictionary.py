@@ -3,8 +3,6 @@
 Grades as in a design file: A the maker's documents, B a file of a real device, D derived, X assumed.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf, isfinite, pi
 

@@ -1,7 +1,5 @@
 """Settings of the motion controller: from its own objects to a design and back, without loss."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A torque that depends on an angle: a straight line, and waves about it, which bend."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -3,8 +3,6 @@
 A mistake is noted and the walk goes on, past what is `UNREAD` then, so that all are told at once.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress

@@ -3,8 +3,6 @@
 Reading, writing, access by dotted key, the schema and the hash are loops over this table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from typing import Any, Literal

@@ -1,7 +1,5 @@
 """Controller settings as files, TOML or XML as a CANopen device configuration (``.xdc``)."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Data sheets' and controllers' words for what a design file has under another name, by the table of both."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """How data sheets write numbers and units: each spelling becomes a number and a product of names."""
 
-from __future__ import annotations
-
 import re
 from math import isfinite, nan
 

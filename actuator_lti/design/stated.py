@@ -1,7 +1,5 @@
 """A number as a file states it, in SI: by the axis, its screw, and the amperes of the motor's data sheet."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """What is not wrong in a design but suspicious: one line each, for the report and the terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf, isfinite, pi, sqrt
 

@@ -1,7 +1,5 @@
 """Tolerances: read from the design file, made absolute, checked against the allowed range."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, get_args, get_type_hints

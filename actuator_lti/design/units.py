@@ -93,6 +93,7 @@ _ASIDE = {
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
+    "db": "is no unit here; a ratio is 10^(dB/20): -20 dB is 0.1",
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")

@@ -1,7 +1,5 @@
 """A system of python-control or scipy as a law of one's own of a design."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

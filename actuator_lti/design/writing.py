@@ -1,7 +1,5 @@
 """A design as a design file again, nothing lost but the comments; text overrides; the hash."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

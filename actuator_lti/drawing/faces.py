@@ -3,8 +3,6 @@
 That is loaded when the first picture or table is asked for.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import Any
 

@@ -4,8 +4,6 @@ A followed value is one that writes down what is done with it (`nonlinear.export
 has a ``either`` of its own.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -4,8 +4,6 @@ A symbolic link is followed: what it points to is replaced, the link stays. Devi
 ``/dev/stdout``, are written to, never replaced; nothing else is taken for a file.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import secrets

@@ -6,8 +6,6 @@ fields of a structure as ``name.field``; all else (sparse, objects) is passed ov
 arrays, which stand beside the real ones for whoever asks for them.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator
@@ -19,8 +17,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.bounds import MAT_DIMENSIONS, MAT_VALUES
 from actuator_lti.errors import InputError
-
-FloatArray = NDArray[np.float64]
+from actuator_lti.types import Floats
 
 HEADER = 128
 MATRIX, COMPRESSED = 14, 15
@@ -36,7 +33,7 @@ MAX_DIMENSIONS = MAT_DIMENSIONS.most
 class MatContent:
     """Arrays by name, lists of texts by name, and the names (or kinds) of what was passed over."""
 
-    arrays: dict[str, FloatArray] = field(default_factory=dict)
+    arrays: dict[str, Floats] = field(default_factory=dict)
     texts: dict[str, tuple[str, ...]] = field(default_factory=dict)
     passed_over: list[str] = field(default_factory=list)
     complexes: dict[str, NDArray[np.complex128]] = field(default_factory=dict)
@@ -189,7 +186,7 @@ class _Reader:
             yield kind, data[begin : begin + size], place
             place = following
 
-    def _numbers(self, part: Part) -> FloatArray | None:
+    def _numbers(self, part: Part) -> Floats | None:
         """Numbers of one element as floats; None for a type that is no number."""
         code = NUMBERS.get(part[0])
         if code is None:

@@ -5,8 +5,6 @@ checked here for every file that a user or somebody else wrote: designs, studies
 descriptions, report.json. What comes out may be printed and written to other files as it is.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -15,8 +15,8 @@ from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
+from actuator_lti.types import Floats
 
-FloatArray = NDArray[np.float64]
 Loop = Literal["L", "T", "S"]
 WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
 
@@ -49,10 +49,10 @@ class RecordedResponse:
     ``left_out``: rows without numbers, or without coherence.
     """
 
-    frequency_hz: FloatArray
+    frequency_hz: Floats
     response: NDArray[np.complex128]
-    deviation: FloatArray
-    coherence: FloatArray
+    deviation: Floats
+    coherence: Floats
     name: str
     left_out: int = 0
 
@@ -113,7 +113,7 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
         return _response(columns, Path(source).name, averages)
 
 
-def _table(text: str) -> dict[str, FloatArray]:
+def _table(text: str) -> dict[str, Floats]:
     """Columns by their headings."""
     lines = [line.strip() for line in text.splitlines()]
     lines = [line for line in lines if line and line[0] not in "#%"]
@@ -139,7 +139,7 @@ def _number(word: str, cut: str | None) -> float:
         return np.nan
 
 
-def _response(columns: Mapping[str, FloatArray], name: str, averages: int | None) -> RecordedResponse:
+def _response(columns: Mapping[str, Floats], name: str, averages: int | None) -> RecordedResponse:
     found: dict[str, str] = {}
     for role, (like, _) in _UNITS.items():
         named = next((one for one in columns if one not in found.values() and like.search(one)), None)
@@ -181,7 +181,7 @@ def _unit(role: str, name: str, default: Any) -> Any:
     return next((unit for like, unit in known.items() if re.search(like, name, re.I)), default)
 
 
-def _values(table: Mapping[str, FloatArray], found: Mapping[str, str]) -> NDArray[np.complex128]:
+def _values(table: Mapping[str, Floats], found: Mapping[str, str]) -> NDArray[np.complex128]:
     if "real" in table:
         return table["real"] + 1j * table["imaginary"]
     size, phase = table["size"], table["phase"]
@@ -200,8 +200,8 @@ def _values(table: Mapping[str, FloatArray], found: Mapping[str, str]) -> NDArra
 
 
 def _deviation(
-    table: Mapping[str, FloatArray], found: Mapping[str, str], coherence: FloatArray, averages: int | None
-) -> FloatArray:
+    table: Mapping[str, Floats], found: Mapping[str, str], coherence: Floats, averages: int | None
+) -> Floats:
     if "deviation" in table:
         deviation = table["deviation"] * _unit("deviation", found["deviation"], 1.0)
         if not (deviation >= 0.0).all():
@@ -210,5 +210,5 @@ def _deviation(
     n = table.get("averages", np.nan) if averages is None else np.asarray(float(averages))
     if (np.asarray(n) < 2.0).any():
         raise InputError("averages: at least 2")
-    made: FloatArray = np.sqrt((1.0 - coherence) / (coherence * (n - 1.0)))
+    made: Floats = np.sqrt((1.0 - coherence) / (coherence * (n - 1.0)))
     return made

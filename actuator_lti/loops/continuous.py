@@ -1,7 +1,5 @@
 """The continuous form with exact delays, and the ideal form without: every loop as an LTI system."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -13,8 +13,6 @@ Kp (1 + 1/(Tn s)) + Kp T/(2 Tn) + O(s T^2), the tracking loop leads by T/2, a mo
 is held, and holds and differences also lose some gain.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The exact sampled form: every loop as a state space with its own period."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

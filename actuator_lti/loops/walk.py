@@ -9,8 +9,6 @@ their limiters; ``velocity_integral`` and ``current_integral``; ``w_meas``; the 
 points ``u``, ``i_ref``, ``w_ref``. The friction feed-forward has a step in it and no linear part.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass

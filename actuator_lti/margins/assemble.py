@@ -1,7 +1,5 @@
 """The result from its figures: verdict, delay margins, evidence."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

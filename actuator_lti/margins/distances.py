@@ -1,7 +1,5 @@
 """Distances of a response L whose smallest value is asked for: to -1, and those that peaks are one over."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -9,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.types import Complex, Real
 
 
 @dataclass(frozen=True)

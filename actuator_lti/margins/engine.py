@@ -1,7 +1,5 @@
 """`stability_margins`: one entry for every kind of loop."""
 
-from __future__ import annotations
-
 import math
 from contextlib import suppress
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Poles sorted by the stability boundary, each with the accuracy that its eigenvalue has."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,7 +7,7 @@ import numpy as np
 from scipy.linalg.lapack import dgeev
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.types import Complex, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
 _SHARP = 1e-3  # a border pole's error, over its modulus

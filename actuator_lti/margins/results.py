@@ -1,7 +1,5 @@
 """What the margin engine returns: frozen results that print with their units."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

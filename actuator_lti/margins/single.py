@@ -1,7 +1,5 @@
 """One margin each: gain, phase, delay, disk; and how the two ways to stability agree."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

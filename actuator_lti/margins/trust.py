@@ -1,7 +1,5 @@
 """Whether figures in double precision can be trusted: told from zero, with a small bound of their error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -9,7 +7,8 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import Complex, RationalLoop, Real, horner
+from actuator_lti.margins.loop import RationalLoop, horner
+from actuator_lti.types import Complex, Real
 
 EPS = float(np.finfo(float).eps)
 TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve counts as touching

@@ -1,7 +1,5 @@
 """Public names of a package that are loaded on first use (PEP 562): one way for all packages."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Collection, Mapping
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Step response of a system with inner delays: walked along the first of them, then by its poles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -12,32 +10,29 @@ from scipy.interpolate import BarycentricInterpolator
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
-from actuator_lti.margins.loop import Complex, Real, balanced
+from actuator_lti.margins.loop import balanced
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
-from actuator_lti.systems.delay_stepper import MOST_PIECES, NODES, DelayStepper
+from actuator_lti.systems.delay_stepper import MOST_PIECES, DelayStepper
 from actuator_lti.systems.plain_system import response
+from actuator_lti.types import Complex, Real
 
 _FIRST = 10.0  # longest delays to walk at first
 _MEET = 1e-7
 _POINTS = 32
-_SERIES = np.linalg.inv(np.vander(0.5 * (NODES + 1.0)))  # of the part of a piece, from its values
 _ZERO = 1e-12  # of the largest response about the poles
 _FORGOTTEN = 25.0  # time constants
 _CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points on it
 
 
 class Stepped:
-    """The first part of the response, over each piece a polynomial of the part of it.
-
-    From its values at `NODES` of each piece, shape (pieces, 8).
-    """
+    """The first part of the response, over each piece a power series of the part of it."""
 
     sampled, tie = False, 0.0
 
-    def __init__(self, begins: Real, lengths: Real, values: Real) -> None:
-        self._begins, self._lengths, self._series = begins, lengths, values @ _SERIES.T
+    def __init__(self, begins: Real, lengths: Real, series: Real) -> None:
+        self._begins, self._lengths, self._series = begins, lengths, series
 
     def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
         """See `actuator_lti.step.motion.Motion.spans`."""
@@ -51,7 +46,7 @@ class Stepped:
         """Times up to ``end``, and e there."""
         time = np.linspace(0.0, end, count)
         k = np.searchsorted(self._begins, time, side="right") - 1
-        powers = np.vander((time - self._begins[k]) / self._lengths[k], NODES.size)
+        powers = np.vander((time - self._begins[k]) / self._lengths[k], self._series.shape[1])
         return time, (powers * self._series[k]).sum(axis=1)
 
 
@@ -77,16 +72,17 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     walk, u = DelayStepper(system, 0.0, np.zeros(form.states), np.ones(1)), np.ones(1)
     while True:
         walk.at(head, u)
-        begins, lengths, values = walk.pieces()
-        values = values[..., 0] / final - 1.0
+        begins, lengths, series = walk.pieces()
+        series = series[..., 0] / final
+        series[:, -1] -= 1.0
         exact, weights = _modes(system, poles.values, head)
         late = begins > 0.75 * head
         modes = (np.exp(np.outer(begins[late], exact)) @ weights).real / final
-        if np.abs(modes - values[late, 0]).max() <= _MEET:
+        if np.abs(modes - series[late, -1]).max() <= _MEET:
             n = exact.size
             A = flint.acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
             state = weights * np.exp(exact * head) / final
-            return Stepped(begins, lengths, values), Motion(A, np.ones(n), state, False, head), final
+            return Stepped(begins, lengths, series), Motion(A, np.ones(n), state, False, head), final
         head *= 2.0
 
 

@@ -1,7 +1,5 @@
 """The python-control system of a plain one, made where somebody asks for it: importing it takes a second."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from actuator_lti.systems.plain_system import PlainDelaySystem, PlainSystem

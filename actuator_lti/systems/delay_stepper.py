@@ -9,8 +9,6 @@ Instants are kept while their jumps matter, for ever where a loop of delays lets
 Bellen, Zennaro, Numerical Methods for Delay Differential Equations, 2003.
 """
 
-from __future__ import annotations
-
 from heapq import heappop, heappush
 from itertools import count
 from math import factorial
@@ -29,6 +27,7 @@ _RADAU = (Legendre.basis(_STAGES) - Legendre.basis(_STAGES - 1)).roots()
 NODES = np.concatenate(([-1.0], _RADAU[:-1], [1.0]))  # of a piece, from -1 to 1
 _POWERS = np.arange(NODES.size)
 _SERIES = np.linalg.inv(NODES[:, None] ** _POWERS)  # power series from values at the nodes
+_OF_PART = np.linalg.inv(np.vander(0.5 * (NODES + 1.0))) @ NODES[:, None] ** _POWERS  # of 0 to 1, from that
 _LAST = np.linalg.inv(legvander(NODES, _STAGES))[-2:]  # Legendre coefficients of the highest degrees
 _HIGHEST = np.array([[0.05], [1.0]])  # weights of these
 _SLOPES = (_POWERS * NODES[1:, None] ** np.maximum(_POWERS - 1, 0)) @ _SERIES
@@ -95,10 +94,12 @@ class DelayStepper:
         return self._state, (self._C @ self._state + self._D @ np.concatenate([z, u]))[len(self._delays) :]
 
     def pieces(self) -> tuple[Real, Real, Real]:
-        """When the pieces so far begin, their lengths, and the outputs at `NODES` of each, (pieces, 8, p)."""
+        """When the pieces so far begin, their lengths, and the outputs as power series of the part of each.
+
+        Highest power first, shape (pieces, 8, p).
+        """
         some = slice(1, self._count)
-        values = NODES[:, None] ** _POWERS @ self._series[some, :, len(self._delays) :]
-        return self._begins[some], self._lengths[some], values
+        return self._begins[some], self._lengths[some], _OF_PART @ self._series[some, :, len(self._delays) :]
 
     def _turned(self, slope: Real) -> None:
         """The jumps that begin where the input's slope changes, at the start those of both too."""

@@ -1,7 +1,5 @@
 """A rational system as a fraction of two polynomials with exact coefficients: its doubles, as they are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

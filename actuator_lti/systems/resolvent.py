@@ -1,7 +1,5 @@
 """(p - A)^-1 B and C (p - A)^-1 B + D at many complex points p: s = jw, or z = exp(jwT)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

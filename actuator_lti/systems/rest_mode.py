@@ -7,8 +7,6 @@ residue of 1e-16 over a pole at 1e-17, which no later computation can tell from 
 and taken out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Matrices may be stacked: shape (..., n, n), with a period and a delay for each, 
 of delay and all or none with a fraction (see `split_delay`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

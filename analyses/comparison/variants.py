@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 from math import isfinite, nan
@@ -19,6 +19,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.reading import as_path
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Progress
 from analyses.comparison.found import (
     Changed,
     Contribution,
@@ -37,7 +38,6 @@ from analyses.studies.study import Study, Variant, load_study
 from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
 
-Progress = Callable[[int, int], None]
 _ALIKE = 1e-12  # relative; differences below are rounding
 _SEEN = 5e-5  # relative; differences below change no digit that is shown
 

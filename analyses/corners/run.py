@@ -1,7 +1,5 @@
 """Make the corners of a design and judge each by the linear loops."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 

@@ -12,9 +12,9 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.driving import LOADS, at_ticks, first_states, load_of, needed_command, supply_of
-from analyses.estimation.arrays import FloatArray
 from analyses.records.consistency import Finding, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
@@ -132,7 +132,7 @@ def correlate_record(
 
 def measured_signals(
     design: Design, record: Record, derive: bool = False, notes: list[str] | None = None
-) -> dict[str, FloatArray]:
+) -> dict[str, Floats]:
     """The recorded signals that the model has too; with ``derive``, a speed from the position as well.
 
     A signal that is zero throughout is left out.
@@ -159,12 +159,12 @@ def measured_signals(
 def model_signals(
     design: Design,
     record: Record,
-    measured: Mapping[str, FloatArray],
+    measured: Mapping[str, Floats],
     notes: list[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
     *,
     command: str | None = None,
-) -> tuple[dict[str, FloatArray], dict[str, float]]:
+) -> tuple[dict[str, Floats], dict[str, float]]:
     """The model's signals at a regular record's times, and the limiters' shares of the time.
 
     ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
@@ -211,7 +211,7 @@ def model_signals(
     return {name: np.interp(time, series["time"], series[name]) for name in measured}, limits
 
 
-def _series(design: Design, run: Trajectory) -> dict[str, FloatArray]:
+def _series(design: Design, run: Trajectory) -> dict[str, Floats]:
     """The signals of a run under the names of a record, and its time."""
     rate = run.output_speed_rad_s
     return {

@@ -1,14 +1,12 @@
 """One signal, measured and modelled: the figures that say how alike they are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from math import isnan
 
 import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag
 
 
@@ -33,9 +31,9 @@ class SignalComparison:
     max_error: float
     max_error_time_s: float
     delay_s: float | None
-    time_s: FloatArray = field(repr=False)
-    measured: FloatArray = field(repr=False)
-    modelled: FloatArray = field(repr=False)
+    time_s: Floats = field(repr=False)
+    measured: Floats = field(repr=False)
+    modelled: Floats = field(repr=False)
 
     @property
     def share_of_motion(self) -> float:
@@ -44,7 +42,7 @@ class SignalComparison:
 
 
 def compare_signals(
-    name: str, unit: str, time_s: FloatArray, measured: FloatArray, modelled: FloatArray
+    name: str, unit: str, time_s: Floats, measured: Floats, modelled: Floats
 ) -> SignalComparison:
     """Compare two signals sampled at the same times.
 
@@ -91,7 +89,7 @@ def compare_signals(
     )
 
 
-def delay_between(time_s: FloatArray, measured: FloatArray, modelled: FloatArray) -> float | None:
+def delay_between(time_s: Floats, measured: Floats, modelled: Floats) -> float | None:
     """The shift in s by which the modelled signal is to be moved later to fit the measured one best.
 
     By cross-correlation (FFT) on a regular grid to the sample, then to a fraction by least squares on the

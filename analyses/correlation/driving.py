@@ -14,7 +14,8 @@ from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ class Driven:
 
     signal: str
     stage: str
-    values: FloatArray
+    values: Floats
     design: Design
     notes: tuple[str, ...] = ()
 
@@ -102,7 +103,7 @@ def needed_command(design: Design, record: Record, signal: str | None = None) ->
     return driven
 
 
-def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[FloatArray, FloatArray]:
+def at_ticks(driven: Driven, time_s: Floats, duration_s: float) -> tuple[Floats, Floats]:
     """Times and values of the command at the drive's ticks.
 
     Through the samples goes a smooth curve, as a feed-forward takes the slope: straight lines would give it
@@ -122,7 +123,7 @@ def at_ticks(driven: Driven, time_s: FloatArray, duration_s: float) -> tuple[Flo
     return ticks, values
 
 
-def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatArray:
+def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     """A spline or Akima's curve, which misses every other sample less; beyond the ends it stands still."""
     from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
@@ -132,14 +133,14 @@ def _smooth(time_s: FloatArray, values: FloatArray, at_s: FloatArray) -> FloatAr
     akima = partial(Akima1DInterpolator, method="makima")
     between = slice(1, len(values) - 1 + len(values) % 2, 2)
 
-    def missed(curve: Callable[..., Callable[[FloatArray], FloatArray]]) -> float:
+    def missed(curve: Callable[..., Callable[[Floats], Floats]]) -> float:
         return float(np.linalg.norm(curve(time_s[::2], values[::2])(time_s[between]) - values[between]))
 
     curve = akima if len(values) < LEAST_FOR_A_SPLINE else min((akima, CubicSpline), key=missed)
     return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_of(values: FloatArray) -> BoolArray:
+def steps_of(values: Floats) -> BoolArray:
     """For each interval between two samples, whether the values jump there from standstill to standstill.
 
     Examples
@@ -152,7 +153,7 @@ def steps_of(values: FloatArray) -> BoolArray:
     return np.asarray(moves & ~around[:-2] & ~around[2:])
 
 
-def supply_of(driven: Driven, record: Record, time_s: FloatArray, notes: list[str]) -> dict[str, Any]:
+def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:
     """The recorded supply as `simulate` takes it; nothing without one, or for an ideal source.
 
     It limits the voltage. Where a loop sets the voltage itself (no current loop), that voltage is a duty
@@ -171,9 +172,7 @@ def supply_of(driven: Driven, record: Record, time_s: FloatArray, notes: list[st
     return {"supply": commands.sampled(time_s, values, where=record.name), "supply_scales": scales}
 
 
-def load_of(
-    design: Design, record: Record, time_s: FloatArray, notes: list[str]
-) -> tuple[Design, LoadMoment]:
+def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) -> tuple[Design, LoadMoment]:
     """The recorded load, which holds all of it; without one, the design's own moments act."""
     from nonlinear import loads
 
@@ -186,7 +185,7 @@ def load_of(
     return bare, loads.series(time_s, record[name], where=record.name)
 
 
-def first_states(driven: Driven, record: Record, measured: Mapping[str, FloatArray]) -> tuple[State, State]:
+def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats]) -> tuple[State, State]:
     """The state at the record's first sample: at rest there, or in the motion that the first samples show.
 
     In motion, or with a current, the controllers are settled: their integrals hold what is needed for it.

@@ -1,7 +1,5 @@
 """Records against the model: the figures of each, and of all together."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

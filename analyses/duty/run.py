@@ -1,20 +1,16 @@
 """Simulate a duty, then heat the winding and the overload state with its current."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import exp, inf, isfinite, log
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from nonlinear import Trajectory, commands, simulate
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -1,14 +1,10 @@
 """Arrays of one kind of number, as all analyses of records type them, and rows that are marked in them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int64]
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 def stretches(marked: BoolArray) -> list[tuple[int, int]]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 
 COVERAGE = 1.959963984540054
 """Standard errors of a normal value in half of its 95 % interval."""
@@ -45,8 +45,8 @@ class Fit:
     """
 
     names: tuple[str, ...]
-    values: FloatArray
-    covariance: FloatArray
+    values: Floats
+    covariance: Floats
     fixed: Mapping[str, Fixed] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> float:
@@ -62,7 +62,7 @@ class Fit:
         return self[name]
 
     @property
-    def standard_errors(self) -> FloatArray:
+    def standard_errors(self) -> Floats:
         """Standard errors, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
@@ -83,7 +83,7 @@ class Fit:
         return found | fixed
 
     @property
-    def correlation(self) -> FloatArray:
+    def correlation(self) -> Floats:
         """Correlation matrix; 0 beside a value without an error."""
         std = np.where(self.standard_errors > 0.0, self.standard_errors, 1.0)
         return np.asarray(self.covariance / np.outer(std, std))

@@ -1,7 +1,5 @@
 """Least squares of one or several records: what they tell, what they do not, and how sure it is."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -10,7 +8,7 @@ from scipy.optimize import brentq
 from scipy.signal import lfilter
 
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
 
@@ -38,15 +36,15 @@ class NotTold:
 class Solution:
     """Values and covariances: ``white`` as if the residuals were white, ``correlated`` as they are."""
 
-    values: FloatArray
-    white: FloatArray
-    correlated: FloatArray
-    residual: FloatArray
+    values: Floats
+    white: Floats
+    correlated: Floats
+    residual: Floats
     condition: float
 
 
 def told_apart(
-    w: FloatArray, names: Sequence[str], *, least: float = LEAST_OWN_SHARE
+    w: Floats, names: Sequence[str], *, least: float = LEAST_OWN_SHARE
 ) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
     """Which columns can be told apart (a share above ``least`` their own), the first named first.
 
@@ -59,7 +57,7 @@ def told_apart(
     ((0, 1), ['offset cannot be separated from dry', 'load is not excited at all'])
     """
     kept: list[int] = []
-    basis: list[FloatArray] = []
+    basis: list[Floats] = []
     left = []
     for k, name in enumerate(names):
         size = float(np.linalg.norm(w[:, k]))
@@ -80,7 +78,7 @@ def told_apart(
     return tuple(kept), tuple(left)
 
 
-def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
+def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
     """Ordinary least squares of ``y = w p``.
 
     Parameters
@@ -113,7 +111,7 @@ def solve(w: FloatArray, y: FloatArray, ends: Sequence[int] = ()) -> Solution:
     )
 
 
-def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[int] = ()) -> FloatArray:
+def correlated_covariance(w: Floats, residual: Floats, ends: Sequence[int] = ()) -> Floats:
     """As `covariance_of`, of rows of several records, one after the other."""
     blocks = zip(np.split(w, ends[:-1]), np.split(residual, ends[:-1]), strict=True)
     return covariance_of([information_of(*block) for block in blocks])
@@ -123,13 +121,13 @@ def correlated_covariance(w: FloatArray, residual: FloatArray, ends: Sequence[in
 class Information:
     """What one record tells: ``W'W``, ``W' G W``, its rows, and how many coefficients its noise took."""
 
-    gram: FloatArray
-    noise: FloatArray
+    gram: Floats
+    noise: Floats
     rows: int
     order: int
 
 
-def information_of(w: FloatArray, noise: FloatArray) -> Information:
+def information_of(w: Floats, noise: Floats) -> Information:
     """Of the rows of one record and (at least a part of) its noise.
 
     G is the autocovariance of the noise's own autoregressive model: with ``A(q) e = v`` white, ``W' G W =
@@ -140,7 +138,7 @@ def information_of(w: FloatArray, noise: FloatArray) -> Information:
     return Information(gram=w.T @ w, noise=variance * z.T @ z, rows=len(w), order=len(a) - 1)
 
 
-def covariance_of(records: Sequence[Information]) -> FloatArray:
+def covariance_of(records: Sequence[Information]) -> Floats:
     """Covariance of the least-squares values that all records together give.
 
     ``(W'W)^-1 W' G W (W'W)^-1``: no row of one record is correlated with one of another. Grown by rows over
@@ -151,13 +149,13 @@ def covariance_of(records: Sequence[Information]) -> FloatArray:
     return np.asarray(rows / max(rows - found, 1) * inverse @ sum(part.noise for part in records) @ inverse)
 
 
-def scaled_lstsq(w: FloatArray, y: FloatArray) -> FloatArray:
+def scaled_lstsq(w: Floats, y: Floats) -> Floats:
     """Least-squares values of ``y = w p``, each column divided by its size first."""
     scale = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
     return np.asarray(np.linalg.lstsq(w / scale, y, rcond=None)[0] / scale)
 
 
-def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:
+def autoregressive(values: Floats) -> tuple[Floats, float]:
     """Coefficients of ``A(q) e = v`` and the variance of v, by Levinson's recursion.
 
     The order is that of the lowest information criterion of Akaike, up to ``10 log10 n``.
@@ -185,7 +183,7 @@ def autoregressive(values: FloatArray) -> tuple[FloatArray, float]:
     return best
 
 
-def between_records(values: Sequence[float], stds: Sequence[float] | FloatArray) -> float:
+def between_records(values: Sequence[float], stds: Sequence[float] | Floats) -> float:
     """Standard deviation between records beyond their own errors (Mandel and Paule); 0 for one record.
 
     The scatter with which ``sum((x - mean)^2 / (std^2 + scatter^2))`` is one less than the number of records.

@@ -1,13 +1,11 @@
 """Correlation of series: means with an uncertainty that respects it, and the lag of one behind another."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 
 BATCH_TIMES = 5.0
 MIN_BATCHES, MAX_BATCHES = 8, 64
@@ -22,12 +20,12 @@ class Means:
     least five correlation times long where the record allows.
     """
 
-    values: FloatArray
-    covariance: FloatArray
-    correlation_samples: FloatArray
+    values: Floats
+    covariance: Floats
+    correlation_samples: Floats
 
 
-def correlated_means(columns: FloatArray) -> Means:
+def correlated_means(columns: Floats) -> Means:
     """Means and their covariance, by batch means: columns of shape (n, k), n samples of k signals.
 
     The length of a batch follows the longest integrated autocorrelation time of the signals.
@@ -41,7 +39,7 @@ def correlated_means(columns: FloatArray) -> Means:
     return Means(values=columns.mean(axis=0), covariance=covariance, correlation_samples=tau)
 
 
-def correlation_time(values: FloatArray) -> float:
+def correlation_time(values: Floats) -> float:
     """Integrated autocorrelation time 1 + 2 sum(rho_k), in samples, not below 1.
 
     The sum ends at the first lag beyond five times the sum so far (Sokal's window). A constant gives 1.
@@ -58,14 +56,14 @@ def correlation_time(values: FloatArray) -> float:
     return max(float(tau[last]), 1.0)
 
 
-def autocovariance(values: FloatArray, lags: int) -> FloatArray:
+def autocovariance(values: Floats, lags: int) -> Floats:
     """Autocovariance about zero at the lags 0 to ``lags``, each the sum of products over n."""
     size = next_fast_len(2 * len(values), real=True)
     spectrum = rfft(values, size)
     return np.asarray(irfft(spectrum.real**2 + spectrum.imag**2, size)[: lags + 1] / len(values))
 
 
-def best_lag(a: FloatArray, b: FloatArray) -> int:
+def best_lag(a: Floats, b: Floats) -> int:
     """Steps by which b is to be moved later to fit a, by the normalised cross-correlation."""
     size = next_fast_len(len(a) + len(b) - 1, real=True)
     cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)

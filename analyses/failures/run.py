@@ -1,22 +1,18 @@
 """Run every failure of a design on the rig of `analyses.failures.cases`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, log
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.stiffness import compliance
+from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
 from analyses.motion.settling import Settling, outcome
 from analyses.specification.capability import drive_figures
-
-Floats = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

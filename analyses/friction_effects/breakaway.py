@@ -3,8 +3,6 @@
 Both by the gains of the controllers, and simulated.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from math import copysign

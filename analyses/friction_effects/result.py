@@ -1,7 +1,5 @@
 """Everything that is said of dry friction at small signals, in one result."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """From bench records to a design that may be written: inputs, joint fit, refinement, verdicts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial

@@ -1,7 +1,5 @@
 """From a campaign to coefficients: import, steady parts, surface, the question of a richer law."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 

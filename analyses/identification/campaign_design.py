@@ -1,7 +1,5 @@
 """Which further runs would shrink the uncertainty of the margins most."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -10,7 +8,7 @@ import numpy as np
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.identification.surface import PATHS, SurfaceFit
 
 LOOPS = ("velocity", "position")
@@ -28,7 +26,7 @@ class MarginSpread:
     label: str
     unit: str
     value: float
-    slopes: FloatArray
+    slopes: Floats
     std: float
     floor_std: float
 
@@ -138,7 +136,7 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
     return result
 
 
-def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> Iterator[SuggestedRun]:
+def _greedy(fit: SurfaceFit, count: int, weight: Floats | None) -> Iterator[SuggestedRun]:
     """The run of the least weighed sum (or determinant) of the covariance, again and again."""
     own = float(np.median(fit.residual_stds_Nm**2))
     points = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points])
@@ -149,7 +147,7 @@ def _greedy(fit: SurfaceFit, count: int, weight: FloatArray | None) -> Iterator[
     candidates = np.array([[1.0, w, m] for m in (0.0, *levels) for w in speeds])
     information = rows.T @ rows
 
-    def spread(matrix: FloatArray) -> float:
+    def spread(matrix: Floats) -> float:
         covariance = np.linalg.inv(matrix)
         return float(np.linalg.det(covariance) if weight is None else np.sum(weight * covariance))
 

@@ -1,7 +1,5 @@
 """Every number of the design against the fit, the one cause of what is off, the constant that all hang on."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -13,7 +11,7 @@ from scipy.stats import chi2
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
@@ -204,7 +202,7 @@ def _constant(design: Design, record: Record) -> str | None:
     return None if closely else "torque_constant"
 
 
-def _shares(start: Design, more: Design, model: JointModel, records: Sequence[Record]) -> FloatArray:
+def _shares(start: Design, more: Design, model: JointModel, records: Sequence[Record]) -> Floats:
     """Relative change of each fitted value over that of the constant; exact, as the fit is linear in it."""
     tables, targets = [], []
     for weight, record in zip(model.weights, records, strict=True):

@@ -1,7 +1,5 @@
 """A record before it is believed: clipped, late, drifting; put right where it can be, and said."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,7 +7,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import BoolArray, FloatArray, lasting
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray, lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
@@ -108,7 +107,7 @@ def diagnosed(
     )
 
 
-def _widened(model: JointModel, moved: FloatArray) -> JointModel:
+def _widened(model: JointModel, moved: Floats) -> JointModel:
     """The model with what an error moves all its values by, once its standard deviation."""
     return replace(model, covariance=model.covariance + np.outer(moved, moved))
 
@@ -136,7 +135,7 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
     return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
 
 
-def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], FloatArray]:
+def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], Floats]:
     """Whether scale or offset of all torques drifts (-1 to 1) along a record, and adds to the covariance."""
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
@@ -158,7 +157,7 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], FloatArra
     return [Finding(subject="drift along the record", passed=None, text=text)] if told else [], moved
 
 
-def flat_tops(values: FloatArray) -> BoolArray:
+def flat_tops(values: Floats) -> BoolArray:
     """Where a signal stands at its largest or smallest value for three samples or more.
 
     Examples
@@ -213,7 +212,7 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
     inertia and friction.
     """
 
-    def slopes(record: Record) -> FloatArray:
+    def slopes(record: Record) -> Floats:
         """Columns of the model, and by how much the drive of each row falls with a shift, N m/s."""
         half = 0.5 * record.period_s
         late, early = (rows_under(design, shifted(design, record, s), model) for s in (half, -half))
@@ -243,7 +242,7 @@ def lag_of(design: Design, record: Record, simulated: Record, model: JointModel)
     return Lag(lag, float(np.hypot(error, feigned)))
 
 
-def _step(z: FloatArray, table: FloatArray, y: FloatArray) -> tuple[float, float]:
+def _step(z: Floats, table: Floats, y: Floats) -> tuple[float, float]:
     """The last value of ``z' (y - table p) = 0``, and its standard error."""
     size = np.linalg.norm(z, axis=0)
     z, table = z / size, table / size

@@ -1,7 +1,5 @@
 """Resistance, back-EMF constant and, only where the record shows it, inductance: from u, i and w."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -10,7 +8,7 @@ from scipy.signal import butter, filtfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import parameter
@@ -54,7 +52,7 @@ def fit_electrical(design: Design, records: Sequence[Record], recipe: Recipe | N
     return replace(again, fixed={**again.fixed, "inductance": kept})
 
 
-def _fitted(late: Sequence[FloatArray], early: Sequence[FloatArray], only: tuple[str, ...]) -> ElectricalFit:
+def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ...]) -> ElectricalFit:
     """The fit of some parameters, in error by what a voltage that acts at once would make of them."""
     table = np.concatenate(late)
     w, u = table[:, [NAMES.index(name) for name in only]], table[:, -1]
@@ -74,7 +72,7 @@ def _fitted(late: Sequence[FloatArray], early: Sequence[FloatArray], only: tuple
     )
 
 
-def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> FloatArray:
+def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> Floats:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
         if name not in record.signals:

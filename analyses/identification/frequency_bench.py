@@ -1,7 +1,5 @@
 """From records of a two-mass drive to a design: frequency response, play, verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -11,7 +9,7 @@ import numpy as np
 from actuator_lti.design import read_design_text, write_design
 from actuator_lti.design.model import Coupling, Design, LoadFriction
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
 from analyses.identification import two_mass
@@ -142,7 +140,7 @@ def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
     return replace(lines, means=means, noise=noise)
 
 
-def _reaction(design: Design, torque: FloatArray, angle: FloatArray) -> float:
+def _reaction(design: Design, torque: Floats, angle: Floats) -> float:
     """Torque on the motor by that in the coupling: 1/N_c, and CM N_r by the sign of the power to the load."""
     turned = float(angle[-1] - angle[0])
     side = np.sign(float(np.mean(torque)) * turned) if abs(turned) > 1.0 else 0.0

@@ -1,7 +1,5 @@
 """Friction as a map over the speed: break points found, and judged against the plain law."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -9,7 +7,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.design.model import Design
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, LawChoice, Recipe, RecordFit, linear_basis
@@ -71,7 +69,7 @@ def _law(breaks: tuple[float, ...], model: JointModel, independent: float) -> La
     )
 
 
-def _away_from_reversals(part: RecordFit) -> tuple[FloatArray, FloatArray]:
+def _away_from_reversals(part: RecordFit) -> tuple[Floats, Floats]:
     """Speed and friction of rows with no reversal beside: the decimation's filter mixes both sides."""
     side = np.sign(part.speed)
     turns = np.concatenate([[False], side[1:] != side[:-1], [False]])
@@ -80,9 +78,7 @@ def _away_from_reversals(part: RecordFit) -> tuple[FloatArray, FloatArray]:
     return part.speed[clear], part.friction[clear]
 
 
-def _one_more(
-    speed: FloatArray, rest: FloatArray, top: float, result: tuple[float, ...]
-) -> tuple[float, ...]:
+def _one_more(speed: Floats, rest: Floats, top: float, result: tuple[float, ...]) -> tuple[float, ...]:
     """The break points with the best one more, then each moved in turn."""
     grid = np.geomspace(LEAST_SHARE * top, 0.95 * top, GRID)
     size, side = np.abs(speed), np.sign(speed)

@@ -1,7 +1,5 @@
 """The inverse dynamic model of one or several records: inertia, friction, load, by joint least squares."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import (
     Solution,
@@ -66,7 +64,7 @@ def fit_records(
     if not records:
         raise InputError("no record to identify from")
     knots = None if knots_rad_s is None else tuple(float(v) for v in knots_rad_s)
-    moments: Sequence[FloatArray | None] = [None] * len(records)
+    moments: Sequence[Floats | None] = [None] * len(records)
     for _ in range(GRAVITY_ROUNDS if gravity else 1):
         blocks = [
             record_rows(design, record, form, recipe, gravity=gravity, moment=moment, knots_rad_s=knots)
@@ -87,15 +85,15 @@ class _Problem:
     free: Sequence[str]
     fixed: Mapping[str, Fixed]
 
-    def columns(self, names: Sequence[str]) -> FloatArray:
+    def columns(self, names: Sequence[str]) -> Floats:
         return np.concatenate([block.columns(names) for block in self.blocks])
 
-    def targets(self) -> list[FloatArray]:
+    def targets(self) -> list[Floats]:
         """The drive signal of each record less what is held explains."""
         held = {name: one.value for name, one in self.fixed.items()}
         return [block.y - block.explained(held, list(held)) for block in self.blocks]
 
-    def solved(self, weights: FloatArray) -> Solution:
+    def solved(self, weights: Floats) -> Solution:
         w = np.concatenate([g * one.columns(self.free) for g, one in zip(weights, self.blocks, strict=True)])
         y = np.concatenate([g * target for g, target in zip(weights, self.targets(), strict=True)])
         try:
@@ -149,7 +147,7 @@ def _said(design: Design, problem: _Problem, negative: Mapping[str, float], mode
     return replace(model, fixed={**model.fixed, **said}, covariance=covariance)
 
 
-def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed]) -> FloatArray:
+def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed]) -> Floats:
     """What the errors of the values kept add to the covariance of those that were found."""
     added = np.zeros((len(free), len(free)))
     for name, one in fixed.items():
@@ -158,7 +156,7 @@ def _of_fixed(design: Design, free: tuple[str, ...], fixed: Mapping[str, Fixed])
     return added
 
 
-def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) -> FloatArray:
+def _weights(blocks: Sequence[Rows], solution: Solution, weights: Floats) -> Floats:
     """Inverse residual of each record, against the median so that the size of things stays."""
     ends = np.cumsum([block.rows_used for block in blocks])
     parts = np.split(solution.residual, ends[:-1])
@@ -167,7 +165,7 @@ def _weights(blocks: Sequence[Rows], solution: Solution, weights: FloatArray) ->
     return weights if middle == 0.0 else np.asarray(middle / np.maximum(sizes, 0.05 * middle))
 
 
-def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple[Fit, FloatArray]:
+def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple[Fit, Floats]:
     """One record fitted alone, and its residual: what it tells, the rest held at what all gave."""
     kept, left = told_apart(block.columns(problem.free), problem.free)
     rest = {one.name: Fixed(value=found[one.name], reason="determined by other records") for one in left}
@@ -176,7 +174,7 @@ def _single(block: Rows, problem: _Problem, found: Mapping[str, float]) -> tuple
     return Fit(names=own, values=result.values, covariance=result.correlated), result.residual
 
 
-def _model(design: Design, problem: _Problem, solution: Solution, weights: FloatArray) -> JointModel:
+def _model(design: Design, problem: _Problem, solution: Solution, weights: Floats) -> JointModel:
     blocks, free = problem.blocks, tuple(problem.free)
     found = {name: one.value for name, one in problem.fixed.items()}
     found |= dict(zip(free, solution.values.tolist(), strict=True))

@@ -13,7 +13,8 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.estimation.arrays import BoolArray, FloatArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray
 from analyses.estimation.fit import Fit
 from analyses.records.differentiation import Motion, filtered_motion
 from analyses.records.record import Record
@@ -42,7 +43,7 @@ class Recipe:
     skip_end_samples: int = 0
     points: int = 3
 
-    def motion(self, values: FloatArray, period_s: float) -> Motion:
+    def motion(self, values: Floats, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
         return filtered_motion(
             values, period_s, cutoff_hz=self.cutoff_hz, order=self.filter_order, points=self.points
@@ -51,7 +52,7 @@ class Recipe:
 
 def friction_columns(
     motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
-) -> tuple[list[str], FloatArray]:
+) -> tuple[list[str], Floats]:
     """Names and columns of inertia, friction (of a form, or a map over the speed) and offset."""
     velocity, side = motion.velocity, np.sign(motion.velocity)
     names, own = list(NAMES[form]), [velocity, side, np.ones_like(side)]
@@ -63,7 +64,7 @@ def friction_columns(
     return names, np.column_stack([motion.acceleration, *own])
 
 
-def linear_basis(speed: FloatArray, knots: Sequence[float]) -> FloatArray:
+def linear_basis(speed: Floats, knots: Sequence[float]) -> Floats:
     """Piecewise linear functions, one for each knot: 1 there and 0 at the others; the last slope continues.
 
     Examples
@@ -93,12 +94,12 @@ class Rows:
     used: Mapping[str, str]
     notes: tuple[str, ...]
     names: tuple[str, ...] = field(repr=False)
-    w: FloatArray = field(repr=False)
-    y: FloatArray = field(repr=False)
-    sine: FloatArray = field(repr=False)
-    cosine: FloatArray = field(repr=False)
-    speed: FloatArray = field(repr=False)
-    acceleration: FloatArray = field(repr=False)
+    w: Floats = field(repr=False)
+    y: Floats = field(repr=False)
+    sine: Floats = field(repr=False)
+    cosine: Floats = field(repr=False)
+    speed: Floats = field(repr=False)
+    acceleration: Floats = field(repr=False)
     step_s: float = field(repr=False)
     keep: BoolArray = field(repr=False)
     recipe: Recipe = field(repr=False)
@@ -117,15 +118,15 @@ class Rows:
         """Which rows both use, as far as the shorter of them goes."""
         return np.asarray(self.keep[: len(other.keep)] & other.keep[: len(self.keep)])
 
-    def at(self, rows: BoolArray, values: FloatArray) -> FloatArray:
+    def at(self, rows: BoolArray, values: Floats) -> Floats:
         """Of values at the rows used those at some of them."""
         return values[np.flatnonzero(rows[self.keep[: len(rows)]])]
 
-    def columns(self, names: Sequence[str]) -> FloatArray:
+    def columns(self, names: Sequence[str]) -> Floats:
         """The regressors of some names."""
         return self.w[:, [self.names.index(name) for name in names]]
 
-    def explained(self, values: Mapping[str, float] | Fit, names: Sequence[str]) -> FloatArray:
+    def explained(self, values: Mapping[str, float] | Fit, names: Sequence[str]) -> Floats:
         """What some names explain of the drive."""
         return np.asarray(self.columns(names) @ np.array([values[name] for name in names]))
 
@@ -139,10 +140,10 @@ class RecordFit(Rows):
     of that, at the rows ``compared`` of those used.
     """
 
-    residual: FloatArray = field(repr=False)
-    own_residual: FloatArray = field(repr=False)
-    friction: FloatArray = field(repr=False)
-    noise: FloatArray = field(repr=False)
+    residual: Floats = field(repr=False)
+    own_residual: Floats = field(repr=False)
+    friction: Floats = field(repr=False)
+    noise: Floats = field(repr=False)
     compared: BoolArray = field(repr=False)
 
     @property
@@ -191,7 +192,7 @@ class JointModel(Fit):
     """
 
     form: FrictionForm = "symmetric"
-    white_errors: FloatArray
+    white_errors: Floats
     between: Mapping[str, float]
     relative_residual: float
     records: tuple[RecordFit, ...]
@@ -206,11 +207,11 @@ class JointModel(Fit):
     simulated: tuple[Record, ...] = field(default=(), repr=False)
     laws: tuple[LawChoice, ...] = field(default=(), repr=False)
 
-    def kept(self, rows: Rows) -> FloatArray:
+    def kept(self, rows: Rows) -> Floats:
         """What the values that were not found explain of rows."""
         return rows.explained(self, [name for name in rows.names if name not in self.names])
 
-    def turned(self, rows: Rows) -> FloatArray:
+    def turned(self, rows: Rows) -> Floats:
         """What turns with the direction of the motion, of rows.
 
         A drive that stands still turns its friction at no time that the motion tells.
@@ -219,7 +220,7 @@ class JointModel(Fit):
         return rows.explained(self, [name for name in rows.names if name.startswith(dry)])
 
     @property
-    def residual(self) -> FloatArray:
+    def residual(self) -> Floats:
         """Of all records, one after the other, in the unit of the drive signal."""
         return np.concatenate([record.residual for record in self.records])
 

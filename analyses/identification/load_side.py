@@ -1,14 +1,12 @@
 """Motion and torque on either side of an elastic coupling, as far as a record and the design tell them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lsim
 
 from actuator_lti.design.model import Coupling, Design, LoadFriction
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
 from analyses.records.record import Record
@@ -30,12 +28,12 @@ class TwoSides:
 
     motor: Motion
     load: Motion
-    torque: FloatArray
+    torque: Floats
     told: str
 
 
 def two_sides(
-    design: Design, record: Record, place: str, motion: Motion, moment: FloatArray, recipe: Recipe
+    design: Design, record: Record, place: str, motion: Motion, moment: Floats, recipe: Recipe
 ) -> TwoSides:
     """Motor's and load's motion of a record, from the motion at the motor as if the coupling were rigid.
 
@@ -62,7 +60,7 @@ def two_sides(
     return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told)
 
 
-def _of_load(design: Design, load: Motion) -> FloatArray:
+def _of_load(design: Design, load: Motion) -> Floats:
     """What the coupling carries without a moment: for inertia and friction behind it."""
     friction = design.load.friction or LoadFriction()
     dry = design.load_side_inertia_kgm2 * load.acceleration + friction.dry_torque_Nm * np.sign(load.velocity)
@@ -70,7 +68,7 @@ def _of_load(design: Design, load: Motion) -> FloatArray:
 
 
 def _measured(
-    design: Design, record: Record, followed: Motion, moment: FloatArray, recipe: Recipe
+    design: Design, record: Record, followed: Motion, moment: Floats, recipe: Recipe
 ) -> Motion | None:
     """The load's motion by the output's encoder; None without one, or where its noise is too large."""
     if "output_angle" not in record.signals:
@@ -85,9 +83,7 @@ def _measured(
     return made if design.load_side_inertia_kgm2 * rough < NOISE_SHARE * carried else None
 
 
-def _follows(
-    design: Design, coupling: Coupling, record: Record, motion: Motion, moment: FloatArray
-) -> Motion:
+def _follows(design: Design, coupling: Coupling, record: Record, motion: Motion, moment: Floats) -> Motion:
     """The load's motion that the motor's makes through the design's coupling, from rest in the twist."""
     friction, inertia = design.load.friction or LoadFriction(), design.load_side_inertia_kgm2
     k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad

@@ -1,7 +1,5 @@
 """Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -17,7 +15,7 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import sampled
-from analyses.estimation.arrays import ComplexArray, FloatArray
+from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.asked import Of
@@ -56,7 +54,7 @@ class ResponseResult(Identified):
     """What a measured response told of a design, and the response of the design that comes of it."""
 
     measured: RecordedResponse = field(repr=False)
-    modelled: ComplexArray = field(repr=False)
+    modelled: Complexes = field(repr=False)
     loop: str
     of: Of
     fit: ResponseFit
@@ -101,7 +99,7 @@ def identify_response(
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
 
-    def parts(values: ComplexArray) -> FloatArray:
+    def parts(values: Complexes) -> Floats:
         return np.concatenate([(values / size).real, (values / size).imag])
 
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
@@ -136,7 +134,7 @@ def identify_response(
 
 def _model(
     design: Design, loop: str | None, of: Of, measured: RecordedResponse
-) -> Callable[[Design], ComplexArray]:
+) -> Callable[[Design], Complexes]:
     """The response of a design's loop at the measured frequencies."""
     wired = wire(design, Operating())
     name = loop or wired.outermost
@@ -150,7 +148,7 @@ def _model(
             return sampled.reference_to_output(wired)
         return sampled.loop(wired, name).open_loop
 
-    def response(tried: Design) -> ComplexArray:
+    def response(tried: Design) -> Complexes:
         if tried.coupling is not None and not tried.load_side_inertia_kgm2 > 0.0:
             told = f"wants no inertia behind the coupling; allowed: a response of {name}, --of {of}"
             raise InputError(told, where=measured.name)
@@ -168,11 +166,11 @@ def _model(
 def _determined(
     start: Design,
     names: tuple[str, ...],
-    parts: Callable[[Design], FloatArray],
-    measured: FloatArray,
+    parts: Callable[[Design], Floats],
+    measured: Floats,
     known: bool,
     progress: Callable[[int, int], None] | None,
-) -> tuple[ResponseFit, FloatArray]:
+) -> tuple[ResponseFit, Floats]:
     """The fit of what is determined, and its residual; of the others the one told worst goes first."""
     left: dict[str, str] = {}
     while names:

@@ -1,7 +1,5 @@
 """Records simulated: values with which the drive moves as they did, and the written design against them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -12,9 +10,9 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
 from analyses.correlation.driving import command_of
-from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
 from analyses.identification.joint_model import FrictionForm, default_value
@@ -49,10 +47,10 @@ class OutputErrorResult(Fit):
 class Moved:
     """Values (SI) with which an output fits best, its slopes over them, shape (n, p), and what is left."""
 
-    values: FloatArray
-    slopes: FloatArray
-    rest: FloatArray
-    first: FloatArray
+    values: Floats
+    slopes: Floats
+    rest: Floats
+    first: Floats
     iterations: int
     at_bound: tuple[str, ...]
 
@@ -70,8 +68,8 @@ class Resimulated:
 def fit_output(
     design: Design,
     paths: tuple[str, ...],
-    output_of: Callable[[Design], FloatArray],
-    measured: FloatArray,
+    output_of: Callable[[Design], Floats],
+    measured: Floats,
     progress: Callable[[int, int], None] | None = None,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
@@ -85,10 +83,10 @@ def fit_output(
     ends = np.array([(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]).T
     count, most = 0, ITERATIONS * (2 * len(paths) + 1)
 
-    def values_at(moved: FloatArray) -> FloatArray:
+    def values_at(moved: Floats) -> Floats:
         return np.asarray(np.clip(start + scale * (moved - 1.0), *ends))
 
-    def residual(moved: FloatArray) -> FloatArray:
+    def residual(moved: Floats) -> Floats:
         nonlocal count
         values = dict(zip(paths, values_at(moved).tolist(), strict=True))
         output = output_of(with_values(design, values, check=False))
@@ -166,7 +164,7 @@ def refine_records(
         seen.append((record, name, measured, float(np.sqrt(np.mean(measured[name] ** 2)))))
     wanted = np.concatenate([measured[name] / size for _, name, measured, size in seen])
 
-    def output(tried: Design) -> FloatArray:
+    def output(tried: Design) -> Floats:
         parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
         return np.concatenate(parts)
 

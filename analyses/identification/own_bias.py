@@ -1,7 +1,5 @@
 """What the fit of an inverse model makes of a record whose truth is known: its own bias, taken off."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -11,9 +9,9 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
-from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
 from analyses.identification.inverse import fit_records, with_scatter
@@ -108,7 +106,7 @@ def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
     return replace(measured, noise=own - model, compared=np.pad(both, (0, more))[measured.keep])
 
 
-def _by_direction(model: JointModel, again: JointModel) -> FloatArray:
+def _by_direction(model: JointModel, again: JointModel) -> Floats:
     """What the values move by where the simulated records turn back at other instants than the measured."""
     tables, turned = [], []
     for weight, own, other in zip(model.weights, model.records, again.records, strict=True):
@@ -119,9 +117,7 @@ def _by_direction(model: JointModel, again: JointModel) -> FloatArray:
     return scaled_lstsq(np.concatenate(tables), np.concatenate(turned))
 
 
-def _alone(
-    own: Fit, simulated: Fit, weighed: tuple[FloatArray, FloatArray], made: Design, model: JointModel
-) -> Fit:
+def _alone(own: Fit, simulated: Fit, weighed: tuple[Floats, Floats], made: Design, model: JointModel) -> Fit:
     """One record fitted alone, less its bias, with the errors of its noise."""
     both = tuple(name for name in own.names if name in simulated.names)
     values = np.array([own[name] - simulated[name] + default_value(made, name) for name in both])
@@ -148,7 +144,7 @@ def _driven(design: Design, record: Record) -> Record:
         return record
     name = "position_reference" if design.axis == "linear" else "reference"
 
-    def place(record: Record) -> FloatArray:  # as recorded, whatever cut-off the fit has
+    def place(record: Record) -> Floats:  # as recorded, whatever cut-off the fit has
         return motion_of(design, record, recipe_for(record))[0].position
 
     wanted = command = place(record)

@@ -1,7 +1,5 @@
 """Motions within a drive's limits that tell its values as closely as asked: the plan of an experiment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
@@ -10,8 +8,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import model_signals
-from analyses.estimation.arrays import FloatArray
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
 from analyses.identification.joint_model import JointModel, Rows, default_value
@@ -42,7 +40,7 @@ class Segment:
     amplitude: float
     speed: float
     drive_rms: float
-    command: FloatArray = field(repr=False)
+    command: Floats = field(repr=False)
     information: Information = field(repr=False)
 
 
@@ -62,8 +60,8 @@ class Plan:
     segments: tuple[Segment, ...]
     expected: Fit
     half_widths: dict[str, float]
-    time_s: FloatArray = field(repr=False)
-    command: FloatArray = field(repr=False)
+    time_s: Floats = field(repr=False)
+    command: Floats = field(repr=False)
 
     @property
     def passed(self) -> bool:
@@ -138,7 +136,7 @@ def plan_motions(
     )
 
 
-def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: FloatArray) -> list[Segment]:
+def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: Floats) -> list[Segment]:
     """The best segment again and again, alike ones together; a first one tells all values alone."""
     chosen: list[Segment] = []
     parts = list(there)
@@ -154,7 +152,7 @@ def _chosen(segments: Sequence[Segment], there: Sequence[Information], size: Flo
     return sorted(chosen, key=segments.index)
 
 
-def _largest(design: Design, shape: str, cycles: int) -> tuple[FloatArray, Record]:
+def _largest(design: Design, shape: str, cycles: int) -> tuple[Floats, Record]:
     """The motion as large as deflection, speed and every other limit allow, and its simulated record."""
     time = PERIOD_S * np.arange(round(SEGMENT_S / PERIOD_S), dtype=np.float64)
     edge = np.minimum(np.minimum(time, time[-1] - time) / RISE_S, 1.0)

@@ -1,7 +1,5 @@
 """Play of a coupling from a record of both its sides under a torque that reverses."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -10,7 +8,8 @@ from scipy.ndimage import binary_erosion
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import own_std
 from analyses.identification.two_mass import TwoMass
@@ -121,7 +120,7 @@ def _coarse(steps: tuple[float, float], touching: BoolArray, smooth_samples: flo
     return float(np.hypot(*steps) / np.sqrt(12.0 * max(independent, 1.0)))
 
 
-def _resolution(values: FloatArray) -> float:
+def _resolution(values: Floats) -> float:
     """The step of a recorded signal: the smallest difference between its values, if most are multiples."""
     steps = np.diff(np.unique(values))
     step = float(np.min(steps[steps > 1e-9 * float(np.ptp(values))], initial=np.inf))
@@ -131,7 +130,7 @@ def _resolution(values: FloatArray) -> float:
     return step if np.mean(np.abs(shares - np.round(shares)) < 0.01) > 0.95 else 0.0
 
 
-def _in_contact(torque_Nm: FloatArray, twist: FloatArray, half: float, guard_samples: int) -> BoolArray:
+def _in_contact(torque_Nm: Floats, twist: Floats, half: float, guard_samples: int) -> BoolArray:
     """Rows beyond the gap on the side that the torque, well away from zero, pushes to."""
     side = np.sign(torque_Nm)
     pushed = np.abs(torque_Nm) > CONTACT * float(np.quantile(np.abs(torque_Nm), 0.95))

@@ -1,7 +1,5 @@
 """Tests of residuals as in system identification: whiteness, and independence of the inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -9,7 +7,8 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from analyses.estimation.arrays import FloatArray, IntArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import IntArray
 from analyses.identification.joint_model import JointModel, RecordFit
 
 LEVEL = 0.01
@@ -31,7 +30,7 @@ class ResidualTest:
     name: str
     input: str
     lags: IntArray = field(repr=False)
-    correlation: FloatArray = field(repr=False)
+    correlation: Floats = field(repr=False)
     bound: float
 
     @property

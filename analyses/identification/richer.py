@@ -1,13 +1,12 @@
 """Is a richer friction law warranted? Asked of runs that the law has not seen."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import nan
 
 import numpy as np
 
-from analyses.estimation.arrays import BoolArray, FloatArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray
 from analyses.identification.shared_errors import with_shared
 from analyses.identification.surface import SurfaceFit
 
@@ -59,7 +58,7 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     fold[np.lexsort((w, np.round(m, 1), s))] = (np.arange(len(w)) + np.arange(len(w)) // count) % count
     plain = np.column_stack([np.ones_like(w), w, m])
 
-    def errors(*terms: FloatArray) -> FloatArray:
+    def errors(*terms: Floats) -> Floats:
         """Weighted prediction error of each run by the law that has not seen it, the best of its terms."""
         tables = [weight[:, None] * np.column_stack([plain, term]) for term in terms]
         out = np.empty(len(w))
@@ -90,9 +89,7 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     return RicherLaws(scores=tuple(scores), best=best, folds=int(fold.max()) + 1)
 
 
-def _predicted(
-    rows: FloatArray, shared: FloatArray, torque: FloatArray, seen: BoolArray
-) -> tuple[FloatArray, float]:
+def _predicted(rows: Floats, shared: Floats, torque: Floats, seen: BoolArray) -> tuple[Floats, float]:
     """Weighted errors of a law (shared errors along) at unseen runs, and what is left at those it saw."""
     rows = rows / np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
     a = with_shared(rows[seen], shared[seen])
@@ -102,7 +99,7 @@ def _predicted(
     return errors, float(np.sum((b - a @ result) ** 2))
 
 
-def _score(name: str, formula: str, parameters: int, base: FloatArray, errors: FloatArray) -> LawScore:
+def _score(name: str, formula: str, parameters: int, base: Floats, errors: Floats) -> LawScore:
     level = float(np.mean(base**2))
     saved = (base**2 - errors**2) / level if level > 0.0 else np.zeros(len(base))
     gain, std = float(np.mean(saved)), float(np.std(saved, ddof=1) / np.sqrt(len(saved)))

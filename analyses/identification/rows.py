@@ -1,7 +1,5 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -11,7 +9,8 @@ from scipy.ndimage import minimum_filter1d
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray, lasting
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray, lasting
 from analyses.identification.joint_model import (
     FrictionForm,
     JointModel,
@@ -63,7 +62,7 @@ def is_loaded(record: Record) -> bool:
     return bool({"load_force", "torque"} & set(record.signals))
 
 
-def drive_of(design: Design, record: Record) -> tuple[FloatArray, str, str, bool]:
+def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
     """The drive torque (force) of a record: values, signal, words, and whether kE w is still to come off."""
     motor, signals = record.drive(design).effective_motor, record.signals
     constant, gain, ohm = motor.torque_constant_Nm_A, motor.source_gain_Nm_V, motor.resistance_ohm
@@ -103,8 +102,8 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
 
 
 def moment_of(
-    design: Design, record: Record, output_angle: FloatArray, *, gravity: bool = True
-) -> tuple[FloatArray, str]:
+    design: Design, record: Record, output_angle: Floats, *, gravity: bool = True
+) -> tuple[Floats, str]:
     """The moment at the output and the signal that it comes from.
 
     Without a recorded one, that of the design's own moments and (with ``gravity``) pendulum at the recorded
@@ -125,7 +124,7 @@ def record_rows(
     recipe: Recipe | None,
     *,
     gravity: bool = False,
-    moment: FloatArray | None = None,
+    moment: Floats | None = None,
     knots_rad_s: Sequence[float] | None = None,
 ) -> Rows:
     """Make the rows of one record, less what its own settings add (an inertia at the output).
@@ -208,7 +207,7 @@ def _check(record: Record, locked: bool) -> None:
         raise InputError(told)
 
 
-def _torque(design: Design, record: Record, motion: Motion) -> tuple[FloatArray, str, str]:
+def _torque(design: Design, record: Record, motion: Motion) -> tuple[Floats, str, str]:
     """The drive torque as it acts: a voltage later by the computing delay and half of what it is held for."""
     motor = design.effective_motor
     constant = motor.torque_constant_Nm_A or 0.0
@@ -234,7 +233,7 @@ def rows_under(design: Design, record: Record, model: JointModel) -> Rows:
     return made(moment=model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine)
 
 
-def _at_rest(velocity: FloatArray, period_s: float) -> BoolArray:
+def _at_rest(velocity: Floats, period_s: float) -> BoolArray:
     """Stretches of 30 ms or more below 0.5 % of the largest speed: the friction is not that of sliding."""
     slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
     return lasting(slow, max(round(REST_TIME_S / period_s), 6))

@@ -1,14 +1,13 @@
 """The identification that the files ask for: of a campaign, of records of a motion, or of two masses."""
 
-from __future__ import annotations
-
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
+from actuator_lti.types import Progress
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
 from analyses.identification.campaign import (
@@ -28,8 +27,6 @@ from analyses.records.campaign_file import load_campaign
 from analyses.records.campaign_import import import_campaign
 from analyses.records.open_record import open_record, open_records
 from analyses.records.record import Record, named_apart
-
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,13 +1,11 @@
 """What a current sampled at the controller's ticks tells of the current between them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.estimation.arrays import ComplexArray, FloatArray
+from actuator_lti.types import Complexes, Floats
 from analyses.records.record import Record
 
 TICK_TOLERANCE = 1e-3
@@ -28,7 +26,7 @@ class HeldVoltage:
     delay_s: float
     back_emf_A_per_rad_s: float
 
-    def mean_over_sample(self, omega_rad_s: FloatArray) -> ComplexArray:
+    def mean_over_sample(self, omega_rad_s: Floats) -> Complexes:
         """F: the line of the current over the line of its samples, for a voltage in steps.
 
         Of a voltage ``u_k = exp(j w k T)`` the line is ``exp(-j w d) (1 - 1/z)/(j w T)``, z = exp(j w T),
@@ -81,7 +79,7 @@ def held_voltage(design: Design, record: Record) -> HeldVoltage | None:
     )
 
 
-def mean_current(design: Design, record: Record, current: FloatArray, acceleration: FloatArray) -> FloatArray:
+def mean_current(design: Design, record: Record, current: Floats, acceleration: Floats) -> Floats:
     """The current between the ticks: the samples less their lead times the rate of what the voltage drives.
 
     That rate is ``di/dt + (kE/R) dw/dt``. A correction that is not small is left out.

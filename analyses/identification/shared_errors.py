@@ -1,12 +1,10 @@
 """Errors that all runs of a campaign share, the intervals that hold them, and runs that do not belong."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np
 
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.identification.steady import SteadyPoint
 from analyses.records.campaign_file import Instruments
 
@@ -20,7 +18,7 @@ def shared_errors(
     instruments: Instruments,
     load_coefficient: float,
     torque_constant_Nm_A: float,
-) -> tuple[tuple[str, ...], FloatArray]:
+) -> tuple[tuple[str, ...], Floats]:
     """Names of the shared errors, and what the bound of each adds to each run's torque, N m, (runs, errors).
 
     An error is uniform within its bounds; those whose bound is zero are left out. The torque sensor's error
@@ -44,7 +42,7 @@ def shared_errors(
 
 
 @lru_cache(maxsize=8)
-def _base(normals: int, uniforms: int, freedom: int) -> tuple[FloatArray, FloatArray]:
+def _base(normals: int, uniforms: int, freedom: int) -> tuple[Floats, Floats]:
     """Student draws (unit scale, jointly) and uniform draws; fixed, so that results repeat exactly."""
     rng = np.random.default_rng(20240601)
     normal = rng.standard_normal((DRAWS, normals))
@@ -52,7 +50,7 @@ def _base(normals: int, uniforms: int, freedom: int) -> tuple[FloatArray, FloatA
     return student, rng.uniform(-1.0, 1.0, (DRAWS, uniforms))
 
 
-def half_widths(random_covariance: FloatArray, shared: FloatArray, freedom: int) -> FloatArray:
+def half_widths(random_covariance: Floats, shared: Floats, freedom: int) -> Floats:
     """Half widths of the symmetric intervals that hold 95 % of the joint errors, shape (p,).
 
     Propagated distributions (GUM Supplement 1): Student errors of the runs, of that freedom, with their
@@ -65,9 +63,7 @@ def half_widths(random_covariance: FloatArray, shared: FloatArray, freedom: int)
     return np.asarray(np.quantile(np.abs(student @ root.T + uniform @ shared), 0.95, axis=0))
 
 
-def standardised(
-    x: FloatArray, y: FloatArray, variance: FloatArray, shared: FloatArray
-) -> tuple[FloatArray, float]:
+def standardised(x: Floats, y: Floats, variance: Floats, shared: Floats) -> tuple[Floats, float]:
     """Residuals of a robust fit in robust standard deviations, and the limit beyond which a run is no part.
 
     Huber's estimate, started from least absolute deviations, on rows divided by their standard deviation;
@@ -91,7 +87,7 @@ def standardised(
     return rest / scale, float(norm.isf(0.5 * LEVEL / count))
 
 
-def with_shared(x: FloatArray, shared: FloatArray) -> FloatArray:
+def with_shared(x: Floats, shared: Floats) -> Floats:
     """Regressors beside the shared errors, and a row for each shared error that holds it to its bound.
 
     The unknowns that belong to the columns of ``shared`` have a variance of 1/3, that of a uniform error

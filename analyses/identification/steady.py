@@ -1,13 +1,12 @@
 """The steady part of each run, by a stated criterion on the acceleration, and its means: one point a run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray, longest
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import longest
 from analyses.estimation.means import correlated_means
 from analyses.records.campaign_import import ImportedRun
 
@@ -54,7 +53,7 @@ class SteadyWindow:
 
 
 def find_steady_window(
-    time_s: FloatArray, speed_rad_s: FloatArray, criterion: SteadyCriterion = CRITERION
+    time_s: Floats, speed_rad_s: Floats, criterion: SteadyCriterion = CRITERION
 ) -> SteadyWindow:
     """The steady part of a run, which may be sampled irregularly."""
     period = float(np.median(np.diff(time_s)))
@@ -85,7 +84,7 @@ def find_steady_window(
     )
 
 
-def moving_slope(time_s: FloatArray, values: FloatArray, samples: int) -> FloatArray:
+def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:
     """Slope of the least-squares line over every ``samples`` neighbours, shape (n - samples + 1,).
 
     Examples
@@ -115,7 +114,7 @@ class SteadyPoint:
     torque_Nm: float
     speed_rad_s: float
     load_Nm: float
-    covariance: FloatArray
+    covariance: Floats
     window: SteadyWindow
     samples: int
     correlation_samples: tuple[float, float, float]

@@ -1,7 +1,5 @@
 """The friction surface M = C0 + Cv w + CM |M_ext| through the points of a campaign (paper, equation 9)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
@@ -9,7 +7,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.estimation.parameters import parameter
@@ -48,13 +46,13 @@ class SurfaceFit(Fit):
     """
 
     points: tuple[SteadyPoint, ...]
-    random_covariance: FloatArray
-    shared_shifts: dict[str, FloatArray]
-    half_widths: FloatArray
-    shared_effects: FloatArray = field(repr=False)
-    residuals_Nm: FloatArray
-    own_residuals_Nm: FloatArray
-    residual_stds_Nm: FloatArray
+    random_covariance: Floats
+    shared_shifts: dict[str, Floats]
+    half_widths: Floats
+    shared_effects: Floats = field(repr=False)
+    residuals_Nm: Floats
+    own_residuals_Nm: Floats
+    residual_stds_Nm: Floats
     run_scatter_Nm: float
     birge_ratio: float
     outliers: tuple[Outlier, ...]
@@ -80,7 +78,7 @@ class SurfaceFit(Fit):
         """Those of the coefficients that were fitted, by the keys of a design."""
         return self.renamed({name: parameter(name).key for name in NAMES if name not in self.fixed})
 
-    def predict_Nm(self, speed_rad_s: FloatArray, load_Nm: FloatArray) -> FloatArray:
+    def predict_Nm(self, speed_rad_s: Floats, load_Nm: Floats) -> Floats:
         """Friction torque at speeds and loads."""
         return np.asarray(self["C0"] + self["Cv"] * speed_rad_s + self["CM"] * np.abs(load_Nm))
 
@@ -153,19 +151,19 @@ class _Runs:
             raise NumericalError(told)
         return held
 
-    def ordinary(self) -> FloatArray:
+    def ordinary(self) -> Floats:
         """All coefficients, by ordinary least squares."""
         theta = self._start.copy()
         theta[self.told] = np.linalg.lstsq(self.free, self.rest, rcond=None)[0]
         return theta
 
-    def own_variance(self, theta: FloatArray) -> FloatArray:
+    def own_variance(self, theta: Floats) -> Floats:
         """Variance of each residual from the run's own noise: that of its means along (1, -Cv, -CM)."""
         along = np.array([1.0, -theta[1], -theta[2]])
         own = np.array([along @ p.covariance @ along for p in self.points])
         return np.maximum(own, 1e-8 * float(np.median(own)) + 1e-30)
 
-    def gain(self, variance: FloatArray, effects: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gain(self, variance: Floats, effects: Floats) -> tuple[Floats, Floats]:
         """What makes coefficients of torques, (X' V^-1 X)^-1 X' V^-1, and V: each run's own, and the shared.
 
         An error that is shared has a third of its bound squared.
@@ -174,7 +172,7 @@ class _Runs:
         whitened = np.linalg.solve(covariance, self.free)
         return np.asarray(np.linalg.solve(self.free.T @ whitened, whitened.T)), covariance
 
-    def scatter(self, own: FloatArray, effects: FloatArray) -> tuple[float, float]:
+    def scatter(self, own: Floats, effects: Floats) -> tuple[float, float]:
         """Variance between runs that makes chi-square equal its freedom, and the Birge ratio without it."""
         x, y, freedom = self.free, self.rest, len(self.y) - len(self.told)
 
@@ -241,8 +239,8 @@ class Contribution:
 
 
 def contributions(
-    values: FloatArray,
-    covariance: FloatArray | None = None,
+    values: Floats,
+    covariance: Floats | None = None,
     *,
     load_Nm: float = PAPER_LOAD_NM,
     speed_rad_s: float = PAPER_SPEED_RAD_S,

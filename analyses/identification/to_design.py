@@ -1,7 +1,5 @@
 """Identified values into a design, with their tolerances and correlations."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -13,7 +11,7 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel
@@ -144,7 +142,7 @@ def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
     return Tolerance(kind="truncated-normal", std=std, lower=lower, upper=upper)
 
 
-def _correlations(paths: Sequence[str], correlation: FloatArray) -> list[Correlation]:
+def _correlations(paths: Sequence[str], correlation: Floats) -> list[Correlation]:
     matrix = np.clip(correlation, -1.0, 1.0)
     matrix = np.where(np.abs(matrix) < LEAST_CORRELATION, 0.0, np.round(matrix, 6))
     np.fill_diagonal(matrix, 1.0)

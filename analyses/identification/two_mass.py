@@ -1,7 +1,5 @@
 """A two-mass drive from a record of a periodic excitation: lines, their noise, what fits them best."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -9,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
-from analyses.estimation.arrays import ComplexArray, FloatArray
+from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.means import autocovariance
 from analyses.records.record import Record
@@ -35,9 +33,9 @@ class Lines:
     ``freedom`` (complex) degrees.
     """
 
-    omega_rad_s: FloatArray
-    means: ComplexArray
-    noise: ComplexArray
+    omega_rad_s: Floats
+    means: Complexes
+    noise: Complexes
     names: tuple[str, ...]
     periods: int
     freedom: int
@@ -84,7 +82,7 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
     )
 
 
-def _spectrum(values: FloatArray, periods: int, samples: int) -> ComplexArray:
+def _spectrum(values: Floats, periods: int, samples: int) -> Complexes:
     """Amplitudes of the whole record, a line at every ``periods``-th place; the mean rate is taken off."""
     block = values[: periods * samples].reshape(periods, samples)
     rate = (block[-1].mean() - block[0].mean()) / max((periods - 1) * samples, 1)
@@ -92,7 +90,7 @@ def _spectrum(values: FloatArray, periods: int, samples: int) -> ComplexArray:
     return np.asarray(np.fft.rfft(block.ravel() - straight) * (2.0 / (periods * samples)))
 
 
-def response(lines: Lines, k: int = 1) -> tuple[ComplexArray, FloatArray]:
+def response(lines: Lines, k: int = 1) -> tuple[Complexes, Floats]:
     """Frequency response from the torque to the signal of a number, and its relative standard error."""
     of, by = lines.means[k], lines.means[0]
     n = lines.noise
@@ -155,8 +153,8 @@ class TwoMass(Fit):
 
 
 def angle_responses(
-    omega: FloatArray, p: Mapping[str, float], n: float, reaction: float | None = None
-) -> tuple[ComplexArray, ComplexArray]:
+    omega: Floats, p: Mapping[str, float], n: float, reaction: float | None = None
+) -> tuple[Complexes, Complexes]:
     """Motor angle and load angle over motor torque (model.md section 6, without play).
 
     ``J_m s^2 th + Cv s th + r T = torque``, ``J_l s^2 phi + Cv_l s phi = T``, ``T = (k + c s)(th/n - phi)``;
@@ -192,11 +190,11 @@ def fit_two_mass(
     names = tuple(name for name in NAMES if name not in held)
     scale = _scales(start, names)
 
-    def unpacked(q: FloatArray) -> dict[str, float]:
+    def unpacked(q: Floats) -> dict[str, float]:
         own = dict(zip(names, (q * scale).tolist(), strict=True))
         return {**held, **{name: value if name in FLOORS else abs(value) for name, value in own.items()}}
 
-    def residual(q: FloatArray) -> FloatArray:
+    def residual(q: Floats) -> Floats:
         g = angle_responses(lines.omega_rad_s, unpacked(q), reduction, reaction)
         both = _whitened(lines, g[:outputs])
         return np.concatenate([both.real, both.imag]) * np.sqrt(2.0)
@@ -234,7 +232,7 @@ def _weighed(freedom: int, outputs: int) -> tuple[float, float]:
     return freedom / rest, freedom * rest / max(rest**2 - 1.0, 1.0)
 
 
-def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
+def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> Floats:
     """What each parameter is measured by: its start, or a small part of what the others make critical."""
     for name in ("motor_inertia", "load_inertia", "stiffness"):
         if not start.get(name, 0.0) > 0.0:
@@ -248,7 +246,7 @@ def _scales(start: Mapping[str, float], names: tuple[str, ...]) -> FloatArray:
     return np.array([max(abs(start.get(name, 0.0)), size.get(name, 0.0)) for name in names])
 
 
-def _whitened(lines: Lines, responses: Sequence[ComplexArray]) -> ComplexArray:
+def _whitened(lines: Lines, responses: Sequence[Complexes]) -> Complexes:
     """Residuals ``output - G torque`` of every line, whitened together: they share the torque's noise."""
     count = len(responses)
     mix = np.zeros((len(lines.omega_rad_s), count, count + 1), dtype=complex)

@@ -1,7 +1,5 @@
 """What a point of the map shows: the limit that acts, the shape of the output; closed forms (model.md, 5)."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal

@@ -11,8 +11,6 @@ a current loop is taken as the current limit U/R that it amounts to: the velocit
 it and goes on integrating.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from itertools import pairwise
 from math import asin, inf, isfinite, pi, sqrt
@@ -28,12 +26,12 @@ from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
+from actuator_lti.types import Floats
 from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
 from nonlinear import LIMITERS, Rows, commands, simulate
 from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
-Floats = npt.NDArray[np.float64]
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
 SMALLEST_PART, LARGEST_PART = 0.01, 1.0  # of full deflection
 LEAST_PART = 1e-6  # of full deflection, where the smallest part does not settle

@@ -28,6 +28,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.loops.sampled import reference_to_output
+from actuator_lti.types import Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of, tone
 from analyses.linear.responses import response_at
@@ -35,8 +36,6 @@ from analyses.validation.places import Bench
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 NO_MOTION = 1e-3  # of the command
 UPDATES = 400  # of the position loop in a window
 

@@ -1,7 +1,5 @@
 """The sawtooth of the paper: a sine faster than the speed limit, against a pure rate limit's formulas."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from os import PathLike

@@ -3,8 +3,6 @@
 They begin where the linear drive would be in steady state, so that no start-up hits a limit.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Iterable

@@ -10,17 +10,15 @@ An angle of amplitude A about a bias d, counted in steps q, has the fundamental 
     n = (2 q/(pi A)) sum_k sqrt(1 - ((k + d) q/A)^2),  all k with |k + d| q < A.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from math import inf, log, pi
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
+from actuator_lti.types import Floats
 from analyses.large_signal.conditional import step_rows
 from analyses.large_signal.tones import LONGEST_TICKS, TIME_CONSTANTS, full_range, tone
 from analyses.limit_cycles.describing import (
@@ -37,7 +35,6 @@ from analyses.linear.responses import response_at
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import without_counts
 
-Floats = npt.NDArray[np.float64]
 WITHIN = 0.05  # of its value: a gain that is off by less counts as linear
 RATIOS, OFFSETS = np.geomspace(0.2, 60.0, 600), np.linspace(0.0, 1.0, 21)
 SPEEDS = (0.05, 0.382, 1.382, 5.1)  # counts a sample: few, and so that no pattern repeats soon

@@ -15,8 +15,6 @@ motor's that of the speed made of it), so a cycle is predicted at the gain g tha
 border: ``A = 2 q/(pi g)``, stable.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce

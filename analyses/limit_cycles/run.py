@@ -1,7 +1,5 @@
 """Predict limit cycles, start the simulator in their shape, and wait what the drive as it is ends in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal
 

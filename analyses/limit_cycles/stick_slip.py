@@ -5,8 +5,6 @@ the drive is the sampled linear loop with the smaller sliding friction until the
 symmetric cycle is an E that the slip turns into -E.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

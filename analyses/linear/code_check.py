@@ -4,8 +4,6 @@ The C of an export is compiled with the options of its README and put in the sim
 prediction is judged on it as `analyses.validation` judges it.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from dataclasses import dataclass

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -18,6 +18,7 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
 from actuator_lti.loops.limiters import Onset, onset
 from actuator_lti.loops.result import Form
+from actuator_lti.types import Progress
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     import pandas
     from matplotlib.axes import Axes
 
-Progress = Callable[[int, int], None]
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
 MOST_STATES = 120  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
@@ -220,12 +220,14 @@ def operating_points(
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
     """Give the delay budget at the lowest gain crossover of each loop."""
     budgets: dict[str, DelayBudget] = {}
-    for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
-        crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
+    for name, one in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
+        margins = one.judged.margins
+        crossovers = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:
-            quoted = result.margins.phase_margin
+            quoted = margins.phase_margin
             at = quoted.frequency_rad_s if quoted and quoted.frequency_rad_s > 0 else min(crossovers)
-            budgets[name] = delay_budget(design, name, at)
+            held = {"rotor": "locked"} if one.held and name == "current" else {"torques_held": bool(one.held)}
+            budgets[name] = delay_budget(design, name, at, **held)
     return budgets
 
 

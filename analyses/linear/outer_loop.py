@@ -10,8 +10,6 @@ reads ``y`` at these instants; both are exact.  A continuous G becomes the sampl
 held over its period. Read from a JSON file: coefficients or matrices, sampling, sign, names.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import isfinite

@@ -1,7 +1,5 @@
 """What is asked of the margins: form, operating point, and a loop around the drive."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Margins, bandwidths and requirements of a design at one operating point; a measured response over them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, cast
@@ -11,11 +9,12 @@ import numpy as np
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import FloatArray, read_response
 from actuator_lti.files.response import Loop as Kind
+from actuator_lti.files.response import read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.systems.measured_response import MeasuredResponse
+from actuator_lti.types import Floats
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.margins.asked import Asked
@@ -31,10 +30,10 @@ class Measured:
     name: str
     loop: str
     of: str
-    frequency_hz: FloatArray
+    frequency_hz: Floats
     measured: np.ndarray
     model: np.ndarray
-    radius: FloatArray  # of the circle about each measured value that holds the true one in 99 % of all cases
+    radius: Floats  # of the circle about each measured value that holds the true one in 99 % of all cases
     source: str  # where the radius comes from
     open_loop: MeasuredResponse  # the measured L: itself, T/(1 - T) or 1/S - 1
     open_model: np.ndarray
@@ -45,14 +44,14 @@ class Measured:
     left_out: int  # rows of the file without numbers
 
     @property
-    def difference_db(self) -> FloatArray:
+    def difference_db(self) -> Floats:
         """Measured over model, dB."""
-        return cast("FloatArray", 20.0 * np.log10(np.abs(self.measured / self.model)))
+        return cast("Floats", 20.0 * np.log10(np.abs(self.measured / self.model)))
 
     @property
-    def difference_deg(self) -> FloatArray:
+    def difference_deg(self) -> Floats:
         """Measured over model, deg."""
-        return cast("FloatArray", np.degrees(np.angle(self.measured / self.model)))
+        return cast("Floats", np.degrees(np.angle(self.measured / self.model)))
 
     @property
     def within(self) -> int:
@@ -115,7 +114,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
 
 
 def _with_spread(
-    omega: FloatArray, values: np.ndarray, deviation: FloatArray, period_s: float | None
+    omega: Floats, values: np.ndarray, deviation: Floats, period_s: float | None
 ) -> MeasuredResponse:
     """What was measured with its noise: as it is known, else as the points scatter about their neighbours."""
     data = MeasuredResponse(omega, values, np.zeros(omega.size), period_s, "")

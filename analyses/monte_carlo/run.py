@@ -1,12 +1,10 @@
 """A Monte Carlo study from a design to odds, distributions and worst cases."""
 
-from __future__ import annotations
-
 import functools
 import hashlib
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
@@ -23,6 +21,7 @@ from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
+from actuator_lti.types import Progress
 from analyses.finite import finite
 from analyses.monte_carlo import judging
 from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
@@ -42,7 +41,6 @@ from analyses.specification.requirements import RequirementVerdict
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
 
-Progress = Callable[[int, int], None]
 KEPT = 1_000_000  # samples that are kept as Parquet, about 200 MB
 PARTS = 1024  # of a study whose samples are not kept: what a part comes to is a few MB
 NOTED_S = 30.0

@@ -1,7 +1,5 @@
 """What is asked of one motion: the command, the load, what is left out, what is written."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated

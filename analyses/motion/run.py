@@ -1,7 +1,5 @@
 """Command and load of one motion, and the motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """What a motion of a drive ends in, a step above all: one word (`nonlinear.settling.rest`) for all."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians

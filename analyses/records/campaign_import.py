@@ -1,7 +1,5 @@
 """A campaign's records: each run read and joined; a bad run set aside and named, the others go on."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

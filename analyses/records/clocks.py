@@ -1,7 +1,5 @@
 """Two recorders with clocks of their own, put on one: by a shared event, or by correlation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import NamedTuple
@@ -9,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag, correlation_time
 from analyses.records.campaign_file import Method
 from analyses.records.factors import named_factor
@@ -55,8 +53,8 @@ class ClockJoin:
 class Series(NamedTuple):
     """The magnitude of a signal over its recorder's time."""
 
-    time_s: FloatArray
-    values: FloatArray
+    time_s: Floats
+    values: Floats
 
 
 def join_records(
@@ -115,7 +113,7 @@ def join_records(
     return joined, join
 
 
-def motion_events(time_s: FloatArray, magnitude: FloatArray) -> tuple[float, float] | None:
+def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | None:
     """First rise through half of the plateau, and how much later the last fall below it is (0: not shown).
 
     The plateau is the 95 % point of the magnitude, its floor the 1 % point. None where there is no rise: a
@@ -224,18 +222,18 @@ class _Pair:
         self.middle = 0.5 * (b.time_s[0] + b.time_s[-1])
         self.half = 0.5 * (b.time_s[-1] - b.time_s[0])
 
-    def rate(self, p: FloatArray) -> float:
+    def rate(self, p: Floats) -> float:
         """That of the clocks; 1 where no stretch is among the parameters."""
         return 1.0 + float(p[1]) * self.step / self.half if len(p) > 1 else 1.0
 
-    def both(self, p: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def both(self, p: Floats) -> tuple[Floats, Floats]:
         """The samples of the first signal inside the second, and the second there."""
         ga, gb = self.a.time_s, self.b.time_s
         moved = self.start + p[0] * self.step + self.middle + self.rate(p) * (gb - self.middle)
         inside = (ga >= moved[0]) & (ga <= moved[-1])
         return self.a.values[inside], np.interp(ga[inside], moved, self.b.values)
 
-    def residual(self, p: FloatArray) -> FloatArray:
+    def residual(self, p: Floats) -> Floats:
         """What a straight line from the second to the first leaves, zero outside the overlap."""
         x, y = self.both(p)
         out = np.zeros(len(self.a.values))
@@ -245,12 +243,12 @@ class _Pair:
         out[: len(x)] = x - x.mean() - dy * (dy @ x) / (dy @ dy)
         return out
 
-    def quality(self, p: FloatArray) -> float:
+    def quality(self, p: Floats) -> float:
         x, y = self.both(p)
         return float(np.corrcoef(x, y)[0, 1]) if len(x) >= 10 and np.std(y) * np.std(x) > 0.0 else 0.0
 
 
-def _gauss_newton(pair: _Pair, parameters: int) -> tuple[FloatArray, FloatArray]:
+def _gauss_newton(pair: _Pair, parameters: int) -> tuple[Floats, Floats]:
     """Parameters and covariance; differences over half a grid step, past the kinks of interpolation.
 
     To the noise is added how far apart in time the edges remain on the mean: two instruments do not

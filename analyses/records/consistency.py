@@ -1,7 +1,5 @@
 """Does a record agree with itself and with the drive it is said to come from?"""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import inf, isfinite
@@ -9,7 +7,8 @@ from math import inf, isfinite
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.estimation.arrays import BoolArray, FloatArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
@@ -68,7 +67,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     return tuple(result for result in found if result is not None)
 
 
-def place_of(design: Design, record: Record) -> tuple[str, FloatArray] | None:
+def place_of(design: Design, record: Record) -> tuple[str, Floats] | None:
     """The position at the motor and the signal that it comes from; None where none is recorded."""
     if design.axis == "linear":
         return ("position", record["position"]) if "position" in record.signals else None
@@ -83,7 +82,7 @@ def _rate_name(design: Design) -> str:
     return "velocity" if design.axis == "linear" else "speed"
 
 
-def _smooth(record: Record, values: FloatArray) -> FloatArray:
+def _smooth(record: Record, values: Floats) -> Floats:
     """A signal without its fast part, no phase; the same filter for all signals that are compared."""
     from scipy.signal import butter, sosfiltfilt
 
@@ -93,7 +92,7 @@ def _smooth(record: Record, values: FloatArray) -> FloatArray:
     return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"))
 
 
-def _moving(*signals: FloatArray) -> BoolArray:
+def _moving(*signals: Floats) -> BoolArray:
     """Where one of some signals is not small: in a long rest there is nothing but noise."""
     return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
 
@@ -103,7 +102,7 @@ def _inner(record: Record) -> slice:
     return slice(len(record) // 20, len(record) - len(record) // 20)
 
 
-def _ratio(y: FloatArray, x: FloatArray) -> tuple[float, float]:
+def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
     """Slope of y over x through zero, and how alike they are (cosine); zeros for a flat signal."""
     xx, yy = float(x @ x), float(y @ y)
     if xx == 0.0 or yy == 0.0:
@@ -124,7 +123,7 @@ class RateRatio:
     alike: float
     low: float
     high: float
-    rate: FloatArray
+    rate: Floats
     moves: BoolArray
 
     @property
@@ -157,18 +156,18 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     return RateRatio(place[0], found, alike, low, high, rate, moves)
 
 
-def _thinned(record: Record, values: FloatArray) -> FloatArray:
+def _thinned(record: Record, values: Floats) -> Floats:
     """As many rows of a smoothed signal as the filter leaves."""
     return values[:: max(1, round(0.25 / (SMOOTH_HZ * record.period_s)))]
 
 
-def _bounds(y: FloatArray, x: FloatArray, beside_x: FloatArray, beside_y: FloatArray) -> tuple[float, float]:
+def _bounds(y: Floats, x: Floats, beside_x: Floats, beside_y: Floats) -> tuple[float, float]:
     """What y may be over x with noise in either: each regressed on the other, `SURE` errors wide (Frisch).
 
     Another signal stands beside the regressor: its own slope takes up a delay between the two.
     """
 
-    def ends(of: FloatArray, over: FloatArray, beside: FloatArray) -> tuple[float, float]:
+    def ends(of: Floats, over: Floats, beside: Floats) -> tuple[float, float]:
         w = np.column_stack([over, beside])
         size = np.linalg.norm(w, axis=0)
         result = solve(w / size, of)
@@ -240,7 +239,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
     rows = np.lib.stride_tricks.sliding_window_view(step, 6)
     count = np.min(np.abs(step), where=step != 0.0, initial=inf)
 
-    def times_its_neighbours(at: int, beside: list[int]) -> tuple[FloatArray, int]:
+    def times_its_neighbours(at: int, beside: list[int]) -> tuple[Floats, int]:
         """A step of each row over those beside it, 0 where these are not alike; how many are."""
         mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
         alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
@@ -262,7 +261,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
     return Finding(f"steps of the {place[0]} from row to row", not told, words)
 
 
-def _other(record: Record, name: str, rate: FloatArray, moves: BoolArray) -> str:
+def _other(record: Record, name: str, rate: Floats, moves: BoolArray) -> str:
     """The signal that is more like the rate, if there is one: two columns are swapped."""
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):

@@ -20,7 +20,7 @@ from actuator_lti.bounds import CSV_LINE_BYTES, CSV_ROWS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import open_regular
 from actuator_lti.start.extras import need
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.records.record import Record, RowCounts
 from analyses.records.spec import MISSING_TEXTS, CsvFormat, RecordSpec
 from analyses.records.table_record import Block, SiRows, record_of_rows
@@ -49,7 +49,7 @@ def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = MAX_R
 
 def stream_csv(
     path: str | Path, spec: RecordSpec, counts: RowCounts | None = None, digest: hashlib._Hash | None = None
-) -> Iterator[FloatArray]:
+) -> Iterator[Floats]:
     """Yield blocks of rows, shape (n, 1 + signals): time in s, then each signal in SI.
 
     Memory does not depend on the length of the file. ``counts`` is filled in on the way, ``digest`` fed with
@@ -276,7 +276,7 @@ class BoundedRows:
         self._held = [np.empty((0, columns))]
         self._rest = np.empty((0, columns))
 
-    def add(self, rows: FloatArray) -> None:
+    def add(self, rows: Floats) -> None:
         for start in range(0, len(rows), self.limit):
             part = np.concatenate([self._rest, rows[start : start + self.limit]])
             whole = len(part) // self.factor * self.factor
@@ -292,10 +292,10 @@ class BoundedRows:
         self._held = [_averaged(held[:even], 2)]
         self.factor *= 2
 
-    def array(self) -> FloatArray:
+    def array(self) -> Floats:
         last = [self._rest.mean(axis=0, keepdims=True)] if len(self._rest) else []
         return np.concatenate([*self._held, *last])
 
 
-def _averaged(rows: FloatArray, factor: int) -> FloatArray:
+def _averaged(rows: Floats, factor: int) -> Floats:
     return np.asarray(rows.reshape(-1, factor, rows.shape[1]).mean(axis=1)) if factor > 1 else rows

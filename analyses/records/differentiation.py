@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 
 LARGEST_DIRECT = 10
 
@@ -16,9 +16,9 @@ LARGEST_DIRECT = 10
 class Motion:
     """Filtered position with its first two derivatives, all at the record's own period."""
 
-    position: FloatArray
-    velocity: FloatArray
-    acceleration: FloatArray
+    position: Floats
+    velocity: Floats
+    acceleration: Floats
 
     def scaled(self, factor: float) -> Motion:
         """The motion behind a ratio."""
@@ -28,7 +28,7 @@ class Motion:
 SEVEN_POINTS = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0
 
 
-def central_difference(values: FloatArray, period_s: float, points: int = 3) -> FloatArray:
+def central_difference(values: Floats, period_s: float, points: int = 3) -> Floats:
     """First derivative: central inside, one-sided at the two ends.
 
     Over three points it falls short by ``(w T)^2 / 6`` of a sine of frequency w, over seven by
@@ -49,7 +49,7 @@ def central_difference(values: FloatArray, period_s: float, points: int = 3) -> 
 
 
 def filtered_motion(
-    position: FloatArray, period_s: float, *, cutoff_hz: float, order: int, points: int = 3
+    position: Floats, period_s: float, *, cutoff_hz: float, order: int, points: int = 3
 ) -> Motion:
     """Butterworth forward and backward, then central differences over three or seven points twice.
 
@@ -75,7 +75,7 @@ def filtered_motion(
     return Motion(position=smooth, velocity=velocity, acceleration=acceleration)
 
 
-def decimated(columns: FloatArray, factor: int) -> FloatArray:
+def decimated(columns: Floats, factor: int) -> Floats:
     """Every ``factor``-th row after a low-pass without phase, so that the last row is kept.
 
     Chebyshev type I of 8th order, 0.05 dB ripple, cut at 0.8 of the new Nyquist frequency, forward and

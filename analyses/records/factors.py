@@ -1,7 +1,5 @@
 """Factors that a wrong unit or a wrong convention leaves behind, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import pi, sqrt
 

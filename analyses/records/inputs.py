@@ -1,7 +1,5 @@
 """The account of a file's columns, and the layout that their names tell."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

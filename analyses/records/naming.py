@@ -1,7 +1,5 @@
 """The signals that the analyses know: one table of names, SI units, meanings, and other names for them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from difflib import get_close_matches

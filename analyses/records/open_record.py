@@ -1,7 +1,5 @@
 """A record by its file alone: a record file (TOML) that describes it, or a layout that is known."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Mapping

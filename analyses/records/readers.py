@@ -1,7 +1,5 @@
 """Files of named columns (Parquet, JSON, MATLAB up to 7.2), and a record of any file by its ending."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Iterator, Mapping
 from io import BytesIO
@@ -15,14 +13,14 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import MatContent, read_mat5
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
 from actuator_lti.start.extras import need
-from analyses.estimation.arrays import FloatArray
+from actuator_lti.types import Floats
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec
 from analyses.records.table_record import record_of_columns
 
 
-def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+def load_parquet(path: Path) -> tuple[Mapping[str, Floats], str]:
     """The columns of numbers by name, NaN where a value is missing, and the file's SHA-256."""
     need("pyarrow", "tables", "a Parquet file")
     import pyarrow as pa
@@ -48,7 +46,7 @@ def load_parquet(path: Path) -> tuple[Mapping[str, FloatArray], str]:
     return result, hashlib.sha256(data).hexdigest()
 
 
-def load_json(path: Path) -> tuple[Mapping[str, FloatArray], str]:
+def load_json(path: Path) -> tuple[Mapping[str, Floats], str]:
     """The columns of numbers by name (``group.name`` in groups), NaN for null, and the file's SHA-256."""
     where = shown_path(path)
     data = read_bytes(path, "JSON record", TABLE_BYTES)
@@ -62,7 +60,7 @@ def load_json(path: Path) -> tuple[Mapping[str, FloatArray], str]:
     return dict(_columns(tree, "")), hashlib.sha256(data).hexdigest()
 
 
-def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, FloatArray]]:
+def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, Floats]]:
     for name, value in tree.items():
         if isinstance(value, dict):
             yield from _columns(value, f"{group}{name}.")
@@ -93,7 +91,7 @@ def load_mat(path: Path) -> tuple[MatContent, str]:
     return content, hashlib.sha256(data).hexdigest()
 
 
-def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[str, FloatArray]:
+def columns_of(content: MatContent, layout: CsvFormat, path: Path) -> Mapping[str, Floats]:
     """The vectors of a file by name; where the layout names a matrix, its columns.
 
     The columns of a matrix are named by the layout's ``names``, or by the only list of texts in the file

@@ -13,7 +13,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from analyses.estimation.arrays import BoolArray, FloatArray, longest
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray, longest
 
 RESAMPLE_TOLERANCE = 0.05
 """Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
@@ -74,8 +75,8 @@ class Record:
     """
 
     name: str
-    time_s: FloatArray = field(repr=False)
-    signals: Mapping[str, FloatArray] = field(repr=False)
+    time_s: Floats = field(repr=False)
+    signals: Mapping[str, Floats] = field(repr=False)
     units: Mapping[str, str]
     counts: RowCounts
     averaged: int = 1
@@ -99,7 +100,7 @@ class Record:
     def __len__(self) -> int:
         return len(self.time_s)
 
-    def __getitem__(self, name: str) -> FloatArray:
+    def __getitem__(self, name: str) -> Floats:
         """The named signal; an unknown name is an InputError that lists those there are."""
         if name in self.signals:
             return self.signals[name]
@@ -152,7 +153,7 @@ def check_error(error: float, tolerance: float, note: str, where: str) -> None:
         raise InputError(f"{note}; {allowed}", where=where)
 
 
-def line_error(time_s: FloatArray, values: FloatArray, gap: float) -> float:
+def line_error(time_s: Floats, values: Floats, gap: float) -> float:
     """How far straight lines over a gap are from a signal, as a share of its range (95 % point)."""
     span = max(2, round(gap))
     span_of_values = float(np.ptp(values))

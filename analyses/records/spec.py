@@ -1,7 +1,5 @@
 """How a recorder writes its files: separators, columns, units, and what to do with a bad row."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass

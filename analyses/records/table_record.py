@@ -1,7 +1,5 @@
 """Records out of named columns of numbers: the time of each row, missing values, SI."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,15 +9,16 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
-from analyses.estimation.arrays import BoolArray, FloatArray, IntArray
+from actuator_lti.types import Floats
+from analyses.estimation.arrays import BoolArray, IntArray
 from analyses.records.inputs import inputs_of
 from analyses.records.record import Record, RowCounts, check_error, line_error
 from analyses.records.spec import RecordSpec, to_si, unit_factor
 
 
 def filled(
-    time_s: FloatArray, signals: Mapping[str, FloatArray], tolerance: float, where: str
-) -> tuple[dict[str, FloatArray], list[str]]:
+    time_s: Floats, signals: Mapping[str, Floats], tolerance: float, where: str
+) -> tuple[dict[str, Floats], list[str]]:
     """Signals without holes, linear between the values that there are; outside them the nearest is held.
 
     The notes tell what was filled, and the error of a straight line over one step of the values that there
@@ -51,7 +50,7 @@ LACKING = "with a missing value"
 class Block:
     """Numbers of the wanted columns, shape (n, columns), NaN where missing, and the file line of each row."""
 
-    values: FloatArray
+    values: Floats
     lines: IntArray
 
 
@@ -69,7 +68,7 @@ class SiRows:
         self._row, self._wraps, self._last_time = 0, 0.0, -np.inf
         self._last_raw: float | None = None
 
-    def __call__(self, block: Block) -> FloatArray:
+    def __call__(self, block: Block) -> Floats:
         """Rows of time and signals, shape (n, 1 + signals)."""
         spec, times = self._spec, self._spec.time
         block = self._without_missing(block)
@@ -106,7 +105,7 @@ class SiRows:
         self._counts.drop(reason, f"line {block.lines[keep.argmin()]}", int(np.count_nonzero(~keep)))
         return Block(values=block.values[keep], lines=block.lines[keep])
 
-    def _unwrapped(self, raw: FloatArray) -> FloatArray:
+    def _unwrapped(self, raw: Floats) -> Floats:
         wrap = self._spec.time.wrap
         if wrap is None or not len(raw):
             return raw
@@ -117,7 +116,7 @@ class SiRows:
         self._last_raw = float(raw[-1])
         return np.asarray(unwrapped)
 
-    def _increases(self, time: FloatArray, block: Block) -> BoolArray:
+    def _increases(self, time: Floats, block: Block) -> BoolArray:
         reached = np.maximum.accumulate(np.concatenate([[self._last_time], time]))
         self._last_time = float(reached[-1])
         keep = np.asarray(time > reached[:-1])
@@ -129,7 +128,7 @@ class SiRows:
 
 
 def record_of_columns(
-    vectors: Mapping[str, FloatArray],
+    vectors: Mapping[str, Floats],
     spec: RecordSpec,
     path: Path,
     digest: str,
@@ -157,7 +156,7 @@ def record_of_columns(
 
 
 def record_of_rows(
-    rows: FloatArray,
+    rows: Floats,
     spec: RecordSpec,
     path: Path,
     counts: RowCounts,

@@ -1,7 +1,5 @@
 """Figures that only an analysis of one design finds: failures, duty, limit cycles, corners, command."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, log10, pi

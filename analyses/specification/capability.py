@@ -1,7 +1,5 @@
 """What a drive can do at each load torque: rate, acceleration, current; manoeuvres, and their bounds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

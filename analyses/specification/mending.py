@@ -1,7 +1,5 @@
 """The move that mends the weakest point of a drive: one gain, the least change, nothing else made worse."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from math import inf, log
@@ -90,7 +88,9 @@ def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.n
     """The least reserve of a view for each value of a gain; minus infinity where the loop is not stable."""
     try:
         population = Population(view.design or design, {path: values}, len(values))
-        found = linear_figures(population, operating_point=view.kind, load_Nm=view.load_Nm, held=True)
+        found = linear_figures(
+            population, operating_point=view.kind, load_Nm=view.load_Nm, time_figures=False, held=True
+        )
     except InputError:
         return np.full(len(values), -inf)
     limits = {name: limit_of(design, name, view)[0] for name in CUSTOMARY}

@@ -1,7 +1,5 @@
 """Everything that a specification of the actuator asks for, in one result; step times from small to full."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

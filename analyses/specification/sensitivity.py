@@ -4,8 +4,6 @@ The slope is a central difference over the exact sampled loops with a step of 0.
 swing is the figure computed anew with the parameter at both ends of its tolerance, or 10 % off without one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 It is put to the simulator: by its own derivative, and by a moment injected at the output.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, sqrt

@@ -27,6 +27,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.start.extras import need
+from actuator_lti.types import Progress
 from analyses.studies.proof import Proof, hold_against, packages_of, prove, prove_once
 
 if TYPE_CHECKING:
@@ -180,7 +181,6 @@ def _answered(work: Callable[[Any], Any], proof: Proof, part: Any) -> tuple[Any,
 
 Chunk = tuple[int, int]
 Arrays = dict[str, np.ndarray]
-Progress = Callable[[int, int], None]
 Item = TypeVar("Item")
 Result = TypeVar("Result")
 

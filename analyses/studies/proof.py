@@ -4,8 +4,6 @@ Threads and kernel of linear algebra are settings that a process reads once, as 
 libraries and the processor come to is seen in computed samples, to the last bit.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import platform

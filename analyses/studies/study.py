@@ -38,8 +38,6 @@ A study file is TOML and only data::
     pdf = true
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field

@@ -8,8 +8,6 @@ then searches the box that holds all that is nearer, and the descent begins agai
 value is taken back towards home by itself. What is returned meets every corner, or is the best compromise.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from analyses.tuning.problem import Problem

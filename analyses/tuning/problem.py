@@ -1,7 +1,5 @@
 """The tuning problem: gains as variables, requirements at every corner as constraints."""
 
-from __future__ import annotations
-
 import os
 import re
 from collections.abc import Mapping

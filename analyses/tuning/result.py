@@ -1,7 +1,5 @@
 """What tuning returns; the tuned design once more, by certified margins and by nonlinear steps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 

@@ -1,8 +1,6 @@
 """Tune a design: rules, refinement, rounding to the controller's steps, all corners, nonlinear check."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 from os import PathLike
@@ -14,6 +12,7 @@ from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.types import Progress
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
@@ -23,7 +22,6 @@ from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
-Progress = Callable[[int, int], None]
 _BINDS = 0.02  # relative distance above the smallest within which a requirement counts as binding
 
 

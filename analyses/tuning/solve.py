@@ -7,8 +7,6 @@ the working set, and again.  Deviation from the rule gains costs a little, so th
 reserve those nearest to the rules are taken: margins beyond it are not worth a loop that only saturates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial

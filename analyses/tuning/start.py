@@ -6,8 +6,6 @@ neutral until they are needed: a notch of depth 1, a low-pass at the end of the 
 distance from there is what they cost, in the same measure as a gain (`change`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product

@@ -4,21 +4,17 @@ A run begins in the steady state that its sine has, by the tangent, so that noth
 fundamentals are correlated over whole periods.  It judges nothing: the tangent does (`small_signal`).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil
 
 import numpy as np
-import numpy.typing as npt
 
+from actuator_lti.types import Complexes, Floats
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import Place
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.runs.running import Running
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 FREQUENCIES = 24
 LOWEST, HIGHEST = 2e-3, 0.9  # of Nyquist
 SAMPLES = 240  # of a run, about

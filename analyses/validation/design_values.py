@@ -6,8 +6,6 @@ decides what comes out of one tick, and the prediction is a formula of the model
 Noise, jitter and their seed are left: they are random.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import ceil, inf, isfinite

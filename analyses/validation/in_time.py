@@ -7,8 +7,6 @@ K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and 
 searched, nothing waited for.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,6 +19,7 @@ import numpy.typing as npt
 from actuator_lti.errors import NumericalError
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import balanced
+from actuator_lti.types import Complexes, Floats
 from analyses.validation.places import Bench
 from analyses.validation.row import Row, judged
 from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, nearest_pole
@@ -29,8 +28,6 @@ from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup
 from nonlinear.bench.probe import Probe
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 Numbers = npt.NDArray[Any]
 MOST_SAMPLES = 4000  # of a step
 SETTLINGS = 1.2  # of the settling time that a step is shown for

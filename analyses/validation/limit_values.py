@@ -3,8 +3,6 @@
 A limit is asked for with the others lifted, by a command far beyond it: the state holds what is left.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from math import inf, isfinite
 

@@ -14,13 +14,13 @@ from math import inf, isfinite
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import LimiterPath, limiter_places
+from actuator_lti.types import Complexes
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
 from nonlinear import tangent
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
     from actuator_lti.loops import Loop, Loops
     from actuator_lti.loops.limiters import Place as LimiterPlace
     from nonlinear import Tangent
-
-Complexes = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

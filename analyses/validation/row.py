@@ -1,7 +1,5 @@
 """One check of a validation: what is predicted, what the simulator shows, and whether the two agree."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import inf, isfinite
 

@@ -6,8 +6,6 @@ their change what torque is missing: ``T = T_predicted - J (w_1 - w_0)/Ts``.  Th
 are bisected between two starts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Validate a design: every prediction checked by the simulator, and where the linear model stops holding."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -17,6 +15,7 @@ from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
+from actuator_lti.types import Progress
 from analyses.friction_effects import friction_effects
 from analyses.isolation import attempt
 from analyses.large_signal.conditional import Conditional, conditional_stability
@@ -37,7 +36,6 @@ from analyses.validation.settings import FINDINGS, Settings
 from analyses.validation.small_signal import Place, small_signal
 from nonlinear.bench.operating_motion import on_the_bench
 
-Progress = Callable[[int, int], None]
 T = TypeVar("T")
 U = TypeVar("U")
 NEAR = (0.9, 0.95, 1.0, 1.05)

@@ -1,7 +1,5 @@
 """A drive and the model of it, on the bench without what a question does not ask for."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any

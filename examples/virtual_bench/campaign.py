@@ -11,12 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-
-FloatArray = NDArray[np.float64]
+from actuator_lti.types import Floats
 
 CLUTCH_KNEE = 0.5
 """Share of a run's speed over which the slipping clutch builds up its moment."""
@@ -58,11 +56,11 @@ class TrueRun:
     id: str
     speed_setting_rad_s: float
     load_setting_Nm: float
-    time_s: FloatArray
-    current_A: FloatArray
-    speed_rad_s: FloatArray
-    angle_rad: FloatArray
-    torque_Nm: FloatArray
+    time_s: Floats
+    current_A: Floats
+    speed_rad_s: Floats
+    angle_rad: Floats
+    torque_Nm: Floats
 
 
 def simulate_bench(
@@ -132,7 +130,7 @@ def _simulate_run(
     )
 
 
-def _ripple(plan: BenchPlan, rows: int, rng: np.random.Generator) -> FloatArray:
+def _ripple(plan: BenchPlan, rows: int, rng: np.random.Generator) -> Floats:
     """The clutch's slow ripple about one, a first-order process."""
     from scipy.signal import lfilter
 
@@ -141,7 +139,7 @@ def _ripple(plan: BenchPlan, rows: int, rng: np.random.Generator) -> FloatArray:
     return np.asarray(1.0 + plan.ripple * lfilter([1.0], [1.0, -keep], noise))
 
 
-def _build_up(speed_rad_s: FloatArray, setting_rad_s: float) -> FloatArray:
+def _build_up(speed_rad_s: Floats, setting_rad_s: float) -> Floats:
     """Share of the clutch's moment at the sensor: none at rest, all of it at the run's speed.
 
     The simulated drive feels the whole moment throughout, which at rest and in the few ms of run-up only

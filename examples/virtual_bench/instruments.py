@@ -6,14 +6,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from actuator_lti.types import Floats
 from analyses.records.campaign_file import Instruments
 from analyses.records.record import Record, RowCounts
 from examples.virtual_bench.campaign import TrueRun
 
-FloatArray = NDArray[np.float64]
 PAPER_BOUNDS = Instruments(
     torque_full_scale_Nm=10.0, torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002
 )
@@ -149,11 +148,11 @@ def _sensor_log(
     )
 
 
-def _rounded(values: FloatArray, step: float) -> FloatArray:
+def _rounded(values: Floats, step: float) -> Floats:
     return np.round(values / step) * step if step > 0.0 else values
 
 
-def _record(name: str, time_s: FloatArray, signals: dict[str, FloatArray]) -> Record:
+def _record(name: str, time_s: Floats, signals: dict[str, Floats]) -> Record:
     units = {"current": "A", "speed": "rad/s", "angle": "rad", "torque": "N*m"}
     return Record(
         name=name,

@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.design.model import Command, Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.records.record import Record, RowCounts
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +125,7 @@ def _volts(design: Design, current_A: float, speed_rad_s: float) -> float:
     return (motor.resistance_ohm or 0.0) * current_A + (motor.back_emf_constant_Vs_rad or 0.0) * speed_rad_s
 
 
-def _multisine(time: FloatArray, plan: TwoMassPlan, seed: int) -> FloatArray:
+def _multisine(time: Floats, plan: TwoMassPlan, seed: int) -> Floats:
     """Lines of equal amplitude and random phase; one period, repeated."""
     first, last = np.ceil(plan.lowest_hz * plan.period_s), plan.highest_hz * plan.period_s
     hertz = np.arange(first, last) / plan.period_s
@@ -160,5 +158,5 @@ def _logged(design: Design, run: object, plan: TwoMassPlan, seed: int, name: str
     return Record(name=name, time_s=run.time_s[::every], signals=signals, units={}, counts=RowCounts())
 
 
-def _stepped(values: FloatArray, step: float | None) -> FloatArray:
+def _stepped(values: Floats, step: float | None) -> Floats:
     return values if not step else np.asarray(np.floor(values / step) * step)

@@ -3,8 +3,6 @@ the measured speed, and
 an instrument that adds a signal, multiplies the gain, delays, and notes before and after.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

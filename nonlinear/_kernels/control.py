@@ -3,8 +3,6 @@
 It is a function of its own: with measurements written into ``io`` it runs without the motor's model.
 """
 
-from __future__ import annotations
-
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.blocks import (

@@ -9,8 +9,6 @@ interval that is short against every mode.  Only the losses of friction, of the 
 parting are dissipation, and none of them falls.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel, seldom

@@ -5,8 +5,6 @@ the last part of the row), its state from ``layout.ELASTIC_STATE`` in the row s.
 model.md section 6; SI.
 """
 
-from __future__ import annotations
-
 from nonlinear._kernels import layout
 
 MAX_TERMS = 18  # of the Taylor series over one short interval

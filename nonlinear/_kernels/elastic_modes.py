@@ -4,8 +4,6 @@ Every guard is an affine function of the state and the held inputs.  Two guards 
 expression and its negation, so that rounding cannot let both be false.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -6,8 +6,6 @@ transitions over both held segments and over Ts/2^j.  The row is as long as the 
 `prepare_elastic_sizes` says how long, `prepare_elastic` fills it.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -5,8 +5,6 @@ polynomial there; a bound of its second derivative decides whether it can cross,
 two crossings that cancel cannot be missed.
 """
 
-from __future__ import annotations
-
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout

@@ -8,8 +8,6 @@ delta, voltage, motor torque, load torque).  What is squared is its difference D
 so that a slow state beside stiff ones keeps its digits over thirty squarings.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -4,8 +4,6 @@ Over slip: Gauss-Legendre of ten points on the closed-form state, in pieces shor
 which is exact to rounding.  Over stick: closed forms.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

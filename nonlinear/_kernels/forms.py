@@ -4,8 +4,6 @@ Two for any drive that is run without instruments, energies or a law of its own,
 an elastic drive whose output is measured and whose load depends on it; the others for three plain loops.
 """
 
-from __future__ import annotations
-
 from actuator_lti.compiled.form import Form
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.blocks import PROBE_I, PROBE_U, PROBE_W, PROBE_Y

@@ -7,8 +7,6 @@ With c the multiple of 1/8 next to |x| and y = |x| - c, which is exact,
 where N/D is Lambert's continued fraction (1761) with five terms, within 1e-18 for |y| <= 1/16.
 """
 
-from __future__ import annotations
-
 import math
 from decimal import Decimal, localcontext
 

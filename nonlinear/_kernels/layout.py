@@ -9,8 +9,6 @@ units are SI, motor side.
 ``io``, inputs and outputs of one tick: ``IN_`` and ``IO_``.  ``out``, the results of a run: ``OUT_``.
 """
 
-from __future__ import annotations
-
 from itertools import count
 from typing import Annotated
 

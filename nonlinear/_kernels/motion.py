@@ -1,7 +1,5 @@
 """From t_k to t_(k+1): the delay line, the load, and the plant over the two segments of a tick."""
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel, seldom

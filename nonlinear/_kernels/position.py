@@ -1,7 +1,5 @@
 """The outermost stage: what it makes of its command, and its law beyond a P loop of position."""
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -1,7 +1,5 @@
 """One whole run: inputs ahead, tick after tick; its history, or what is kept where there is none."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A stretch of held voltage: slip, landing, stick and breakaway, as often as they come."""
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel, seldom

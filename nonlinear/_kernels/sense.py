@@ -4,8 +4,6 @@ Noise is seeded, and its whole state is two numbers a stream, the same in every 
 multiplicative generator (1988), whose products all stay below 2^53, so that floats hold them exactly.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

@@ -1,7 +1,5 @@
 """The value of a command, a bias or an injected signal at a tick."""
 
-from __future__ import annotations
-
 import math
 from fractions import Fraction
 

@@ -8,8 +8,6 @@ and nothing large cancels.  Nearly double eigenvalues go through the matrix expo
 Matrices lie in a row of work space from a place ``at`` on, row by row: four of up to 7 by 7, `MATRIX` apart.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

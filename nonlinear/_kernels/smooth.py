@@ -12,8 +12,6 @@ through N(u) at its beginning, (N(a) + N(b))/2 in its middle and N(c) at its end
 that motion, so they balance to rounding whatever the step.
 """
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

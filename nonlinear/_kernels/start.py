@@ -1,7 +1,5 @@
 """What comes before the first tick: lengths, what does not change with time, the state; a part of a tick."""
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.compiled.kernel import kernel

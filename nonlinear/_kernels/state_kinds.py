@@ -1,7 +1,5 @@
 """What each number of the state is: the kinds that stand beside the names of the layout."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import get_args, get_type_hints
 

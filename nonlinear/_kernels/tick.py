@@ -4,8 +4,6 @@
 A state copied out and set again elsewhere goes on with the same bits.
 """
 
-from __future__ import annotations
-
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle

@@ -1,7 +1,5 @@
 """Where a signal is added to a drive that runs by hand, and what is read of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite

@@ -1,14 +1,11 @@
 """The response of a system over one base period, of M updates at a place, to a sine there; and its errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.systems.resolvent import balanced
+from actuator_lti.types import Complexes, Floats
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 EPS = float(np.finfo(float).eps)
 GRID = np.geomspace(1e-4, 0.98, 60) * np.pi  # rad a sample: where responses are compared
 FAINT = 1e-6  # of the dominant part of a response: below that it is judged by that part

@@ -7,8 +7,6 @@ a bench does it: a free one runs away under a constant torque, and what is measu
 break point all loops run.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from math import inf, lcm

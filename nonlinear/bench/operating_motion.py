@@ -6,8 +6,6 @@ feels a torque that changes with the angle has no such motion: it stands, withou
 moments hold it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from math import copysign, cosh, inf, isfinite
 

@@ -1,19 +1,16 @@
 """An instrument in the loop, as a frequency response analyser is connected on a bench."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import floor
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command
 
-Floats = npt.NDArray[np.float64]
 Point = Literal["u", "i_ref", "w_ref", "output"]
 
 

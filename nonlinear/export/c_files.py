@@ -1,17 +1,13 @@
 """`actuator-lti export c`: header, source, the design's parameters, an example and a README."""
 
-from __future__ import annotations
-
 import re
 from importlib.metadata import PackageNotFoundError, version
-
-import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
 from nonlinear.export.program import (
@@ -28,7 +24,6 @@ from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
 from nonlinear.row.parameters import design_row
 
-Floats = npt.NDArray[np.float64]
 SPARE_LEVELS = 3  # halvings of the period beyond those of the design
 
 

@@ -1,7 +1,5 @@
 """`actuator-lti export controller`: the controller alone for firmware, with test vectors of the simulator."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 

@@ -1,14 +1,9 @@
 """The controller cut out of the tick of one design: what the kernels leave where its parameters are known."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import partial
-
-import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.compiled.form import number
 from actuator_lti.compiled.kernel import kernel
@@ -19,6 +14,7 @@ from actuator_lti.compiled.structs import Member, Rows, Struct, emit_structs, sp
 from actuator_lti.compiled.unread import without_unread
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout
 from nonlinear._kernels.blocks import counted, measured_speed
 from nonlinear._kernels.control import control
@@ -28,7 +24,6 @@ from nonlinear.export.c_files import exported_row
 from nonlinear.export.controller_names import SIGNAL_AT, member_name
 from nonlinear.native import parameters
 
-Floats = npt.NDArray[np.float64]
 MOTOR_COUNTS, OUTPUT_COUNTS = layout.IO_SIZE, layout.IO_SIZE + 1  # places of inputs that are whole numbers
 _ENTRIES = ("controller_start", "controller_step")
 _SINGLE = {"STANDING": 1e-6}  # what is no change of a reference but rounding, in single precision

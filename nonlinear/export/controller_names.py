@@ -1,7 +1,5 @@
 """Names, units and words of what the controller for firmware remembers, is given and gives."""
 
-from __future__ import annotations
-
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout

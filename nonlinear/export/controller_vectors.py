@@ -1,7 +1,5 @@
 """Test vectors of a controller: states, inputs and outputs of the simulator, with the bound of rounding."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -10,13 +8,13 @@ import numpy.typing as npt
 from actuator_lti.compiled.kinds import Kind, c_float
 from actuator_lti.compiled.structs import Member, Struct
 from actuator_lti.design.field import BIG
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.controller_cut import MOTOR_COUNTS, Controller
 from nonlinear.export.variables import sizes
 from nonlinear.native import control_tick, parameters, tick
 
-Floats = npt.NDArray[np.float64]
 Vector = tuple[Floats, Floats]  # state before a tick, and what the controller sees
 STRETCHES, STEPS = 8, 12  # stretches of a run, and ticks of each
 APART = 40  # updates of the outermost stage from one stretch, and step of the command, to the next

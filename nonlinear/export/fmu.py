@@ -1,7 +1,5 @@
 """`actuator-lti export fmu`: the drive as a co-simulation unit, sources and binaries in one file."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import math

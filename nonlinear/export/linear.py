@@ -8,8 +8,6 @@ it.  Rows are flat; MOST states at the most.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 import numpy as np

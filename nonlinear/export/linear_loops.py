@@ -8,8 +8,6 @@ M-th roots of those of the true loop, so the verdict on stability is the truth.
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 from actuator_lti.batch._complex import copied

@@ -5,8 +5,6 @@ on the first piece of its friction map: its guards are taken away, so that nothi
 """
 
 # mypy: disallow-untyped-defs=False
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """``modelDescription.xml`` of FMI 2.0 and 3.0 from one list of variables."""
 
-from __future__ import annotations
-
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence

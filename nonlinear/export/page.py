@@ -1,7 +1,5 @@
 """What the live page must know: places of the rows, limiters, how rows and figures follow from keys."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from actuator_lti.asked.drive_figure import drive_figure

@@ -4,8 +4,6 @@ What each number of its rows is (name, words, unit) is the comment behind its na
 units are SI, motor side (linear axis: read N for N m, m for rad, kg for kg m2).
 """
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import re

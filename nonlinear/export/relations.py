@@ -4,8 +4,6 @@ Each comparison that a check makes is turned over: where the check then refuses,
 check's own words; where it does not, the check is followed from there.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """What is done with the keys of a design on the way to its row, one statement a line: data, and its C."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

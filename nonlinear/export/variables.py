@@ -1,7 +1,5 @@
 """The variables of a co-simulation unit: inputs, outputs, parameters, constants, with all that FMI asks."""
 
-from __future__ import annotations
-
 import math
 import re
 from dataclasses import dataclass

@@ -13,8 +13,6 @@ its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at
 command to what stands in front of the limits (`nonlinear.export.linear_loops`).
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from functools import cache

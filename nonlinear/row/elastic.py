@@ -1,15 +1,9 @@
 """Parameters of the event-driven plant (model.md section 6): coupling, load-side friction, friction map."""
 
-from __future__ import annotations
-
-import numpy as np
-import numpy.typing as npt
-
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
-
-Floats = npt.NDArray[np.float64]
 
 
 def is_elastic(design: Design) -> bool:

@@ -1,7 +1,5 @@
 """Sections of second order (b0, b1, b2, a1, a2) of the filters that a design names."""
 
-from __future__ import annotations
-
 from math import inf, pi
 from typing import Any
 

@@ -1,23 +1,19 @@
 """A design becomes the row of floats that the compiled kernel reads."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any, get_args
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.row.elastic import put_drive_train
 from nonlinear.row.filters import Section, command_section, section
-
-Floats = npt.NDArray[np.float64]
 
 MAX_EVENTS_PER_TICK = 1000
 TANH_TOLERANCE = 1e-8
@@ -41,6 +37,11 @@ def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     if hasattr(rest, "zero_below"):  # a key that is followed into the row
         return whole, rest.zero_below(1e-9 * period_s)
     return whole[()], np.where(np.abs(rest) < 1e-9 * period_s, 0.0, rest)[()]
+
+
+def _somewhere(condition: Any) -> bool:
+    """Whether it holds in one design, or in any of a stacked one."""
+    return condition if isinstance(condition, bool) else bool(np.any(condition))
 
 
 def design_row(
@@ -133,7 +134,7 @@ def _friction(design: Design, row: Floats, friction_on: bool) -> None:
     row[at.DRY], row[at.DRY_REVERSE] = friction.dry_Nm(0.0, 1), friction.dry_Nm(0.0, -1)
     row[at.LOAD_COEFFICIENT] = friction.load_coefficient
     row[at.OFFSET] = friction.offset_torque_Nm
-    if np.any(np.asarray(friction.breakaway_ratio) < 1.0):
+    if _somewhere(friction.breakaway_ratio < 1.0):
         message = f"friction.breakaway_ratio = {friction.breakaway_ratio}: must be at least 1"
         raise InputError(message, where=design.name)
 
@@ -171,7 +172,7 @@ def _controllers(design: Design, row: Floats) -> None:
             _filters(design, row, place, velocity.every * Ts)
     _encoder(design, row, row[at.EVERY_VELOCITY] * Ts)
     if current is not None:
-        if row[at.SOURCE].any():
+        if not design.motor.has_electrical_dynamics:
             message = "control.current: an ideal torque source has no current to control"
             raise InputError(message, where=design.name)
         row[at.HAS_CURRENT] = 1.0
@@ -255,7 +256,7 @@ def _position(design: Design, row: Floats) -> None:
     row[at.DERIVATIVE_COEFFICIENT] = T / (loop.derivative_filter_s + T)
     row[at.FRICTION_FEEDFORWARD] = loop.friction_feedforward
     row[at.ACCELERATION_FEEDFORWARD] = (
-        loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(row) * T**2)
+        loop.acceleration_feedforward * row[at.INERTIA] / (_torque_gain(design, row) * T**2)
     )
     if loop.sensor == "output":
         row[at.OUTPUT_SENSOR] = 1.0
@@ -263,11 +264,11 @@ def _position(design: Design, row: Floats) -> None:
         row[at.POSITION_COUNTS] = 0.0 if quantum is None else 1.0 / quantum
 
 
-def _torque_gain(row: Floats) -> Floats:
+def _torque_gain(design: Design, row: Floats) -> Floats:
     """Torque per unit of what the position or velocity loop commands: A, or V at standstill."""
-    if row[at.SOURCE].any():
+    if not design.motor.has_electrical_dynamics:
         return row[at.SOURCE_GAIN]
-    return row[at.TORQUE_CONSTANT] / (1.0 if row[at.HAS_CURRENT].any() else row[at.RESISTANCE])
+    return row[at.TORQUE_CONSTANT] / (row[at.RESISTANCE] if design.controller.current is None else 1.0)
 
 
 def _encoder(design: Design, row: Floats, period_s: Any) -> None:
@@ -284,7 +285,8 @@ def _encoder(design: Design, row: Floats, period_s: Any) -> None:
         w0T = encoder.bandwidth_rad_s * period_s
         row[at.TRACKING_ANGLE], row[at.TRACKING_SPEED] = 2.0 * w0T, w0T * encoder.bandwidth_rad_s
     quantum, ratio = design.angle_quantum_rad, 1.0
-    if row[at.SPEED_SENSOR].any():
+    velocity = design.controller.velocity
+    if velocity is not None and velocity.sensor == "output":
         quantum, ratio = design.output_quantum_rad, design.total_ratio
     row[at.COUNTS_PER_RAD] = 0.0 if quantum is None else 1.0 / (quantum * ratio)
 
@@ -295,7 +297,7 @@ def _command(design: Design, row: Floats) -> None:
     outermost = control.outermost
     period = row[at.PERIOD] * (row[at.EVERY_POSITION] if control.position else row[at.EVERY_VELOCITY])
     limits: list[Any] = [command.rate_rad_s, command.acceleration_rad_s2, command.jerk_rad_s3]
-    limited = any(np.min(limit) < inf for limit in limits)
+    limited = any(_somewhere(limit < inf) for limit in limits)
     if outermost in ("current", "voltage") and limited:
         message = f"command: rate, acceleration and jerk need a position or a velocity loop, not {outermost}"
         raise InputError(message, where=design.name)
@@ -303,15 +305,15 @@ def _command(design: Design, row: Floats) -> None:
     ranges = [inf, *limits] if outermost == "position" else [*limits, inf]
     row[at.PROFILE_RANGE], row[at.PROFILE_RATE], row[at.PROFILE_ACCELERATION] = ranges[:3]
     row[at.PROFILED] = limited
-    if np.min(ranges[3]) < inf:
-        if np.max(ranges[2]) == inf:
+    if _somewhere(ranges[3] < inf):
+        if _somewhere(ranges[2] == inf):
             raise InputError("command.jerk: needs command.acceleration as well", where=design.name)
         samples = np.ceil(2.0 * ranges[2] / (ranges[3] * period) - 1e-9)
         if np.max(samples) > LONGEST_AVERAGE:
             message = f"command.jerk = {np.min(ranges[3]):g}: a mean over {np.max(samples):.0f} samples"
             raise InputError(f"{message}; at most {LONGEST_AVERAGE} fit", where=design.name)
         row[at.PROFILE_SAMPLES] = np.maximum(samples, 1.0)
-    if np.any(np.asarray(command.filter_time_s) > 0.0):
+    if _somewhere(command.filter_time_s > 0.0):
         row[at.COMMAND_FILTERS] = 1
         _put_section(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
 
@@ -349,7 +351,7 @@ def _limits(design: Design, row: Floats, limits_on: bool) -> None:
         return
     tau = limits.overload_time_s
     if tau is not None:
-        if not row[at.HAS_CURRENT].any():
+        if design.controller.current is None:
             raise InputError("limits.peak_time: needs a current loop", where=design.name)
         row[at.OVERLOAD], row[at.OVERLOAD_RATE] = 1.0, row[at.PERIOD] / tau
         row[at.OVERLOAD_RELEASE], row[at.CONTINUOUS_CURRENT] = limits.release, limits.continuous_current_A

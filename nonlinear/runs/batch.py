@@ -7,25 +7,21 @@ numbers do not depend on the number of threads, nor on what else is in the batch
 for its ticks; it leaves ``layout.OUT_SIZE`` numbers.
 """
 
-from __future__ import annotations
-
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.errors import InputError, TooManyTicks, shown, whole_number
+from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.runs.running import Running
 from nonlinear.runs.setup import Run, Tables
 
-Floats = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 CHUNK_TICKS = 2_000_000  # ticks one thread does between two looks at the queue
 
 

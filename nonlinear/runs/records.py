@@ -1,18 +1,14 @@
 """Columns of numbers from a CSV file, with refusals that name the place."""
 
-from __future__ import annotations
-
 import csv
 from os import PathLike
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.bounds import TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, read_bytes, shown, shown_path
-
-Floats = npt.NDArray[np.float64]
+from actuator_lti.types import Floats
 
 
 def read_columns(

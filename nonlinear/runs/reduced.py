@@ -8,10 +8,9 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.types import Complexes, Floats
 from nonlinear._kernels import layout as at
 
-Floats = npt.NDArray[np.float64]
-Complexes = npt.NDArray[np.complex128]
 COLUMNS = {name.lower(): place for name, place in vars(at).items() if name in at.COLUMN_NAMES}
 """The columns of a row by name: every parameter of ``_kernels.layout`` in small letters."""
 

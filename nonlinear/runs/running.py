@@ -11,12 +11,12 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import HISTORY_BYTES
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout
 from nonlinear._kernels import layout as at
 from nonlinear.runs.reduced import COLUMNS
 from nonlinear.runs.trajectory import STATUS, Status
 
-Floats = npt.NDArray[np.float64]
 _SIGNALS = (at.COMMAND, at.BIAS, *(at.PROBES + k * at.PROBE_SIZE + at.PROBE_SIGNAL for k in range(4)))
 _NOISE = (at.CURRENT_NOISE, at.ANGLE_NOISE, at.OUTPUT_NOISE, at.JITTER)
 _COUNTED = {at.S_TICK, at.S_STATUS, at.S_AVERAGE_PLACE, at.S_EVENTS, at.S_MAX_EVENTS, at.S_STEPS}

@@ -1,7 +1,5 @@
 """What a drive is asked to do in a run, and how that is written into the run's row and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import isfinite
@@ -12,15 +10,13 @@ import numpy.typing as npt
 from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, finite_number, shown
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
 from nonlinear.loads import LoadMoment, as_load
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
-
-Floats = npt.NDArray[np.float64]
-
 
 CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
 STATE_PLACES = {  # where a run begins with each number of a `State` (in the row), and ends with it

@@ -1,9 +1,7 @@
 """Simulate one run: check, convert, call the kernel, wrap."""
 
-from __future__ import annotations
-
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import fields, replace
 from math import inf
@@ -17,6 +15,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import NumericalError, finite_number, whole_number
+from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
@@ -26,8 +25,6 @@ from nonlinear.runs.running import Running
 from nonlinear.runs.setup import STATE_PLACES, Run, Tables, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
-Floats = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 LOOK_S = 0.1  # between two looks at a run
 SWITCHES = {"torque-command": at.TORQUE_FILTERS, "overload": at.OVERLOAD, "profile": at.PROFILED}
 STORED = ("magnetic_J", "kinetic_J", "spring_J")  # the other energies are the kernel's, in its order
@@ -156,20 +153,18 @@ def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | No
     begun = drive.copy()
     status = _call(drive, history, flags, out, progress)
     drive.blank(history, out)
-    digest = hashlib.sha256(row.tobytes() + tables.tobytes()).hexdigest()
-    run = wrap(design, row, history, flags, out, STATUS[status], drive.probing, digest)
     left = drive if begun.held() is None else begun
-    return replace(run, limits=_named_limits(run), running=left)
+    return _named_limits(wrap(design, row, history, flags, out, STATUS[status], left))
 
 
-def _named_limits(run: Trajectory) -> Mapping[str, LimitUse]:
-    """The uses of the limits; the clamp at the continuous current is the overload protection's alone."""
+def _named_limits(run: Trajectory) -> Trajectory:
+    """The clamp at the continuous current is the overload protection's alone."""
     if "overload" not in run.limits or not run.limits["overload"].active or not run.limits["current"].active:
-        return run.limits
+        return run
     rows = np.flatnonzero(run.limit_active("current"))
     first = float(run.time_s[rows[0]]) if rows.size else None
     own = replace(run.limits["current"], fraction=rows.size / run.time_s.size, first_time_s=first)
-    return {**run.limits, "current": own}
+    return replace(run, limits={**run.limits, "current": own})
 
 
 def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None) -> int:
@@ -194,10 +189,10 @@ def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progr
 
 def wrap(
     design: Design, row: Floats, history: Floats, flags: npt.NDArray[np.uint16], out: Floats, status: Status,
-    probing: list[str], digest: str,
+    running: Running,
 ) -> Trajectory:  # fmt: skip
-    """Name the columns and the results of one run."""
-    period, s = float(row[at.PERIOD]), out[at.OUT_STATE :]
+    """Name the columns and the results of one run; ``running`` goes on from it."""
+    period, s, probing = float(row[at.PERIOD]), out[at.OUT_STATE :], running.probing
     behind = at.HISTORY_PROBES + 2 * len(probing)
     sides = history[at.HISTORY_PROBES : behind]
     probes = {
@@ -225,9 +220,10 @@ def wrap(
         twist_rad=elastic[1],
         coupling_torque_Nm=elastic[2],
         load_Nm=_load(row, history),
-        parameters_hash=digest,
+        parameters_hash=hashlib.sha256(row.tobytes() + running.tables.tobytes()).hexdigest(),
         stage=design.controller.outermost,
         ratio=float(row[at.RATIO]),
+        running=running,
     )
 
 

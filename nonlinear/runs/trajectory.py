@@ -18,6 +18,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
 from actuator_lti.start.extras import need
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
 
     from nonlinear.runs.running import Running
 
-Floats = npt.NDArray[np.float64]
 COMMANDED: dict[Stage, str] = {
     "position": "reference_rad",
     "velocity": "output_speed_reference_rad_s",

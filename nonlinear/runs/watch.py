@@ -1,7 +1,5 @@
 """A line on a terminal that says what is being waited for."""
 
-from __future__ import annotations
-
 import sys
 import threading
 from collections.abc import Iterator

@@ -7,18 +7,16 @@ while friction holds the drive does, the last state before an event is found by 
 overload protection, ``x += a ((i/i_cont)^2 - x)`` a tick, is followed in closed form.
 """
 
-from __future__ import annotations
-
 from math import log, log1p
 
 import numpy as np
 import numpy.typing as npt
 
+from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout as ES
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
 
-Floats = npt.NDArray[np.float64]
 Places = npt.NDArray[np.intp]
 DRIFT, CHECKED, EVEN = 64, 16, 1e-4  # periods of a window, of a look ahead; how alike two changes are
 STILL = 2.0**-30  # of the largest value: a change in a window that counts

@@ -25,9 +25,9 @@ from math import inf
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
 from nonlinear.settling.drift import (
@@ -46,7 +46,6 @@ from nonlinear.settling.drift import (
     ticks_until_it_acts,
 )
 
-Floats = npt.NDArray[np.float64]
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
 PERIODS, ALIKE = 8, 0.01

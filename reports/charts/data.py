@@ -3,8 +3,6 @@
 A value that is the default is left out, numbers have the digits that a figure shows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, fields, is_dataclass
 from typing import Any, cast

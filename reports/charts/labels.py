@@ -1,7 +1,5 @@
 """Where words go: how wide they are, and the place near their point where nothing else stands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field

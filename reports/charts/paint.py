@@ -4,8 +4,6 @@ A chart names its colours; on a page they are the page's variables with the ligh
 paper the light colour itself.
 """
 
-from __future__ import annotations
-
 COLOURS = {
     "ink": "#1f2933",
     "muted": "#66727f",

@@ -1,7 +1,5 @@
 """One panel as SVG: grid, ticks, curves, marks; the words near their points, over no curve, in the frame."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

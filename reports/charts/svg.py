@@ -4,8 +4,6 @@ What stands here is all that ``templates/page`` needs to zoom, read out and redr
 its axes (``data-x``, ``data-y``: kind, ends, pixels), every curve its key.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from itertools import accumulate

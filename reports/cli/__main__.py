@@ -1,7 +1,5 @@
 """`python -m reports.cli`: the command `actuator-lti` where no script is on the path."""
 
-from __future__ import annotations
-
 import sys
 
 from reports.cli.main import main

@@ -1,7 +1,5 @@
 """All commands of `actuator-lti`; each lives in the module of its name and imports only typer at the top."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from importlib import import_module

@@ -7,8 +7,6 @@ foresaw. One line says which, and where the traceback lies; what a report lacks 
 the report as well.
 """
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

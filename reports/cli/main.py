@@ -1,7 +1,5 @@
 """Entry point of the command `actuator-lti`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from reports import arithmetic

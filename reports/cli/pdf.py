@@ -1,7 +1,5 @@
 """`actuator-lti pdf`: a report.json typeset for signing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

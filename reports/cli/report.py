@@ -1,7 +1,5 @@
 """`actuator-lti report`: the whole report of a design as one page and one JSON file."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import Annotated

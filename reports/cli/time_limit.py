@@ -1,7 +1,5 @@
 """Every command ends within a stated time: first by an error that says so, then the hard way."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

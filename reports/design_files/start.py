@@ -1,7 +1,5 @@
 """A design file to start from."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The empty figures of the live page: axes and curves that the page's script fills."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from actuator_lti.design.model import Axis

@@ -5,8 +5,6 @@ for an export in C: the page interprets the same statements. Figures of the whol
 of `actuator_lti.asked.drive_figure`.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The data of the live page: plain JSON, made once with the report."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Mapping
 

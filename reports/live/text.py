@@ -1,7 +1,5 @@
 """The design file as text with places that a changed value goes to: the user's own where there is one."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from itertools import accumulate, takewhile

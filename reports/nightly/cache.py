@@ -5,8 +5,6 @@ verdicts, what the pages need) and the files of the report.  It is written besid
 killed run leaves no half entry; one that was damaged later fails its checksum and is built again.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

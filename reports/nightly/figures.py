@@ -1,7 +1,5 @@
 """The figures of a report: every number that it states, under the same name every night."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Mapping

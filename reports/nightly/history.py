@@ -6,8 +6,6 @@ approvals, under a checksum of its own. A night's file is written first, the ind
 night is there whole, or not at all.
 """
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """A night for machines: JUnit XML, ``summary.json`` and a Markdown summary for a pull request."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import asdict
 from xml.etree import ElementTree as Xml

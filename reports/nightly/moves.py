@@ -6,8 +6,6 @@ median absolute first difference and never below a third of the figure's toleran
 smaller than the tolerance are dropped.
 """
 
-from __future__ import annotations
-
 import fnmatch
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """A night from beginning to end: lock, build what is new, write the history, publish the site."""
 
-from __future__ import annotations
-
 import platform
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -5,8 +5,6 @@ nobody along. Here a process a thread stays warm from job to job, on a Dask clus
 Its result comes home as an entry of the cache; a lost Dask worker's jobs are done again elsewhere.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 import signal

@@ -1,7 +1,5 @@
 """What the history holds: nights, what came of each design in them, approvals."""
 
-from __future__ import annotations
-
 from base64 import b64decode, b64encode
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ Layout: ``index.html`` (the only page that is ever replaced), ``nights/<night>/`
 before it is put in place, and is removed only when no page of a kept night refers to it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import secrets

@@ -7,8 +7,6 @@ A study file may hold a table for the nightly beside what `analyses.studies.stud
     tolerance = { "*phase margin*" = "0.5 deg", "*bandwidth*" = "1 %" }
 """
 
-from __future__ import annotations
-
 import json
 import platform
 from collections import Counter

@@ -5,8 +5,6 @@ not restored, a deleted file). A night is refused where the history knows less t
 one does not pass for a first night.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import socket

@@ -1,7 +1,5 @@
 """Times as texts; other people's names made safe: as file names, in XML, in CSV and in one line of text."""
 
-from __future__ import annotations
-
 import csv
 import hashlib
 import io

@@ -1,7 +1,5 @@
 """What a night looks like from its history: the rows of the index, and one design over the nights."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """What is no small signal about a steady motion: large commands, motion from rest, counts of the sensors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The figures of an identified campaign."""
 
-from __future__ import annotations
-
 from itertools import combinations
 
 import numpy as np

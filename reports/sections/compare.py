@@ -1,7 +1,5 @@
 """Variants side by side: verdicts, figures with differences, what moved them, predictions."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

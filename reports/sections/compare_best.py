@@ -4,8 +4,6 @@ A page of ten thousand designs would be hundreds of megabytes. Shown are best an
 and figure, those with the most and the least room.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Margins at the corners: hot, cold, low supply, and the worst ends of the tolerances."""
 
-from __future__ import annotations
-
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from analyses.corners.run import Corner, Corners
 from reports import document as doc

@@ -1,7 +1,5 @@
 """The model against records: figures of likeness, and pictures of both with the difference."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from analyses.correlation.closed_loop import CorrelationResult

@@ -1,7 +1,5 @@
 """Limit cycles of play and quantisation: predicted by describing function, then sought by simulation."""
 
-from __future__ import annotations
-
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words

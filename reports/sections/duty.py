@@ -1,7 +1,5 @@
 """Duty cycle against the continuous rating: current, overload protection and winding temperature."""
 
-from __future__ import annotations
-
 import math
 
 from actuator_lti.asked.verdict import Verdict

@@ -1,7 +1,5 @@
 """Failure cases: what the output does before anybody notices, and what the train has to carry."""
 
-from __future__ import annotations
-
 from math import inf
 from typing import Any
 

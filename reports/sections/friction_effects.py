@@ -1,7 +1,5 @@
 """Dry friction at small signals: threshold, lost motion, standing error, limit cycles."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from actuator_lti.design.model import Command, Design

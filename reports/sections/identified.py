@@ -1,7 +1,5 @@
 """What sections of records share: parameters, verdict, columns that went in, whether a record is sound."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from analyses.estimation.fit import Fit

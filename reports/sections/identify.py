@@ -1,7 +1,5 @@
 """An identification of any kind: its section, and the design that it writes; a plan, a frequency response."""
 
-from __future__ import annotations
-
 from itertools import groupby
 from pathlib import Path
 

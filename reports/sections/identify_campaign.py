@@ -1,7 +1,5 @@
 """The identification of a campaign: coefficients, runs, residuals, contributions, what to measure next."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import groupby
 

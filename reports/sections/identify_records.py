@@ -1,7 +1,5 @@
 """The identification from records of a motion: parameters, refinement by simulation, laws, inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -3,8 +3,6 @@
 Margins from small, medium and large deviations: where an oscillation lasts, with and without friction.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import product

@@ -1,7 +1,5 @@
 """Large signals: the map, the amplitude Bode, the sawtooth."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

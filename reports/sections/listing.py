@@ -1,7 +1,5 @@
 """A result that is one list or more: its sentence, and tables headed as the fields of a row state."""
 
-from __future__ import annotations
-
 from functools import partial
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 

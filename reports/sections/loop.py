@@ -1,7 +1,5 @@
 """One loop: its figures over frequency, S and T, step."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Odds, distributions and worst cases of a Monte Carlo study, for the page."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from functools import partial

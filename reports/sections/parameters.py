@@ -1,7 +1,5 @@
 """The values of the design with their sources, and what the report was made of and with."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any

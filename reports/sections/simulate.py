@@ -1,7 +1,5 @@
 """One motion: what happened in numbers, and its figure."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Figures for a specification sheet: rates, acceleration, current, duty, step times, torque and speed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

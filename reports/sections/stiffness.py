@@ -1,7 +1,5 @@
 """Stiffness at the output: how far a load pushes it, powered and unpowered, and what play takes away."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

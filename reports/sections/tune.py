@@ -1,7 +1,5 @@
 """A tuned design: gains in SI and in the controller's objects, what binds, trade-off, nonlinear check."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from actuator_lti.design import write_design

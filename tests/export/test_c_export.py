@@ -12,9 +12,8 @@ import pytest
 from programs import needs_compiler, ran
 from random_drives import random_drive, random_elastic_drive, random_inputs
 
-from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files
-from actuator_lti.design import design_hash
+from actuator_lti.design import design_hash, load_design
 from nonlinear import commands, loads, simulate
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.start import retune
@@ -148,14 +147,11 @@ def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", *ELASTIC])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_the_example_builds_without_a_warning_and_is_the_simulator(
-    name: str, compiler: str, tmp_path
-) -> None:
+def test_the_example_builds_without_a_warning_and_is_the_simulator(name: str, compiler: str, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} on this machine")
     design = load_design(name)
-    texts = c_export(design)
-    ours = {file: text for file, text in texts.items() if file != "README.md"}
+    ours = {file: text for file, text in c_export(design).items() if file != "README.md"}
     said = said_by(tmp_path, ours, "400", "0.01", compiler=[compiler])
     table = np.array([[float(x) for x in line.split(",")] for line in said.splitlines()[1:]])
     run = simulate(design, commands.step(0.01), 400 * design.controller.period_s, loads.constant(0.0))

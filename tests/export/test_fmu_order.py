@@ -9,17 +9,17 @@ import numpy as np
 import pytest
 from fmu_host import Host, Refused, fmpy, hosted, needs_compiler, written
 
-from actuator_lti import load_design
+from actuator_lti import InputError
 from actuator_lti.compiled.compiler import zig_command
-from actuator_lti.design.access import parameter_value, with_values
+from actuator_lti.design import load_design, parameter_value, with_values
 from actuator_lti.design.asked import FrozenMap
-from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
 from nonlinear.export.trace import trace_keys
 from nonlinear.export.variables import structured
 
 pytestmark = needs_compiler
 PERIOD = 1e-4
+NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
 def refused(host: Host, because: str, call: Any, *arguments: Any) -> None:
@@ -138,9 +138,6 @@ def test_what_no_longer_applies_is_not_refused(tmp_path) -> None:
     with hosted(path) as (host,):
         host.start(**{structured(key): value for key, value in none.items()})
         refused(host, "load.gear_error_periods = .*at most", host.put, {"load.gear_error": 0.01})
-
-
-NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint", "ballscrew", "fin"])

@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from random_drives import random_drive
 
-from actuator_lti import load_design
 from actuator_lti.compiled.compiler import compile_files, system_compiler
-from actuator_lti.design.loader import shipped_designs
-from actuator_lti.design.model import Design
+from actuator_lti.design import Design, load_design, shipped_designs
+from nonlinear import Rows
 from nonlinear.native import LIBRARY
-from nonlinear.rows import Rows
 
 CPU = Path("/proc/cpuinfo")
 pytestmark = pytest.mark.skipif(

@@ -9,9 +9,8 @@ import pytest
 from programs import needs_compiler, needs_node, ran
 
 from actuator_lti import load_design
-from nonlinear import commands, loads, simulate
+from nonlinear import Drive, commands, loads, simulate
 from nonlinear._kernels import layout as at
-from nonlinear.drive import Drive
 
 PAGE = (Path(__file__).parents[2] / "docs" / "hosts.md").read_text(encoding="utf-8")
 PARTS = dict(re.findall(r"(?ms)^## ([^\n]+)\n(.*?)(?=^## |\Z)", PAGE))

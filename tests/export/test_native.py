@@ -10,18 +10,17 @@ import pytest
 from programs import needs_compiler
 from random_drives import random_drive, random_elastic_drive
 
-from actuator_lti import load_design
+from actuator_lti import InputError, load_design, stability_margins
 from actuator_lti.axis.library import LIBRARY as AXIS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
-from actuator_lti.compiled import compiler
-from actuator_lti.compiled.library import Library
-from actuator_lti.errors import InputError
-from actuator_lti.margins import stability_margins
+from actuator_lti.compiled import Library, compiler
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
+
+quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
 def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
@@ -35,9 +34,6 @@ def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
     assert (ours.status, ours.limits) == (theirs.status, theirs.limits)
     assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
     return ours
-
-
-quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
 @quiet
@@ -68,9 +64,7 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
         ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
     ],
 )  # fmt: skip
-def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
-    name: str, delay_ticks: float, form: str
-) -> None:
+def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(name: str, delay_ticks: float, form: str):
     """Through stick, slip and limits; the last form that fits, which is taken, is this drive's own."""
     design = load_design(name)
     period_s = design.controller.period_s
@@ -149,9 +143,7 @@ def _margins() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("work", "library"), [(_figures, FIGURES), (_margins, AXIS)])
-def test_figures_are_those_of_the_kernels_as_written(
-    work: Callable[[], np.ndarray], library: Library
-) -> None:
+def test_figures_are_those_of_the_kernels_as_written(work: Callable[[], np.ndarray], library: Library):
     """To rounding: Python's hypot is not the C library's."""
     ours = work()
     with library.written():

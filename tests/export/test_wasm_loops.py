@@ -16,16 +16,14 @@ from programs import in_json, needs_node
 from random_drives import random_drive, random_elastic_drive
 from ulps import TIMES, moved_by_an_ulp
 
-from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti import Loop, assemble_loops, stability_margins
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design import with_values
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import load_design, shipped_designs, with_values
 from actuator_lti.design.model import Design, Instruments
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import point_blocks
-from actuator_lti.loops.result import Loop
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from nonlinear.export import linear, linear_loops
@@ -95,8 +93,7 @@ def around_once(blocks: list[Block], z: complex) -> complex:
     gone, driven = np.eye(n), np.zeros((n, 1), dtype=complex)
     for m, each in enumerate(closed):
         gone, driven = each.A @ gone, each.A @ driven + each.B * z**m
-    x = np.linalg.solve(z ** len(closed) * np.eye(n) - gone, driven)
-    total = 0.0j
+    x, total = np.linalg.solve(z ** len(closed) * np.eye(n) - gone, driven), 0.0j
     for m, each in enumerate(closed):
         total += (each.C @ x)[0, 0] / z**m
         x = each.A @ x + each.B * z**m
@@ -139,8 +136,7 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
     if ours["limiters"]["n"] <= 0:
         assert every > linear.MOST_TICKS
         return 0
-    sizes = numbers(ours["limiters"]["sizes"]).reshape(6, -1)
-    count = 0
+    sizes, count = numbers(ours["limiters"]["sizes"]).reshape(6, -1), 0
     for name, path in loops.limiters.items():
         signal = line_of(LIMITERS[name])
         if signal is None:
@@ -281,8 +277,7 @@ def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path) -> None:
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         loop = assemble_loops(design).break_points["i_ref"]
         assert loop.periodic
-        wanted = stability_margins(loop.open_loop)
-        got = figures_of(ours["i_ref"])
+        wanted, got = stability_margins(loop.open_loop), figures_of(ours["i_ref"])
         known = wanted.gain_margin_db, wanted.phase_margin_deg, wanted.delay_margin_s, wanted.modulus_margin
         names = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin")
         assert [got[name] for name in names] == pytest.approx(known, rel=1e-9)

@@ -10,8 +10,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
-from actuator_lti.design import parameter_value
-from actuator_lti.design.model import Design
+from actuator_lti.design import Design, parameter_value
 
 COUNT = 64
 TIMES = ("rise_time", "settling_time")

@@ -1,5 +1,6 @@
 """Designs for the loop tests, most of them the shipped ones laid bare, and hypothesis strategies for more."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from typing import Any
@@ -9,6 +10,8 @@ from hypothesis import strategies as st
 
 from actuator_lti.design import load_design, model
 from tests.changed import changed
+
+GAINS = {"current": 0.01, "velocity": 1.0, "current velocity": 0.05}  # of the stage outside the gap
 
 
 def amber(
@@ -70,31 +73,21 @@ def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> model.Design
     return controlled(load_design("ctms-motor-position"), **loop)
 
 
+def picker(draw: st.DrawFn) -> Callable[..., Any]:
+    return lambda *values: draw(st.sampled_from(values))
+
+
 @st.composite
 def designs(draw: st.DrawFn) -> model.Design:
     """Valid drives around the baseline: rates, delays, stages left out, speed estimates, loads."""
-    scale = st.floats(0.5, 2.0)
-    n_v = draw(st.sampled_from([1, 2, 3]))
-    n_p = n_v * draw(st.sampled_from([1, 2, 5]))
-    base = amber(n_v, n_p, delay_s=draw(st.floats(0.0, 3e-4)), feedforward=draw(st.sampled_from([0.0, 0.9])))
-    motor = replace(
-        base.motor,
-        rotor_inertia_kgm2=base.motor.rotor_inertia_kgm2 * draw(scale),
-        resistance_ohm=0.055 * draw(scale),
-        inductance_H=6e-6 * draw(scale),
-    )
-    difference = st.builds(
-        model.Encoder,
-        speed=st.just("difference"),
-        difference_samples=st.integers(1, 4),
-        filter_time_s=st.sampled_from([0.0, 5e-4]),
-    )
-    encoder = draw(st.one_of(st.just(model.Encoder()), difference))
-    load = draw(st.sampled_from([model.Load(), model.Load(path="back-drivable", moment_slope_Nm_rad=-40.0)]))
-    design = replace(base, motor=motor, encoder=encoder, load=load)
-    kind = draw(st.sampled_from(["cascade", "cascade", "no current", "no velocity", "position only"]))
-    if kind == "no current":
-        return without(design, "current", gain=0.01)
-    if kind == "no velocity":
-        return without(design, "velocity", gain=1.0)
-    return without(design, "current", "velocity", gain=0.05) if kind == "position only" else design
+    one_of, scale = picker(draw), st.floats(0.5, 2.0)
+    n_v = one_of(1, 2, 3)
+    base = amber(n_v, n_v * one_of(1, 2, 5), draw(st.floats(0.0, 3e-4)), feedforward=one_of(0.0, 0.9))
+    near = ("rotor_inertia_kgm2", "resistance_ohm", "inductance_H")
+    motor = {name: getattr(base.motor, name) * draw(scale) for name in near}
+    samples, filter_time_s = one_of(1, 2, 3, 4), one_of(0.0, 5e-4)
+    difference = {"speed": "difference", "difference_samples": samples, "filter_time_s": filter_time_s}
+    load = one_of({}, {"path": "back-drivable", "moment_slope_Nm_rad": -40.0})
+    design = changed(base, motor=motor, encoder=one_of({}, difference), load=load)
+    left_out = one_of("", "", *GAINS)
+    return without(design, *left_out.split(), gain=GAINS[left_out]) if left_out else design

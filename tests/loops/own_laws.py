@@ -1,14 +1,13 @@
 """Random laws of one's own on shipped drives, and a plain writing of model.md section 10."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from actuator_lti import load_design
-from actuator_lti.design import Design
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.law import LAW_INPUTS, Law
-from actuator_lti.design.model import Command, Encoder, Instruments, Limits, OutputEncoder
-from actuator_lti.loops.assemble import assemble_loops
+from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
@@ -19,6 +18,16 @@ BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
 def period_s(design: Design, stage: str) -> float:
     return design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+
+
+def as_law(design: Design, stage: str, **settings: Any) -> Design:
+    """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
+    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    gain = loop.gain_V_A if stage == "current" else loop.gain
+    if loop.integral_time_s is None:
+        return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
+    step = gain * T / loop.integral_time_s
+    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], **settings)
 
 
 def linear(design: Design) -> Design:
@@ -41,9 +50,7 @@ def linear(design: Design) -> Design:
 
 def radius(design: Design) -> float:
     """Spectral radius of the whole closed loop over a base period."""
-    system = assemble_loops(design).tick_system
-    assert system is not None
-    program = system.program
+    program = assemble_loops(design).tick_system.program
     A, _ = compose([program.tick(k) for k in range(program.ticks)])
     return float(np.max(np.abs(np.linalg.eigvals(A))))
 

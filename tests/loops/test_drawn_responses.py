@@ -8,6 +8,7 @@ from actuator_lti.systems.plain_system import PlainSystem
 from analyses.linear.responses import LARGE, curve, response_at
 
 PERIOD_S = 1e-3
+OMEGA = np.geomspace(1e-2, 1e3, 60)
 
 
 def late_lag(pole: float, delay: int) -> PlainSystem:
@@ -32,9 +33,6 @@ def test_at_a_pole_it_is_infinite_and_nowhere_else(delay: int) -> None:
     values = response_at(late_lag(1.0, delay), omega)
     assert not np.isfinite(values[0])
     assert np.isfinite(values[1:]).all()
-
-
-OMEGA = np.geomspace(1e-2, 1e3, 60)
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-12, -1e-12, 1e-9, -1e-9])

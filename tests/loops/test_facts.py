@@ -8,8 +8,7 @@ from loop_designs import amber, controlled, emps, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
-from actuator_lti import load_design
-from actuator_lti.design import model
+from actuator_lti.design import load_design, model
 from actuator_lti.design.access import stacked
 from actuator_lti.drive.facts import RATE_LIMITS, Capability, breakaway_torque_Nm, capability, stall_torque_Nm
 from actuator_lti.drive.steady import torque_gain_Nm_rad

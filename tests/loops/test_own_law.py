@@ -12,30 +12,18 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, drawn, period_s
+from own_laws import PlainLaw, as_law, drawn, period_s
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
-from actuator_lti.design import Design, design_hash, read_design_text, write_design
+from actuator_lti.design import Design, design_hash, design_tree, read_design_text, warnings_of, write_design
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
-from actuator_lti.design.suspicions import warnings_of
-from actuator_lti.design.writing import design_tree
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
 
 TICKS = 400
 SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
-
-
-def as_law(design: Design, stage: str, **settings: Any) -> Design:
-    """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
-    gain = loop.gain_V_A if stage == "current" else loop.gain
-    if loop.integral_time_s is None:
-        return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
-    step = gain * T / loop.integral_time_s
-    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], **settings)
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -54,7 +42,6 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
         rows["ticks"], rows["load"] = TICKS, 0.1
         rows.series("command", command)
         system = assemble_loops(design).tick_system
-        assert system is not None
         with np.errstate(over="ignore", invalid="ignore"):
             run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
         for name, ours in SIGNALS.items():
@@ -68,9 +55,7 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
 
 @pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
 def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
-    found = drawn(case, stable=True)
-    assert found is not None
-    design, _ = found
+    design, _ = drawn(case, stable=True)
     for place in (*design.controller.stages, *assemble_loops(design).break_points):
         setup = loop_setup(design, place, limits_on=False)
         loops = loops_at(design, setup.bias.operating(design))
@@ -94,7 +79,7 @@ def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
     same = ([], [], [], [[gain]]) if rate is None else ([[0.0]], [[rate]], [[1.0]], [[gain]])
     mine = as_law(design, stage, continuous=same)
     for form in ("sampled", "continuous", "ideal"):
-        ours, theirs = (assemble_loops(each, form) for each in (mine, design))  # type: ignore[arg-type]
+        ours, theirs = (assemble_loops(each, form) for each in (mine, design))
         omega = np.geomspace(1.0, 0.9 * pi / T, 60)
         for name, loop in {**theirs.present, **theirs.break_points}.items():
             other = {**ours.present, **ours.break_points}[name]
@@ -147,7 +132,7 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
         design = base.with_law(stage, system, inputs, L=L, gain=0.7)
         control_, drive = design.controller, Drive(design)
         law, N = PlainLaw(getattr(control_, stage).law), design.total_ratio
-        n_v, n_p = control_.velocity.every, control_.position.every  # type: ignore[union-attr]
+        n_v, n_p = control_.velocity.every, control_.position.every
         line, w_ref, i_ref, speed, limited = [0.0, 0.0], 0.0, 0.0, 0.0, 0
         for k in range(300):
             i, w, th, W = (float(value) for value in rng.standard_normal(4) * (1.0, 5.0, 0.5, 0.1))
@@ -156,14 +141,12 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
             q, qo = 4096 / (2 * pi), (1 << 14) / (2 * pi)
             counted, out = floor(th * q) / q, floor(y * qo) / qo
             if k % n_v == 0:
-                speed = (counted - line[0]) / (2 * n_v * 1e-4)
-                line = [line[1], counted]
+                speed, line = (counted - line[0]) / (2 * n_v * 1e-4), [line[1], counted]
             seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
             if stage == "position" and k % n_p == 0:
-                own = counted if control_.position.sensor == "motor" else N * out  # type: ignore[union-attr]
+                own = counted if control_.position.sensor == "motor" else N * out
                 v = law.output(seen | {"command": N * command, "error": N * command - own})
-                clamped = min(max(v, -30.0), 30.0)
-                step = 4e4 * T
+                clamped, step = min(max(v, -30.0), 30.0), 4e4 * T
                 new = w_ref + min(max(clamped - w_ref, -step), step)
                 limited += new != v
                 w_ref = new
@@ -214,11 +197,11 @@ def test_every_source_gives_the_same_law(tmp_path: Path) -> None:
         assert read_design_text(write_design(read)).controller == read.controller
     z = np.exp(1j * np.geomspace(1e-3, 3.0, 30))
     tf = control.tf([0.2, -0.15], [1.0, -0.9], T)
-    mine = base.with_law("velocity", tf, ["error"]).controller.velocity.law.sampled  # type: ignore[union-attr]
+    mine = base.with_law("velocity", tf, ["error"]).controller.velocity.law.sampled
     made = control.ss(mine.A, mine.B, mine.C[None], mine.D[None], T)
     np.testing.assert_allclose(made(z), tf(z), rtol=1e-12)
     slow = base.with_law("velocity", control.tf([2.0, 30.0], [1.0, 100.0]), ["error"], method="tustin")
-    law = slow.controller.velocity.law  # type: ignore[union-attr]
+    law = slow.controller.velocity.law
     made = control.ss(law.sampled.A, law.sampled.B, law.sampled.C[None], law.sampled.D[None], T)
     s = 2 / T * (z - 1) / (z + 1)
     np.testing.assert_allclose(made(z), (2 * s + 30) / (s + 100), rtol=1e-9)
@@ -230,8 +213,8 @@ def test_hash_tolerance_and_values_follow() -> None:
     mine = as_law(base, "velocity")
     assert design_hash(mine) != design_hash(base)
     more = mine.with_values({"control.velocity.law.gain": {"value": 1.2, "tolerance": "10 %"}})
-    assert more.parameters["control.velocity.law.gain"].tolerance.half_width == pytest.approx(0.12)  # type: ignore[union-attr]
-    nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))  # type: ignore[union-attr]
+    assert more.parameters["control.velocity.law.gain"].tolerance.half_width == pytest.approx(0.12)
+    nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))
     assert up.gain_margins[-1].ratio == pytest.approx(nominal.gain_margins[-1].ratio / 1.2, rel=1e-9)
     assert "control.velocity.gain" not in {item.path for item in mine.parameters.values()}
 
@@ -240,7 +223,7 @@ def test_a_law_unstable_of_itself_is_allowed_and_said() -> None:
     base = load_design("ilr33-amber")
     mine = base.with_law("velocity", ([[1.05]], [[0.01]], [[0.01]], [[0.1]], 1e-4), ["error"])
     assert any("unstable of itself, a pole of size 1.05" in line for line in warnings_of(mine))
-    assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None  # type: ignore[union-attr]
+    assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None
 
 
 def refused(call: Any, *arguments: Any) -> str:

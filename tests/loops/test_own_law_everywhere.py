@@ -6,18 +6,16 @@ from typing import Any
 import numpy as np
 import pytest
 from loop_designs import controlled
-from own_laws import period_s
+from own_laws import as_law, period_s
 
-from actuator_lti import load_design
+from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.compiled.compiler import system_compiler
-from actuator_lti.design import Design
 from actuator_lti.drive.steady import torque_gain_Nm_rad
+from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
-from analyses.linear.loop_survey import survey_loops
 from analyses.tuning.start import rule_gains
-from analyses.validation import validate
-from reports.live.model import live_model
+from reports.live import live_model
 
 STAGES = ("current", "velocity", "position")
 
@@ -25,12 +23,10 @@ STAGES = ("current", "velocity", "position")
 def lead(stage: str) -> Design:
     """The shipped drive with a law of one state and an anti-windup on the error of a stage."""
     design = load_design("ilr33-amber")
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
-    gain = loop.gain_V_A if stage == "current" else loop.gain
-    if loop.integral_time_s is None:
-        return design.with_law(stage, ([[0.5]], [[1.0]], [[-0.25 * gain]], [[1.5 * gain]], T), ["error"])
-    step = gain * T / loop.integral_time_s
-    return design.with_law(stage, ([[1.0]], [[step]], [[1.0]], [[gain + step]], T), ["error"], L=[0.5])
+    if stage != "position":
+        return as_law(design, stage, L=[0.5])
+    gain, T = design.controller.position.gain, period_s(design, stage)
+    return design.with_law(stage, ([[0.5]], [[1.0]], [[-0.25 * gain]], [[1.5 * gain]], T), ["error"])
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -79,10 +75,8 @@ def test_many_designs_have_the_gain_of_the_law() -> None:
 
 def test_torque_at_rest() -> None:
     """Of a static law the product of the gains; a law that integrates has no end of it."""
-    design = load_design("ilr33-amber")
-    base = controlled(design, velocity={"integral_time_s": None})
-    gain = base.controller.velocity.gain  # type: ignore[union-attr]
-    T = period_s(base, "velocity")
+    base = controlled(load_design("ilr33-amber"), velocity={"integral_time_s": None})
+    gain, T = base.controller.velocity.gain, period_s(base, "velocity")
     static = base.with_law("velocity", ([[0.5]], [[0.5]], [[0.4 * gain]], [[0.6 * gain]], T), ["error"])
     assert torque_gain_Nm_rad(static) == pytest.approx(torque_gain_Nm_rad(base), rel=1e-12)
     assert torque_gain_Nm_rad(lead("velocity")) == np.inf

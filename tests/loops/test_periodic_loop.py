@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 from loop_designs import amber
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.design import with_values
+from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Command
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
-from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
+from actuator_lti.loops import PeriodicLoop, assemble_loops, exact_margins, periodic_loop
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear import commands, simulate

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loop_designs import amber, controlled, designs, emps, without
+from loop_designs import amber, controlled, designs, emps, picker, without
 from recursion import run
 from test_stacked import DRIVES, FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops
 from actuator_lti.design import model
+from tests.changed import changed
 
 UNITS = {"position": 1.0, "velocity": 30.0, "current": 2.0, "voltage": 1.0}
 CONTACTS = {"driving": 1.0, "driven": -1.0}
@@ -89,75 +90,42 @@ def test_driving_and_driven_for_every_delay(point: str, delay: float) -> None:
 @st.composite
 def wide_designs(draw: st.DrawFn) -> model.Design:
     """Any stage outermost, any plant, any slot of the controller filled or empty."""
-    n_v = draw(st.sampled_from([1, 2, 3]))
-    base = draw(st.sampled_from([drive_e(), amber(), without(amber(), "current", gain=0.01), emps(5e-4)]))
-    control = base.controller
-    velocity, current, position = control.velocity, control.current, control.position
-    T = n_v * control.period_s
+    one_of = picker(draw)
+    base = one_of(drive_e(), amber(), without(amber(), "current", gain=0.01), emps(5e-4))
+    n_v, Ts, ratio, sensors = one_of(1, 2, 3), base.controller.period_s, base.total_ratio, ("motor", "output")
+    T = n_v * Ts
+    skewed = {"zero_rad_s": 0.5 / T, "pole_rad_s": 0.7 / T, "width_rad_s": 0.4 / T, "depth": 0.1}
     kinds = (
-        model.Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=draw(st.sampled_from([1, 2]))),
+        model.Filter(kind="lowpass", frequency_rad_s=0.4 / T, order=one_of(1, 2)),
         model.Filter(kind="notch", frequency_rad_s=0.8 / T, width_rad_s=0.3 / T, depth=0.2),
-        model.Filter(
-            kind="skewed-notch", zero_rad_s=0.5 / T, pole_rad_s=0.7 / T, width_rad_s=0.4 / T, depth=0.1
-        ),
+        model.Filter(kind="skewed-notch", **skewed),
         model.Filter(kind="leadlag", zero_rad_s=0.1 / T, pole_rad_s=0.3 / T, on="speed"),
         model.Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(-0.9, 0.25)),
     )
-    some = st.booleans()
-    velocity = replace(
-        velocity,
-        every=n_v,
-        filters=tuple(item for item in kinds if draw(some)),
-        integral_time_s=draw(st.sampled_from([None, 0.03])),
-        sensor=draw(st.sampled_from(["motor", "output"])),
-    )
-    position = replace(
-        position,
-        every=n_v * draw(st.sampled_from([1, 2, 5])),
-        feedforward=draw(st.sampled_from([0.0, 0.9])),
-        acceleration_feedforward=draw(st.sampled_from([0.0, 0.5])),
-        integral_time_s=draw(st.sampled_from([None, 0.5])),
-        derivative_time_s=draw(st.sampled_from([0.0, 1e-3])),
-        derivative_filter_s=draw(st.sampled_from([0.0, 1e-3])),
-        sensor=draw(st.sampled_from(["motor", "output"])),
-    )
-    if current is not None:
-        current = replace(
-            current,
-            back_emf_feedforward=draw(st.sampled_from([0.0, 0.8])),
-            resistance_feedforward=draw(st.sampled_from([0.0, 0.6])),
-        )
-    control = replace(
-        control,
-        computing_delay_s=control.period_s * draw(st.floats(0.0, 3.0)),
-        position=draw(st.sampled_from([position, position, None])),
-        velocity=draw(st.sampled_from([velocity, velocity, None])),
-        current=current,
-    )
-    encoders = (
+    velocity = {"every": n_v, "integral_time_s": one_of(None, 0.03), "sensor": one_of(*sensors)}
+    velocity |= {"filters": tuple(item for item in kinds if one_of(False, True))}
+    position = {"every": n_v * one_of(1, 2, 5), "feedforward": one_of(0.0, 0.9), "sensor": one_of(*sensors)}
+    position |= {"acceleration_feedforward": one_of(0.0, 0.5), "integral_time_s": one_of(None, 0.5)}
+    position |= {"derivative_time_s": one_of(0.0, 1e-3), "derivative_filter_s": one_of(0.0, 1e-3)}
+    stages = {"position": one_of(position, position, None), "velocity": one_of(velocity, velocity, None)}
+    if base.controller.current is not None:
+        feeding = {"back_emf_feedforward": one_of(0.0, 0.8), "resistance_feedforward": one_of(0.0, 0.6)}
+        stages["current"] = feeding
+    encoder = one_of(
         model.Encoder(),
         model.Encoder(speed="difference", difference_samples=3),
         model.Encoder(speed="tracking", bandwidth_rad_s=0.3 / T, filter_time_s=T),
     )
-    encoder = draw(st.sampled_from(encoders))
-    J_l = 2e-3 * base.total_ratio**2 / 100 if base.axis == "rotary" else 20.0
-    k = 300.0 * base.total_ratio**2 / 100 if base.axis == "rotary" else 2e6
+    J_l, k = (2e-3 * ratio**2 / 100, 300.0 * ratio**2 / 100) if base.axis == "rotary" else (20.0, 2e6)
     spring = model.Coupling(stiffness_Nm_rad=k, damping_Nms_rad=1e-3 * k)
-    coupling = draw(st.sampled_from([None, spring]))
-    load = model.Load(
-        inertia_kgm2=J_l,
-        path=draw(st.sampled_from(["back-drivable", "self-locking"])),
-        moment_slope_Nm_rad=draw(st.sampled_from([0.0, -0.05 * k])),
-        moment_damping_Nms_rad=draw(st.sampled_from([0.0, 2e-4 * k])),
-        friction=model.LoadFriction(viscous_Nms_rad=1e-4 * k),
-    )
-    command = model.Command(
-        filter_time_s=draw(st.sampled_from([0.0, 20 * T])), filter_order=draw(st.sampled_from([1, 2]))
-    )
-    friction = replace(base.friction, load_coefficient=0.3 / base.total_ratio)
-    return replace(
-        base, controller=control, encoder=encoder, coupling=coupling, load=load, command=command,
-        friction=friction,
+    load = {"moment_slope_Nm_rad": one_of(0.0, -0.05 * k), "moment_damping_Nms_rad": one_of(0.0, 2e-4 * k)}
+    load |= {"inertia_kgm2": J_l, "path": one_of("back-drivable", "self-locking")}
+    load |= {"friction": model.LoadFriction(viscous_Nms_rad=1e-4 * k)}
+    command = model.Command(filter_time_s=one_of(0.0, 20 * T), filter_order=one_of(1, 2))
+    return changed(
+        base, controller={"computing_delay_s": Ts * draw(st.floats(0.0, 3.0)), **stages}, encoder=encoder,
+        coupling=one_of(None, spring), load=model.Load(**load), command=command,
+        friction={"load_coefficient": 0.3 / ratio},
     )  # fmt: skip
 
 
@@ -176,15 +144,14 @@ def test_any_design_from_any_start(design: model.Design) -> None:
 def test_the_gate_has_teeth() -> None:
     """A notch moved by 0.1 %, or 1 % of a tick of delay more, is far outside the tolerance."""
     design = everything()
-    velocity = design.controller.velocity
-    assert velocity.filters == FILTERS
+    assert design.controller.velocity.filters == FILTERS
     moved = replace(FILTERS[1], frequency_rad_s=900.9)
     other = controlled(design, velocity={"filters": (FILTERS[0], moved, *FILTERS[2:])})
     late = controlled(amber(), computing_delay_s=1.01e-4)
     command = 0.1 * np.sin(np.arange(2000) / 40)
-    for base, changed in ((design, other), (amber(), late)):
+    for base, beside in ((design, other), (amber(), late)):
         ours = assemble_loops(base).tick_system.respond(command)["u"]
-        assert worst(ours, run(changed, command)["u"]) > 1e-6
+        assert worst(ours, run(beside, command)["u"]) > 1e-6
 
 
 @pytest.mark.parametrize("rates", RATES)
@@ -200,10 +167,6 @@ def test_lifted_system_in_forced_response(rates: tuple[int, int]) -> None:
         assert worst(stacked[:, :, r].reshape(-1), direct[name]) < 1e-11
 
 
-def _fundamental(values: np.ndarray, z: complex) -> complex:
-    return complex(np.sum(values * z ** -np.arange(len(values))))
-
-
 @pytest.mark.parametrize(("point", "every"), [("u", 1), ("i_ref", 2), ("w_ref", 10)])
 def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(point: str, every: int) -> None:
     """Inject a sinusoid into the running cascade; fundamentals before and after give L = -before/after."""
@@ -216,7 +179,8 @@ def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(po
         d = np.cos(omega * TICK * np.arange(4 * window))
         record = run(design, np.zeros(4 * window), inject={point: d})[point]
         z = np.exp(1j * omega * every * TICK)
-        before, at_point = (_fundamental(each[-window // every :], z) for each in (record, d[::every]))
+        turns = z ** -np.arange(window // every)
+        before, at_point = (np.sum(each[-window // every :] * turns) for each in (record, d[::every]))
         after = before + at_point
         assert loop.open_loop(z) == pytest.approx(-before / after, rel=1e-6)
         assert loop.sensitivity(z) == pytest.approx(after / at_point, rel=1e-6)

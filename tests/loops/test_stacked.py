@@ -8,16 +8,14 @@ import pytest
 from loop_designs import amber, controlled, emps, sprung, without
 from two_mass import drive_d, drive_e
 
-from actuator_lti import assemble_loops, load_design, stability_margins
-from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch._figures import DC_GAIN
-from actuator_lti.batch.static import drive_figures
-from actuator_lti.design import parameter_value, with_overrides, with_values
+from actuator_lti.design import load_design, parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.errors import InputError
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
@@ -32,6 +30,7 @@ MAP = tuple(
     FrictionPoint(speed_rad_s=speed, torque_Nm=torque)
     for speed, torque in ((0.0, 3e-3), (20.0, 2e-3), (90.0, 2.6e-3), (400.0, 4e-3))
 )
+STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def everything() -> Design:
@@ -137,9 +136,7 @@ def same(blocks: list[Any], k: int) -> None:
         (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
     ],
 )
-def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
-    design: Design, k: int, loop: str, told: bool
-) -> None:
+def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(design, k, loop, told):
     values = scattered(design, k + 1)
     figures = linear_figures(Population(design, values, k + 1), time_figures=False)
     alone = stacked(design, {path: float(array[k]) for path, array in values.items()})
@@ -165,9 +162,6 @@ def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope:
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
     closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
     assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
-
-
-STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def rich() -> Design:

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from loop_designs import controlled
 
-from actuator_lti import InputError, load_design
+from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
-from actuator_lti.design.writing import write_design
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
@@ -20,6 +19,8 @@ from nonlinear.bench.operating_motion import operating_motion
 from tests.changed import changed
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
+HELD = r" = .*: held over a tick,? .*; allowed: at most"
+D = 3.0  # N m s/rad
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,6 @@ class Case:
         return (pi - PHASE) / self.order
 
     def put(self, design: model.Design) -> model.Design:
-        """Add it to a drive."""
         if self.name == "cogging":
             motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
             return replace(design, motor=motor)
@@ -174,9 +174,6 @@ def test_every_wave_has_its_place_in_the_row() -> None:
     assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
 
 
-HELD = r" = .*: held over a tick,? .*; allowed: at most"
-
-
 @pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
 def test_keys_of_a_wave(name: str) -> None:
     fin, part, peak = load_design("fin"), name.partition(".")[0], 0.1 if name.startswith("load") else 5e-3
@@ -210,8 +207,7 @@ def test_cogging_of_a_screw_is_over_the_angle_of_its_motor() -> None:
 
 def test_a_self_locking_drive_feels_its_cogging() -> None:
     """It holds the rotor against a torque below its peak, whatever the load path."""
-    amber = load_design("ilr33-amber")
-    plain = replace(amber, friction=model.Friction(viscous_Nms_rad=2e-4))
+    plain = replace(load_design("ilr33-amber"), friction=model.Friction(viscous_Nms_rad=2e-4))
     design = CASES[1].put(plain)
     assert design.load.path == "self-locking"
     assert follows_angle(design)
@@ -260,9 +256,6 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
 
 
-D = 3.0  # N m s/rad
-
-
 def ratio(viscous: float, slope: float) -> float:
     """w_(k+1)/w_k under the torque -slope w_k, held over a tick, and viscous friction."""
     if viscous == 0.0:
@@ -273,8 +266,7 @@ def ratio(viscous: float, slope: float) -> float:
 
 @pytest.mark.parametrize("viscous", [0.0, 1e-3])
 def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
-    design = rotor(viscous, damping=D)
-    expected = ratio(viscous, D / N**2)
+    design, expected = rotor(viscous, damping=D), ratio(viscous, D / N**2)
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
     w = run.motor_speed_rad_s
     assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)

@@ -1,9 +1,7 @@
 """The wider drive in all three forms: limits of the sampled one, hand-made transfer functions, budgets."""
 
 from dataclasses import replace
-from typing import Any
 
-import control
 import numpy as np
 import pytest
 from loop_designs import amber, controlled, faster, response
@@ -11,12 +9,11 @@ from scipy.integrate import solve_ivp
 from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops
-from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
+from actuator_lti import InputError, assemble_loops, delay_budget
+from actuator_lti.design.model import Encoder, Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.loops.delay_budget import delay_budget
-from analyses.linear.loop_survey import survey_loops
+from analyses import survey_loops
 from reports.sections.delays import section
 
 
@@ -24,9 +21,7 @@ from reports.sections.delays import section
     ("drive", "final", "order"), [(amber(2, 10), 5e-3, (1.9, 2.1)), (everything(), 0.02, (1.8, np.inf))]
 )
 @pytest.mark.parametrize("form", ["sampled", "continuous"])
-def test_every_form_of_a_drive_tends_to_the_ideal_one(
-    form: Any, drive: Design, final: float, order: tuple[float, float]
-) -> None:
+def test_every_form_of_a_drive_tends_to_the_ideal_one(form, drive, final, order):
     """First order in Ts for every loop, break point, the command and the moment."""
     omega, ideal, worst = np.array([20.0, 100.0, 300.0]), assemble_loops(drive, "ideal"), []
     for factor in (64, 128):
@@ -86,8 +81,7 @@ def test_faces_of_the_blocks_agree_at_low_frequency() -> None:
     gained = (1 - 1 / z) / (1j * omega)
     np.testing.assert_allclose(block.at_z(omega) * gained, block.at_s(omega), rtol=5e-3)
     for item in FILTERS:  # Tustin, prewarped: exact at its own frequency
-        centre = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5
-        block = biquad(item, T)
+        centre, block = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5, biquad(item, T)
         at = np.array([centre])
         np.testing.assert_allclose(block.at_z(at), block.at_s(at), rtol=1e-10)
     with pytest.raises(InputError, match="below pi/T"):
@@ -111,8 +105,7 @@ def test_the_budget_has_a_share_for_each_filter() -> None:
     for name in ("velocity", "position"):
         assert len(delay_budget(design, name, omega).filters_deg) == 5
     unfed = controlled(design, current={"back_emf_feedforward": 0.0})
-    shares = delay_budget(unfed, "velocity", omega).filters_deg
-    s = 1j * omega
+    shares, s = delay_budget(unfed, "velocity", omega).filters_deg, 1j * omega
     own = np.angle(2000.0**2 / (s**2 + np.sqrt(2) * 2000.0 * s + 2000.0**2), deg=True)
     assert shares["torque lowpass 1 2000 rad/s"] == pytest.approx(own, abs=1e-6)
     assert shares["speed filter 5000 rad/s"] == pytest.approx(-np.degrees(np.arctan(omega * 2e-4)), abs=1e-6)
@@ -153,27 +146,20 @@ def test_ripple_of_the_overload_by_integration() -> None:
 
 
 def test_any_loop_goes_through_python_control() -> None:
-    """Names of states and signals, and its own functions on them."""
+    """Names of states and signals; its functions on them are in test_delay_system.py."""
     loops = assemble_loops(everything())
     for loop in (*loops.present.values(), *loops.break_points.values()):
         assert len(set(loop.open_loop.state_labels)) == loop.open_loop.nstates
         assert len(loop.closed_loop.poles()) == loop.closed_loop.nstates
-        control.frequency_response(loop.open_loop, np.array([10.0, 100.0, 1000.0]))
     assert "W" in loops.velocity.open_loop.state_labels
-    total = control.feedback(loops.position.open_loop, 1)
-    assert total.nstates == loops.position.open_loop.nstates
-    ideal = assemble_loops(everything(), "ideal")
-    assert "torque2_0" in ideal.velocity.open_loop.state_labels
-    control.step_response(ideal.reference_to_output, np.linspace(0, 0.1, 50))
+    assert "torque2_0" in assemble_loops(everything(), "ideal").velocity.open_loop.state_labels
 
 
 def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() -> None:
     """A bare D is proper in front of this plant, as the angle's derivative is a state."""
-    base = drive_e()
-    bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
+    base, bare = drive_e(), PositionLoop(gain=20.0, derivative_time_s=2e-3)
     loop = assemble_loops(controlled(base, position=bare), "ideal").position
-    plain = assemble_loops(base, "ideal").position
-    s = 1j * np.geomspace(1, 1000, 10)
+    plain, s = assemble_loops(base, "ideal").position, 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
 
 

@@ -8,8 +8,7 @@ import pytest
 from built_report import Built, validated
 from live_page import opened, written
 
-from actuator_lti import load_design
-from actuator_lti.design.model import Design
+from actuator_lti import Design, load_design
 from reports.build import design_report
 from reports.html import write_report
 

@@ -9,9 +9,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from actuator_lti import load_design
+from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design.model import Design
 from reports.build import design_report
 from reports.cli.app import build
 from reports.document import dumps, loads
@@ -39,7 +38,6 @@ def page_text(design: Design) -> str:
 
 
 def written(design: Design, folder: Path) -> Path:
-    """Write the page of a design without validation."""
     path = folder / "page.html"
     path.write_text(page_text(design), encoding="utf-8")
     return path
@@ -61,42 +59,61 @@ def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "",
     page.goto(own + fragment)
     if live:
         page.wait_for_selector("#hands-on[data-ready]", timeout=30_000)
-    return page
+    return Live(page)
 
 
-def settled(page: Page, act: Any) -> None:
-    """Do something and wait until the page has followed."""
-    count = page.get_attribute("#hands-on", "data-count")
-    act()
-    page.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
-    page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+class Live:
+    """A page with sliders; what is not here is the browser's."""
 
+    def __init__(self, page: Page) -> None:
+        self.page = page
 
-def type_value(page: Page, key: str, value: float) -> None:
-    """Type a value, in the unit of the page, into the field of a key."""
-    row = f'.row[data-path="{key}"]'
-    page.eval_on_selector(row, "(node) => { node.closest('details').open = true; }")
-    settled(page, lambda: (page.fill(f"{row} .field", repr(value)), page.press(f"{row} .field", "Enter")))
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.page, name)
 
+    def settled(self, act: Any) -> None:
+        """Do something and wait until the page has followed."""
+        count = self.get_attribute("#hands-on", "data-count")
+        act()
+        self.wait_for_function("(n) => document.getElementById('hands-on').dataset.count !== n", arg=count)
+        self.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
-def done(page: Page, timeout_ms: float = 30_000.0) -> None:
-    """Wait until that has followed, too, that comes behind."""
-    page.wait_for_selector("#hands-on[data-behind=done]", timeout=timeout_ms)
+    def does(self, what: str, of: str = "") -> None:
+        """Press one of its buttons: undo, redo, reset, pin, ..."""
+        self.settled(lambda: self.click(f'[data-do="{what}"]{of}'))
 
+    def type_value(self, key: str, value: float) -> None:
+        """Type a value, in the unit of the page, into the field of a key."""
+        row = f'.row[data-path="{key}"]'
+        self.eval_on_selector(row, "(node) => { node.closest('details').open = true; }")
+        self.settled(lambda: (self.fill(f"{row} .field", repr(value)), self.press(f"{row} .field", "Enter")))
 
-def read(page: Page) -> dict[str, dict[str, float]]:
-    """Read every figure of the page, to all digits."""
-    done(page)
-    told = "all => all.map(td => [td.dataset.loop, td.dataset.figure, td.dataset.value])"
-    result: dict[str, dict[str, float]] = {}
-    for loop, name, value in page.locator(".now td[data-figure]").evaluate_all(told):
-        result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
-    return result
+    def done(self, timeout_ms: float = 30_000.0) -> None:
+        """Wait until that has followed, too, that comes behind."""
+        self.wait_for_selector("#hands-on[data-behind=done]", timeout=timeout_ms)
 
+    def read(self) -> dict[str, dict[str, float]]:
+        """Read every figure of the page, to all digits."""
+        self.done()
+        told = "all => all.map(td => [td.dataset.loop, td.dataset.figure, td.dataset.value])"
+        result: dict[str, dict[str, float]] = {}
+        for loop, name, value in self.locator(".now td[data-figure]").evaluate_all(told):
+            result.setdefault(loop, {})[name] = float(value.replace("Infinity", "inf"))
+        return result
 
-def field(page: Page, key: str) -> float:
-    """The value of a key in the unit of the page, as its slider says it."""
-    return float(page.input_value(f'.row[data-path="{key}"] .field'))
+    def field(self, key: str) -> float:
+        """The value of a key in the unit of the page, as its slider says it."""
+        return float(self.input_value(f'.row[data-path="{key}"] .field'))
+
+    def sliders(self) -> dict[str, dict[str, Any]]:
+        """What its sliders move, by path."""
+        return {one["path"]: one for one in self.evaluate(f"{LIVE}.keys")}
+
+    def saved(self, path: Path) -> Path:
+        with self.expect_download() as waiting:
+            self.click('[data-do="save"]')
+        waiting.value.save_as(path)
+        return path
 
 
 def command_line(path: Path | str, part: str = "loops") -> Any:
@@ -107,20 +124,20 @@ def command_line(path: Path | str, part: str = "loops") -> Any:
 
 def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
     """Compare value and verdict of every requirement that the page judges."""
-    done(page)
+    page.done()
     told = "all => all.map(({ dataset }) => [dataset.id, dataset.loop, dataset.value, dataset.met])"
     rows = page.locator("table.demands tbody tr").evaluate_all(told)
     apart = {each["id"] for each in page.evaluate(f"{LIVE}.apart")}
     ours = {(id, loop or None): (value, met) for id, loop, value, met in rows}
     for item in verdicts:
         id = item["id"].removesuffix(f"/{item['loop']}")
-        if id in apart:
+        if id in apart and (id, item["loop"]) not in ours:
             continue
         value, met = ours.pop((id, item["loop"]))
         assert met == {"met": "true", "not met": "false", "not proven": "null"}[item["verdict"]], item
         if item["value"] is not None and math.isfinite(item["value"]):
             assert float(value) == pytest.approx(item["value"], rel=1e-9, abs=1e-9), item
-    assert not ours
+    assert not ours, ours
 
 
 def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
@@ -136,7 +153,7 @@ def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any]) -> None:
 
 def same_figures(page: Page, design: Design, what: str = "") -> None:
     """Compare every figure of every loop with those of the linear form; an unstable loop's S has no peak."""
-    theirs, ours = linear_figures(Population(design, {}, 1)), read(page)
+    theirs, ours = linear_figures(Population(design, {}, 1)), page.read()
     for loop in theirs.loops:
         for name in FIGURES:
             wanted = float(theirs.quantity(name, loop)[0])
@@ -145,10 +162,3 @@ def same_figures(page: Page, design: Design, what: str = "") -> None:
             elif name == "sensitivity_peak" and not theirs.stable(loop)[0]:
                 assert math.isnan(wanted)
                 assert math.isnan(ours[loop][name])
-
-
-def saved(page: Page, path: Path) -> Path:
-    with page.expect_download() as waiting:
-        page.click('[data-do="save"]')
-    waiting.value.save_as(path)
-    return path

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from live_page import AMBER, Browser, Page, done, opened, read, settled, type_value, written
+from live_page import AMBER, Browser, Page, opened, written
 
 from actuator_lti.design import with_values
 from nonlinear import simulate
@@ -25,16 +25,16 @@ def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator
 def ask(page: Page, kind: str, **values: float) -> dict[str, float]:
     """Choose a command and fill in its fields; gives the last values of the run."""
     if page.input_value(".run-kind") != kind:
-        settled(page, lambda: page.select_option(".run-kind", kind))
+        page.settled(lambda: page.select_option(".run-kind", kind))
     for label, value in values.items():
         field = page.locator(".run-keys label", has_text=label).locator("input")
         if field.input_value().replace(".", "").strip("0") != repr(value).replace(".", "").strip("0"):
-            settled(page, lambda field=field, value=value: (field.fill(repr(value)), field.press("Enter")))
+            page.settled(lambda field=field, value=value: (field.fill(repr(value)), field.press("Enter")))
     return last(page)
 
 
 def last(page: Page) -> dict[str, float]:
-    done(page)
+    page.done()
     found: dict[str, float] = json.loads(page.get_attribute(".hands-run", "data-last") or "{}")
     return found
 
@@ -57,11 +57,11 @@ def test_step_sine_and_ramp_are_those_of_the_simulator(page: Page) -> None:
 
 
 def test_the_load_and_the_changed_design_are_in_the_run(page: Page) -> None:
-    type_value(page, "control.position.gain", 80.0)
+    page.type_value("control.position.gain", 80.0)
     found = ask(page, "step", Size=4.0, Duration=0.05, Load=5.0)
     agree(found, step(math.radians(4.0)), 5.0, **{"control.position.gain": 80.0})
     ask(page, "step", Load=0.0)
-    settled(page, lambda: page.click('[data-do="reset"]'))
+    page.does("reset")
 
 
 def test_a_step_of_a_drive_that_moves_is_that_of_the_simulator(page: Page) -> None:
@@ -109,7 +109,6 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
         "all => all.filter(r => r.textContent === 'speed limit').map(r => +r.getAttribute('width'))",
     )
     ends = page.locator('[data-chart="run"] .panel').nth(1).get_attribute("data-x")
-    assert ends is not None
     left, right = map(float, ends.split(" ")[3:])
     assert 0.1 < acting < 0.99
     assert sum(boxes) / (right - left) == pytest.approx(acting, abs=0.01)
@@ -120,10 +119,9 @@ def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
     svg = page.locator('[data-chart="border"] .plot')
     svg.scroll_into_view_if_needed()
     box = svg.bounding_box()
-    assert box is not None
     ask(page, "step", Duration=0.0)
     at = (box["x"] + 0.35 * box["width"], box["y"] + 0.4 * box["height"])
-    settled(page, lambda: page.mouse.click(*at))
+    page.settled(lambda: page.mouse.click(*at))
     assert page.input_value(".run-kind") == "sine"
     trial = page.evaluate(
         "() => Object.fromEntries([...document.querySelectorAll('.run-keys label')]"
@@ -146,7 +144,7 @@ def test_what_is_no_number_is_said_beside_its_field(page: Page) -> None:
 
 
 def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
-    type_value(page, "control.position.gain", 3600.0)
+    page.type_value("control.position.gain", 3600.0)
     ask(page, "step", Size=4.0, Duration=0.5)
     assert "unstable" in page.inner_text("table.now")
     cells = page.locator('table.now tr:has(th[data-loop="position"]) td b').all_inner_texts()
@@ -157,11 +155,11 @@ def test_growth_of_an_unstable_drive_is_seen(page: Page) -> None:
         late = [float(point.split(" ")[1]) for point in points[len(points) // 2 :]]
         swings.append(max(late) - min(late))
     assert swings[1] > 5.0 > 10.0 * swings[0]  # as changed it goes on, as designed it rests
-    settled(page, lambda: page.click('[data-do="reset"]'))
+    page.does("reset")
     usual = ask(page, "step", Size=4.0, Duration=0.0)["ticks"]
     # so little beyond its limit that a run of usual length still decays
-    gain = 120.0 * 10.0 ** (read(page)["position"]["gain_margin"] / 20.0) * 1.002
-    type_value(page, "control.position.gain", gain)
+    gain = 120.0 * 10.0 ** (page.read()["position"]["gain_margin"] / 20.0) * 1.002
+    page.type_value("control.position.gain", gain)
     assert "unstable" in page.inner_text("table.now")
     assert last(page)["ticks"] > usual
-    settled(page, lambda: page.click('[data-do="reset"]'))
+    page.does("reset")

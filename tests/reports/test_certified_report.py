@@ -6,11 +6,9 @@ import control
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design
-from actuator_lti.loops import assemble_loops
-from actuator_lti.margins import stability_margins
+from actuator_lti import assemble_loops, load_design, stability_margins
+from analyses import survey_loops
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
-from analyses.linear.loop_survey import survey_loops
 from reports.as_json import loop_json
 from reports.sections import loop as loop_section
 from reports.sections import margins

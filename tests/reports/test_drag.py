@@ -6,7 +6,7 @@ The truth is the axis: what lies between two places on a scale in dB is a factor
 import math
 
 import pytest
-from live_page import AMBER, LIVE, Page, field, read, settled
+from live_page import AMBER, Page
 
 from actuator_lti.design import with_values
 from actuator_lti.design.control import Filter
@@ -41,7 +41,7 @@ def page(opens) -> Page:
     turn = 2.0 * math.pi
     notch = Filter(kind="notch", frequency_rad_s=turn * 200.0, width_rad_s=turn * 60.0, depth=0.3)
     result = opens(changed(AMBER, controller={"velocity": {"filters": (notch,)}}))
-    settled(result, lambda: result.locator(".tabs button", has_text="Velocity").click())
+    result.settled(lambda: result.locator(".tabs button", has_text="Velocity").click())
     result.locator('[data-chart="bode"]').scroll_into_view_if_needed()
     return result
 
@@ -53,7 +53,7 @@ def drag(page: Page, at: tuple[float, float], dx: float, dy: float) -> None:
     page.mouse.down()
     for k in range(1, 6):
         page.mouse.move(x + round(dx * k / 5), y + round(dy * k / 5))
-    settled(page, page.mouse.up)
+    page.settled(page.mouse.up)
 
 
 def decibels(page: Page, pixels: float) -> float:
@@ -62,18 +62,17 @@ def decibels(page: Page, pixels: float) -> float:
 
 
 def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page) -> None:
-    before = read(page)["velocity"]
-    grab = page.locator('[data-chart="bode"] path.grab')
+    before, grab = page.read()["velocity"], page.locator('[data-chart="bode"] path.grab')
     drag(page, tuple(grab.evaluate(MIDDLE)), 0.0, -8.0)
     by = decibels(page, -8.0)
     assert by > 3.0
-    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
-    after = read(page)["velocity"]
+    assert page.field("control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
+    after = page.read()["velocity"]
     assert after["gain_margin"] == pytest.approx(before["gain_margin"] - by, abs=0.02)
     page.click('[data-do="undo"]')
     page.wait_for_function("() => document.querySelector('[data-do=\"undo\"]').disabled")
-    assert field(page, "control.velocity.gain") == pytest.approx(0.12)
-    assert read(page)["velocity"] == before
+    assert page.field("control.velocity.gain") == pytest.approx(0.12)
+    assert page.read()["velocity"] == before
 
 
 MOVED = """() => new Promise((told) => {
@@ -112,7 +111,7 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
     )
     away = (x - origin[0], y - origin[1])
     drag(page, (x, y), 0.4 * away[0], 0.4 * away[1])
-    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
+    assert page.field("control.velocity.gain") == pytest.approx(0.12 * 1.4, rel=2e-2)
 
 
 def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
@@ -123,28 +122,27 @@ def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None
     low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
     ratio = (high / low) ** (15.0 / apart)
     drag(page, middle("corner of velocity"), 15.0, 0.0)
-    assert field(page, "control.velocity.integral_time") == pytest.approx(15.0 / ratio, rel=5e-3)
-    paths = (key["path"] for key in page.evaluate(f"{LIVE}.keys"))
-    name = next(path for path in paths if path.endswith(".frequency"))
+    assert page.field("control.velocity.integral_time") == pytest.approx(15.0 / ratio, rel=5e-3)
+    name = next(path for path in page.sliders() if path.endswith(".frequency"))
     notch, width = name.removesuffix(".frequency"), name.replace(".frequency", ".width")
-    first, wide = field(page, name), field(page, width)
+    first, wide = page.field(name), page.field(width)
     drag(page, middle(notch), 15.0, 0.0)
-    moved = field(page, name)
+    moved = page.field(name)
     assert moved == pytest.approx(first * ratio, rel=5e-3)
     page.keyboard.down("Shift")
     drag(page, middle(notch), 15.0, 0.0)
     page.keyboard.up("Shift")
-    assert field(page, width) == pytest.approx(wide * ratio, rel=5e-3)
-    assert field(page, name) == moved
+    assert page.field(width) == pytest.approx(wide * ratio, rel=5e-3)
+    assert page.field(name) == moved
 
 
 def test_marks_stand_where_the_margins_are(page: Page) -> None:
     """The stem of the gain margin is as long as the figure says, and so is that of the phase margin."""
     page.locator('[data-chart="bode"] .plots').focus()
     for _ in range(3):
-        settled(page, lambda: page.keyboard.press("PageUp"))
-    assert field(page, "control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (1.5 / 20.0), rel=1e-3)
-    own = read(page)["velocity"]
+        page.settled(lambda: page.keyboard.press("PageUp"))
+    assert page.field("control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (1.5 / 20.0), rel=1e-3)
+    own = page.read()["velocity"]
     for panel, name in ((0, "gain_margin"), (1, "phase_margin")):
         low, high, apart = page.evaluate(SCALE, ["bode", panel])[1]
         length = page.evaluate(
@@ -159,7 +157,7 @@ def test_marks_stand_where_the_margins_are(page: Page) -> None:
 
 def test_a_design_with_a_limit_that_fails_marks_only_that(opens) -> None:
     page = opens(with_values(AMBER, {"control.velocity.gain": 0.75}))
-    settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
+    page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
     stems, demands = '[data-chart="bode"] .live-marks .stem', "table.demands tr[data-loop=velocity]"
     colours = page.locator(stems).evaluate_all("all => all.map(n => n.style.stroke)")
     met = dict(page.locator(demands).evaluate_all("all => all.map(r => [r.dataset.id, r.dataset.met])"))

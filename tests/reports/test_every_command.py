@@ -18,6 +18,7 @@ from tests.command_line import commands
 
 NO_DESIGN = {"designs", "keys", "pdf", "nightly", "objects import", "init"}  # nightly, pdf: a study, a report
 COMMANDS = commands()
+WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
 
 
 def test_every_command_is_listed() -> None:
@@ -125,21 +126,15 @@ def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
     assert "allowed: KEY=VALUE" in said
 
 
-WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
-
-
-def wide_table(columns: int) -> dict:
-    named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
-    rows = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
-    return doc.table("A table", named, [{"name": f"row {r}", **row} for r, row in enumerate(rows)])
-
-
 @pytest.mark.parametrize("width", [40, 60, 80, 200])
 @pytest.mark.parametrize("columns", [1, 4, 12])
 def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, printed) -> None:
-    block = wide_table(columns)
-    out = printed(width, block)
-    assert all(value in out for row in block["rows"] for value in row.values())
+    named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
+    rows = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
+    out = printed(
+        width, doc.table("A table", named, [{"name": f"row {r}", **row} for r, row in enumerate(rows)])
+    )
+    assert all(value in out for r, row in enumerate(rows) for value in (f"row {r}", *row.values()))
 
 
 @pytest.mark.parametrize("width", range(70, 140, 5))

@@ -11,28 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from built_report import HOSTILE
-from live_page import (
-    AMBER,
-    LIVE,
-    Browser,
-    Page,
-    command_line,
-    done,
-    page_text,
-    read,
-    same_figures,
-    saved,
-    settled,
-    type_value,
-    written,
-)
+from live_page import AMBER, Browser, Page, command_line, page_text, same_figures, written
 
-from actuator_lti import assemble_loops
-from actuator_lti.design import with_values
+from actuator_lti import InputError, assemble_loops
+from actuator_lti.design import Design, check_design, with_values
 from actuator_lti.design.asked import FrozenMap
-from actuator_lti.design.checks import check_design
-from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
 from nonlinear import simulate
 from nonlinear.commands import step
 
@@ -60,14 +43,13 @@ def refusal(design: Design) -> str:
 
 def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> None:
     """Each key by itself, moved by a fifth; what the command line refuses, the page refuses in its words."""
-    keys = page.evaluate(f"{LIVE}.keys")
+    keys, refused = page.sliders(), set()
     assert len(keys) > 25
-    refused: set[str] = set()
-    for key in keys:
+    for key in keys.values():
         value = key["value"] * 1.2 if key["value"] else 0.4 * key["high"]
         if key["whole"]:
             value = key["value"] + 1.0
-        type_value(page, key["path"], value / key["factor"])
+        page.type_value(key["path"], value / key["factor"])
         changed = with_values(AMBER, {key["path"]: value}, check=False)
         if why := refusal(changed):
             refused.add(key["path"])
@@ -75,15 +57,15 @@ def test_every_slider_leads_to_the_figures_of_the_changed_design(page: Page) -> 
             assert page.get_attribute(".state", "class") == "state fail"
         else:
             same_figures(page, changed, key["path"])
-        settled(page, lambda: page.click('[data-do="undo"]'))
+        page.does("undo")
     assert {"motor.back_emf_constant", "motor.torque_constant", "control.velocity.every"} <= refused
 
 
 def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
     assert page.get_attribute(".state", "data-failing") == "0"
-    type_value(page, "control.position.gain", 590.0)
+    page.type_value("control.position.gain", 590.0)
     failing = int(page.get_attribute(".state", "data-failing") or 0)
-    found = command_line(saved(page, tmp_path / "hot.toml"), "requirements")
+    found = command_line(page.saved(tmp_path / "hot.toml"), "requirements")
     verdicts = [item for item in found if item["verdict"] == "not met"]
     assert failing == sum(item["loop"] is not None for item in verdicts) > 0
     assert f"{failing} not met" in page.inner_text(".state")
@@ -92,66 +74,57 @@ def test_a_requirement_that_fails_is_said_at_once(page: Page, tmp_path) -> None:
 
 
 def test_undo_redo_reset_and_keyboard(page: Page) -> None:
-    before = read(page)
+    before = page.read()
     slider = page.locator('.row[data-path="control.velocity.gain"] input[type=range]')
     slider.focus()
-    settled(page, lambda: slider.press("ArrowRight"))
-    settled(page, lambda: slider.press("PageUp"))
-    moved = read(page)
+    page.settled(lambda: slider.press("ArrowRight"))
+    page.settled(lambda: slider.press("PageUp"))
+    moved = page.read()
     assert moved["velocity"]["gain_margin"] < before["velocity"]["gain_margin"]
     for does, wanted in (("undo", before), ("redo", moved)):
         for _ in range(2):
-            settled(page, lambda does=does: page.click(f'[data-do="{does}"]'))
-        assert read(page) == wanted
-    settled(page, lambda: page.click('[data-do="reset"]'))
-    assert read(page) == before
+            page.does(does)
+        assert page.read() == wanted
+    page.does("reset")
+    assert page.read() == before
     assert "#" not in page.url
 
 
 @pytest.mark.parametrize(("delay_us", "words", "place"), [
     (1e4, "too many states for this page", "table.now"), (1.1e4, "allowed: at most 100 ticks", ".state")
 ])  # fmt: skip
-def test_a_value_that_is_too_much_is_said_and_undone(
-    page: Page, delay_us: float, words: str, place: str
-) -> None:
-    before = read(page)
-    type_value(page, "control.computing_delay", delay_us)
+def test_a_value_that_is_too_much_is_said_and_undone(page: Page, delay_us: float, words: str, place: str):
+    before = page.read()
+    page.type_value("control.computing_delay", delay_us)
     has = "([place, words]) => document.querySelector(place).innerText.includes(words)"
     page.wait_for_function(has, arg=[place, words])
-    settled(page, lambda: page.click('[data-do="undo"]'))
-    assert read(page) == before
+    page.does("undo")
+    assert page.read() == before
 
 
 def test_nonsense_is_not_taken(opens, page: Page) -> None:
-    before = read(page)
-    row = '.row[data-path="control.position.gain"]'
+    before, row = page.read(), '.row[data-path="control.position.gain"]'
     for words in ("-5", "abc", "", "0", "Infinity", "1e300"):
         page.fill(f"{row} .field", words)
         page.press(f"{row} .field", "Enter")
         assert f'"{words}": allowed: above 0, ' in page.inner_text(f"{row} .was")
         assert page.get_attribute(f"{row} .field", "aria-invalid") == "true"
-    assert read(page) == before
+    assert page.read() == before
     page.fill(f"{row} .field", "120")
     page.press(f"{row} .field", "Enter")
     page.wait_for_selector(f"{row} .field[aria-invalid=false]")
     assert page.inner_text(f"{row} .was") == ""
     nonsense = "#hands-on?control.position.gain=-1&%E0%A4%A=3&control.velocity.gain&no.key=4"
-    other = opens(AMBER, fragment=nonsense)
-    assert read(other) == before
+    assert opens(AMBER, fragment=nonsense).read() == before
 
 
 def test_a_link_carries_the_changes(opens, page: Page) -> None:
-    type_value(page, "control.position.gain", 175.0)
-    type_value(page, "load.inertia", 3e-4)
+    page.type_value("control.position.gain", 175.0)
+    page.type_value("load.inertia", 3e-4)
     page.click('[data-do="link"]')
     link = page.input_value(".sheet textarea")
     other = opens(AMBER, fragment="#" + link.split("#")[1])
-    assert read(other) == read(page)
-
-
-def told_of_record(page: Page) -> str:
-    done(page)
-    return str(page.inner_text(".record"))
+    assert other.read() == page.read()
 
 
 def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
@@ -159,18 +132,23 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
     made = simulate(with_values(AMBER, {"control.position.gain": 80.0}), step(math.radians(2.0)), 0.25)
     table = zip(made.time_s, np.degrees(made.reference_rad), np.degrees(made.output_angle_rad), strict=True)
     lines = ["time_s,command_deg,angle_deg", *(f"{t:.12g},{r:.12g},{y:.12g}" for t, r, y in table)]
-    settled(page, lambda: page.evaluate(DROP, ["bench.csv", "\n".join(lines)]))
-    words = told_of_record(page)
+
+    def told(page: Page) -> str:
+        page.done()
+        return str(page.inner_text(".record"))
+
+    page.settled(lambda: page.evaluate(DROP, ["bench.csv", "\n".join(lines)]))
+    words = told(page)
     assert "bench.csv" in words
     assert float(words.split("as changed: ")[1].split(" %")[0].replace("×10", "e")) > 0.5
-    type_value(page, "control.position.gain", 80.0)
-    words = told_of_record(page)
+    page.type_value("control.position.gain", 80.0)
+    words = told(page)
     assert float(words.split("as changed: ")[1].split(" %")[0].replace("−", "-")) < 1e-6
     assert "fit 100.0" in words
-    settled(page, lambda: page.get_by_label("Measured in").select_option("mrad"))
-    assert "fit 100.0" not in told_of_record(page)
-    settled(page, lambda: page.click(".dropped button"))
-    assert told_of_record(page) == ""
+    page.settled(lambda: page.get_by_label("Measured in").select_option("mrad"))
+    assert "fit 100.0" not in told(page)
+    page.settled(lambda: page.click(".dropped button"))
+    assert told(page) == ""
     page.locator('[data-chart="run"] .keys li', has_text="record").wait_for(state="hidden")
     page.evaluate(DROP, ["bench.png", "\0PNG"])
     page.wait_for_function("() => document.querySelector('.record').innerText.includes('bench.png: no text')")
@@ -178,33 +156,32 @@ def test_a_dropped_record_is_laid_over_the_model(page: Page) -> None:
 
 def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     """Measured as the closed loop 2 dB and 5 deg beside the model's own open loop, with its coherence."""
-    model = assemble_loops(AMBER).velocity.open_loop
-    hertz = np.geomspace(2.0, 400.0, 40)
+    model, hertz = assemble_loops(AMBER).velocity.open_loop, np.geomspace(2.0, 400.0, 40)
     open_loop = model(np.exp(2j * np.pi * hertz * model.dt)) * 10.0**0.1 * np.exp(1j * np.radians(5.0))
     closed = open_loop / (1.0 + open_loop)
     rows = zip(hertz, 20.0 * np.log10(abs(closed)), np.degrees(np.angle(closed)), strict=True)
     table = (f"{f:.15g};{m:.15g};{p:.15g};0.9" for f, m, p in rows)
     lines = ["frequency_Hz;mag_dB;phase_deg;coherence", *table]
-    settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
-    settled(page, lambda: page.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
-    settled(page, lambda: page.get_by_label("of", exact=True).select_option("T"))
+    page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
+    page.settled(lambda: page.evaluate(DROP, ["sweep.csv", "\n".join(lines)]))
+    page.settled(lambda: page.get_by_label("of", exact=True).select_option("T"))
     words = page.inner_text(".record .told")
     assert "by coherence: 2.00 dB rms, at most 2.00" in words
     assert "5.00 deg rms, at most 5.00" in words
     for figure in ("bode", "nyquist"):
         assert page.locator(f'[data-chart="{figure}"] .keys li', has_text="measured").is_visible()
     assert page.locator('[data-chart="difference"]').is_visible()
-    type_value(page, "control.velocity.gain", 0.12 * 10.0**0.1)
+    page.type_value("control.velocity.gain", 0.12 * 10.0**0.1)
     rest = page.inner_text(".record .told").split("coherence: ")[1].split(" dB rms")[0]
     assert float(rest.replace("−", "-")) < 1e-9
-    settled(page, lambda: page.click(".dropped button"))
+    page.settled(lambda: page.click(".dropped button"))
     assert page.locator('[data-chart="difference"]').is_hidden()
 
 
 def test_nothing_of_a_design_becomes_markup(opens) -> None:
     design = replace(AMBER, name=HOSTILE, title=HOSTILE, description=HOSTILE)
     result = opens(design)
-    type_value(result, "control.position.gain", 130.0)
+    result.type_value("control.position.gain", 130.0)
     result.click('[data-do="file"]')
     assert HOSTILE.split("\u202e")[0].split('"')[0] in result.input_value(".sheet textarea")
 
@@ -212,13 +189,12 @@ def test_nothing_of_a_design_becomes_markup(opens) -> None:
 def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     small = opens(AMBER, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     assert small.evaluate("document.documentElement.scrollWidth") <= 390
-    before = read(small)
+    before = small.read()
     slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
     slider.scroll_into_view_if_needed()
     box = slider.bounding_box()
-    assert box is not None
-    settled(small, lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
-    assert read(small)["position"]["bandwidth"] > before["position"]["bandwidth"]
+    small.settled(lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
+    assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
 def test_without_scripts_the_page_is_the_report_alone(browser: Browser, tmp_path: Path) -> None:
@@ -239,7 +215,7 @@ def test_what_waits_is_not_started_once_a_value_moves(opens) -> None:
     """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
     page = opens(AMBER)
     page.evaluate("const now = performance.now.bind(performance); performance.now = () => 1000 * now();")
-    type_value(page, "control.position.gain", 101.0)  # by this clock its run took long: the next is late
+    page.type_value("control.position.gain", 101.0)  # by this clock its run took long: the next is late
     page.evaluate(
         """async () => {
           const root = document.getElementById("hands-on");

@@ -4,9 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.asked.quantities import CORNERED, LOOP_QUANTITIES, QUANTITIES
-from actuator_lti.loops import assemble_loops
 from analyses.corners import corners
 from analyses.linear.loop_figures import all_loop_figures
 from reports import document as doc

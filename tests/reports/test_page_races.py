@@ -4,7 +4,7 @@ import json
 import math
 
 import pytest
-from live_page import AMBER, LIVE, Page, done, field, read, settled, type_value
+from live_page import AMBER, Page
 
 from actuator_lti import load_design
 
@@ -32,7 +32,7 @@ SLOW = "const now = performance.now.bind(performance); performance.now = () => 1
 @pytest.fixture
 def page(opens) -> Page:
     result = opens(AMBER)
-    done(result)
+    result.done()
     return result
 
 
@@ -57,7 +57,7 @@ def test_done_is_said_of_the_values_that_are_asked_for(page: Page) -> None:
         return [first, then];""",
     )
     assert told == ["waits", "waits"]
-    done(page)
+    page.done()
 
 
 def test_a_value_that_is_refused_is_not_pinned_before_that_is_said(page: Page) -> None:
@@ -84,9 +84,9 @@ def test_nothing_is_no_step(page: Page) -> None:
 
 def test_a_move_under_way_is_reset(page: Page) -> None:
     """Back to what was committed last: nothing to commit, yet something to follow."""
-    before = read(page)
-    type_value(page, GAIN, 150.0)
-    settled(page, lambda: page.click('[data-do="undo"]'))
+    before = page.read()
+    page.type_value(GAIN, 150.0)
+    page.does("undo")
     shown = at_once(
         page,
         f"""const [range, field] = ["[type=range]", ".field"].map(
@@ -100,25 +100,24 @@ def test_a_move_under_way_is_reset(page: Page) -> None:
         return [moved, field.value];""",
     )
     assert shown[0] != "120.0" == shown[1]
-    assert read(page) == before
+    assert page.read() == before
 
 
 def test_a_slider_let_go_after_an_undo_holds_where_it_stands(page: Page) -> None:
-    type_value(page, GAIN, 150.0)
+    page.type_value(GAIN, 150.0)
     slider = page.locator(f'.row[data-path="{GAIN}"] input[type=range]')
     slider.scroll_into_view_if_needed()
     box = slider.bounding_box()
     x, y = box["x"], box["y"] + box["height"] / 2.0
     page.mouse.move(x + 0.5 * box["width"], y)
     page.mouse.down()
-    settled(page, lambda: page.mouse.move(x + 0.8 * box["width"], y))
-    settled(page, lambda: page.keyboard.press("Control+z"))
+    page.settled(lambda: page.mouse.move(x + 0.8 * box["width"], y))
+    page.settled(lambda: page.keyboard.press("Control+z"))
     page.mouse.up()
-    done(page)
+    page.done()
     place = float(slider.input_value())
-    own = next(key for key in page.evaluate(f"{LIVE}.keys") if key["path"] == GAIN)
-    low, high = own["low"], own["high"]
-    assert field(page, GAIN) == pytest.approx(low * (high / low) ** (place / 1000.0), rel=1e-3)
+    low, high = (page.sliders()[GAIN][end] for end in ("low", "high"))
+    assert page.field(GAIN) == pytest.approx(low * (high / low) ** (place / 1000.0), rel=1e-3)
     assert place > 600.0
 
 
@@ -130,16 +129,16 @@ def test_the_map_is_drawn_though_it_is_seen_before_the_page_is_ready(opens) -> N
 
 def test_of_several_sights_told_at_once_the_last_counts(opens) -> None:
     page = opens(AMBER, first=WATCHED)
-    done(page)
+    page.done()
     assert at_once(page, "seen(false, true); return root.dataset.behind;") == "waits"
 
 
 def test_the_map_waits_as_long_as_a_step_settles_though_that_follows_later(opens) -> None:
     page = opens(AMBER, first=WATCHED + SLOW)
     at_once(page, "seen(true);")
-    done(page, 60_000)
-    type_value(page, GAIN, 140.0)
-    settling_s = read(page)["position"]["settling_time"]
+    page.done(60_000)
+    page.type_value(GAIN, 140.0)
+    settling_s = page.read()["position"]["settling_time"]
     period_s, every = AMBER.controller.period_s, AMBER.controller.position.every
     cells = json.loads(page.get_attribute("#hands-on", "data-cells") or "[]")
     assert {cell[1] for cell in cells} == {math.ceil(1.5 * settling_s / (period_s * every)) * every}
@@ -180,12 +179,12 @@ def test_a_playback_paused_and_gone_on_with_is_one(page: Page) -> None:
 def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     """Another loop is shown while the corner of this one is held: what was moved is a step of its own."""
     page.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    settled(page, lambda: page.locator(".tabs button", has_text="Velocity").click())
+    page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
     box = page.locator('[data-chart="bode"] circle[data-name="corner of velocity"]').bounding_box()
     x, y = box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
     page.mouse.move(x, y)
     page.mouse.down()
-    settled(page, lambda: page.mouse.move(x + 15.0, y))
+    page.settled(lambda: page.mouse.move(x + 15.0, y))
     at_once(page, "find('.tabs [data-loop=\"position\"]').click();")
     page.mouse.move(x + 16.0, y)
     page.mouse.up()
@@ -211,23 +210,23 @@ def test_a_curve_that_is_held_moves_from_where_it_was_taken(page: Page, between:
     page.mouse.move(x, y - 6)
     at_once(page, between)
     page.mouse.move(x, y - 9)
-    settled(page, lambda: page.mouse.move(x, y))
+    page.settled(lambda: page.mouse.move(x, y))
     page.mouse.up()
-    done(page)
-    assert field(page, GAIN) == 120.0
+    page.done()
+    assert page.field(GAIN) == 120.0
 
 
 def test_rows_of_one_drive_are_not_named_by_another(opens) -> None:
     """Break points of the drive as written follow later than the values of the link, which update at once."""
     link = "#hands-on?control.velocity.every=1&control.position.every=1"
     page = opens(load_design("ilr33-amber-multirate"), link)
-    done(page)
+    page.done()
     assert "fundamental" not in page.inner_text("table.now")
 
 
 def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None:
     page = opens(AMBER, first=SLOW)
-    done(page)
+    page.done()
     words = at_once(
         page,
         f"""press("pin"); await frame();
@@ -236,5 +235,5 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
         return [...cells].map((one) => one.textContent);""",
     )
     assert "…" in words
-    done(page)
+    page.done()
     assert "…" not in page.inner_text("table.variants")

@@ -3,10 +3,8 @@
 import re
 
 import pytest
-from live_page import done
 
-from actuator_lti import load_design
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import load_design, shipped_designs
 
 HANDS, SIZE = '.toc a[href="#hands-on"]', ".run-keys label:has-text('Size') input"
 EACH, LOOPS = "#answer details.fold > summary", "table.loops"
@@ -38,11 +36,10 @@ def test_ten_questions_are_answered_within_two_clicks(opens, name: str) -> None:
         if SIZE in clicks:
             page.fill(SIZE, "20")
             page.press(SIZE, "Enter")
-            done(page)
+            page.done()
         answer = page.locator(place).first
         assert answer.is_visible(), question
         assert re.search(pattern, answer.inner_text()), (question, answer.inner_text())
         if not clicks:  # seen without scrolling
             box = answer.bounding_box()
-            assert box is not None
             assert box["y"] + box["height"] <= 900, question

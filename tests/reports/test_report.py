@@ -14,10 +14,8 @@ import actuator_lti
 import analyses
 import nonlinear
 import reports
-from actuator_lti import assemble_loops, load_design, stability_margins
-from actuator_lti.design import with_values
-from actuator_lti.errors import InputError
-from actuator_lti.loops.limiters import onset
+from actuator_lti import InputError, assemble_loops, onset, stability_margins
+from actuator_lti.design import load_design, with_values
 from reports import document as doc
 from reports.build import design_report
 from reports.certain import certain
@@ -37,7 +35,6 @@ def curves(panel: Panel) -> list[Curve]:
 
 
 def rows_of(document: dict[str, Any], section: str, caption: str) -> list[dict[str, Any]]:
-    """Give the rows of a table by its place."""
     part = next(part for part in document["sections"] if part["id"] == section)
     blocks = [block for block in doc.walk(part) if block["kind"] == "table"]
     return next(block["rows"] for block in blocks if block["caption"].startswith(caption))

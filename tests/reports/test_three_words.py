@@ -9,11 +9,10 @@ from typing import Any
 import pytest
 
 import analyses.linear.loop_survey
-from actuator_lti import assemble_loops, stability_margins
+from actuator_lti import InputError, assemble_loops, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import design_hash, load_design, read_design_text, write_design
 from actuator_lti.design.model import Design, Requirement, Waiver
-from actuator_lti.errors import InputError
 from analyses.corners import corners
 from analyses.isolation import drain
 from analyses.linear import loop_figures
@@ -27,6 +26,9 @@ from tests.command_line import Command, Ran
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
+CASES = pytest.mark.parametrize(
+    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
+)
 
 
 def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> Design:
@@ -36,8 +38,6 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
 
 @pytest.fixture
 def written(tmp_path) -> Callable[[Design], Path]:
-    """Write a design; the path of its file."""
-
     def call(design: Design) -> Path:
         (tmp_path / "d.toml").write_text(write_design(design), encoding="utf-8")
         return tmp_path / "d.toml"
@@ -45,15 +45,8 @@ def written(tmp_path) -> Callable[[Design], Path]:
     return call
 
 
-CASES = pytest.mark.parametrize(
-    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
-)
-
-
 @CASES
-def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_margins_and_report_say_the_same(waivers, status, head, written, tmp_path, cli):
     path = written(asking(*waivers))
     said = cli.text("margins", path, status=status)
     assert said.startswith(f"{head}  ")
@@ -74,9 +67,7 @@ def test_margins_and_report_say_the_same(
 
 
 @CASES
-def test_what_corners_and_samples_leave_out_is_not_proven(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_what_corners_and_samples_leave_out_is_not_proven(waivers, status, head, written, tmp_path, cli):
     design = asking(*waivers)
     drawn = ("--samples", "4", "--no-worst", "--quiet", "--out", tmp_path)
     for name, *more in (("corners", "--quiet"), ("montecarlo", *drawn)):

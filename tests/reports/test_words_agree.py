@@ -8,9 +8,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design
-from actuator_lti.design import with_values
-from actuator_lti.margins import stability_margins
+from actuator_lti import assemble_loops, stability_margins
+from actuator_lti.design import load_design, with_values
 from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
@@ -32,6 +31,9 @@ from reports.sections.large_signal import _shift_table
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
 from reports.sections.names import Unit
 from reports.terminal import print_blocks
+
+SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
+SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
@@ -96,10 +98,6 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     assert {name for name in tested if name.startswith("feedback_")} == {
         f"feedback_{name}" for name in set(to_command) - set(tested) - {"to_reference"}
     }
-
-
-SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
-SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 
 
 @pytest.mark.parametrize(

@@ -13,10 +13,8 @@ from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
-from actuator_lti import load_design
+from actuator_lti import Design, InputError, NumericalError, load_design
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, NumericalError
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.places import Bench
 from analyses.validation.row import Row
@@ -130,7 +128,6 @@ def first_row(design: Design, model: Design) -> Row | None:
 
 
 def lines(name: str) -> Iterator[str]:
-    """The table of one drive."""
     yield f"## {name}"
     yield ""
     yield "| key | change | seen by | where |"
@@ -160,7 +157,6 @@ Made by `python -m tests.validation.mutation_table`; tests/validation/test_desig
 
 
 def main() -> None:
-    """Write the page."""
     page = [HEAD]
     for name in DRIVES:
         page += lines(name)

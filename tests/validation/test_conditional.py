@@ -140,9 +140,7 @@ def test_saturation_gain() -> None:
         (3108, "keeps oscillating", "voltage"),  # 45 times as large a step was named: an irregular swing
     ],
 )
-def test_a_finding_on_a_random_drive_is_that_of_plain_integration(
-    seed: int, ending: str, limiter: str
-) -> None:
+def test_a_finding_on_a_random_drive_is_that_of_plain_integration(seed: int, ending: str, limiter: str):
     """2 % below the threshold the error dies out, 2 % above it grows beyond the step itself."""
     design = changed(full_drive(seed), encoder={"counts_per_rev": None}, supply=None)
     found, settle = looked(design), settling_ticks(design)

@@ -2,7 +2,6 @@
 
 import re
 from math import radians
-from typing import Any
 
 import numpy as np
 import pytest
@@ -34,9 +33,7 @@ STEP, SINE = commands.step(0.02), commands.sine(0.01, 5.0)
         ({"friction": {"dry_torque_Nm": 2.0 * PEAK_NM}}, commands.step(0.1), 0.5, "sits on a limit"),
     ],
 )
-def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(
-    parts: dict[str, Any], command: commands.Command, duration_s: float, ends: str
-) -> None:
+def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command, duration_s, ends):
     design = changed(AMBER, **parts)
     run = simulate(design, command, duration_s)
     result = conduct(run)

@@ -9,12 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_lti import load_design
+from actuator_lti import InputError
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.checks import check_design
-from actuator_lti.design.loader import shipped_designs
+from actuator_lti.design import check_design, load_design, shipped_designs
 from actuator_lti.design.model import Design, FrictionPoint, Instruments, Supply
-from actuator_lti.errors import InputError
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.torque_values import edge, mechanics
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -26,14 +24,11 @@ AMBER = load_design("ilr33-amber")
 
 
 def red(design: Design, model: Design) -> set[str]:
-    """Names of the rows that are not met."""
     return {row.name for row in design_value_rows(design, model) if row.verdict is not Verdict.MET}
 
 
 def found(design: Design, name: str, condition: str = "") -> float:
-    """What the simulator shows of a row."""
     row = next(r for r in design_value_rows(design) if r.name == name and condition in r.condition)
-    assert row.found is not None
     return row.found
 
 
@@ -193,7 +188,6 @@ def test_an_edge_is_found_beside_where_it_is_predicted_or_far() -> None:
 
 
 def rows_of_page(name: str) -> dict[str, str]:
-    """Lines of the table of a drive by their key."""
     part = PAGE.read_text(encoding="utf-8").split(f"## {name}\n")[1].split("\n## ")[0]
     return {line.split("`")[1]: line for line in part.splitlines() if line.startswith("| `")}
 
@@ -206,8 +200,7 @@ def drawn() -> list[tuple[str, str]]:
 
 @pytest.mark.parametrize(("name", "key"), drawn())
 def test_a_key_of_the_table_is_seen_by_the_row_it_names(name: str, key: str) -> None:
-    line = rows_of_page(name)[key]
-    result = seen(load_design(name), key)
+    line, result = rows_of_page(name)[key], seen(load_design(name), key)
     if result.row is None:
         assert result.why
         assert result.why in line

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.operating import dead_zone
-from actuator_lti.errors import InputError
-from actuator_lti.loops import assemble_loops
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles import limit_cycles
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio
@@ -25,15 +24,13 @@ from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
 AMBER, FIN = load_design("ilr33-amber"), load_design("fin")
+FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
+TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
+every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 def counting(per_rev: int, **encoder: object) -> Design:
     return changed(AMBER, encoder={"counts_per_rev": per_rev, **encoder})
-
-
-FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
-TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
-every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 @cache
@@ -61,8 +58,7 @@ def test_gain_of_counts_by_quadrature(ratio: float, offset: float) -> None:
 
 
 def test_beyond_the_linear_amplitude_the_gain_is_one_within_5_percent() -> None:
-    ratios = np.linspace(linear_ratio(), 12.0, 150)
-    offsets = np.linspace(0.0, 1.0, 11)
+    ratios, offsets = np.linspace(linear_ratio(), 12.0, 150), np.linspace(0.0, 1.0, 11)
     assert max(abs(counted_gain(r, d) - 1.0) for r in ratios for d in offsets) <= 0.055
     below = np.linspace(0.85, 1.0, 60) * linear_ratio()
     assert max(abs(counted_gain(r, d) - 1.0) for r in below for d in offsets) > 0.045
@@ -88,8 +84,7 @@ def test_the_cycle_of_a_counted_speed_is_there_from_rest(encoder: dict[str, obje
     """Without friction, pushed off the edge a little; size and frequency within a fifth (first harmonic)."""
     design = counting(4000, **encoder)
     (cycle,) = cycles_of_quantisation(design)
-    q = design.angle_quantum_rad
-    free = without_nonlinearities(design)
+    q, free = design.angle_quantum_rad, without_nonlinearities(design)
     run = simulate(free, commands.hold(-1e-3 * q / design.total_ratio), 2.0, limits_on=False)
     tail = run.motor_angle_rad[-6000:]
     tail = tail - tail.mean()

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design, onset
+from actuator_lti import NumericalError, assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs, with_values
 from actuator_lti.design.model import Command, Design, Friction
-from actuator_lti.errors import NumericalError
 from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map
@@ -56,8 +55,7 @@ def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
 
 
 def test_amplitudes_hold_those_that_the_design_asks_for() -> None:
-    values = amplitudes(AMBER, 25, 1e-5)
-    full = AMBER.validation.full_deflection_rad
+    values, full = amplitudes(AMBER, 25, 1e-5), AMBER.validation.full_deflection_rad
     assert len(values) == 25
     assert np.all(np.diff(values) > 0.0)
     for fraction in AMBER.validation.amplitude_fractions:
@@ -101,8 +99,7 @@ def test_without_friction_the_linear_response_holds_below_the_border() -> None:
 
 
 def test_the_linear_response_is_that_of_the_loops() -> None:
-    loops = assemble_loops(AMBER)
-    omega = 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
+    loops, omega = assemble_loops(AMBER), 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
     system = loops.reference_to_output
     expected = system(np.exp(1j * omega * system.dt))
     np.testing.assert_allclose(linear_steady_state(loops, omega).output, expected, rtol=1e-9)
@@ -217,8 +214,7 @@ def test_small_sines_are_the_linear_curve_of_the_output(name: str) -> None:
     design = small(SPRINGS[name])
     result, loops = mapped(design), assemble_loops(design)
     path, command = loops.reference_to_output, design.command
-    z = np.exp(2j * np.pi * result.frequency_hz * path.dt)
-    samples = 1
+    z, samples = np.exp(2j * np.pi * result.frequency_hz * path.dt), 1
     if np.isfinite(command.jerk_rad_s3):
         samples = round(2.0 * command.acceleration_rad_s2 / (command.jerk_rad_s3 * path.dt))
     linear = path(z) * np.mean([z**-k for k in range(samples)], axis=0)

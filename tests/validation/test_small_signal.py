@@ -2,15 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
 
-from actuator_lti import load_design, onset
+from actuator_lti import Design, load_design, onset
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import shipped_designs
-from actuator_lti.design.model import Design
 from actuator_lti.loops import ExactMargins
 from analyses.validation import CHECKS, validate
 from analyses.validation.design_values import design_value_rows
@@ -20,6 +18,9 @@ from analyses.validation.small_signal import Place, small_signal
 from nonlinear import tangent
 from tests.changed import changed
 from tests.validation.random_drives import full_drive
+
+INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
+FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
 
 
 def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
@@ -31,8 +32,7 @@ def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
 def test_every_limit_of_a_shipped_drive(name: str) -> None:
     """Each limiter that the limit of linear validity lists has its row, and it is met."""
     design = load_design(name)
-    bench = Bench(design, design)
-    border = onset(bench.loops("command"), [10.0])
+    border = onset(Bench(design, design).loops("command"), [10.0])
     wanted = {f"{each}_onset".replace("-", "_") for each, at in border.each_rad.items() if np.isfinite(at[0])}
     found = rows(design)
     assert set(found) == wanted
@@ -47,17 +47,12 @@ def test_speed_drives_and_clamped_integrals(seed: int) -> None:
     assert seed != 730_037 or "voltage_onset_integral" in found
 
 
-def one_per_cent_more(place: Place, z: np.ndarray) -> np.ndarray:
-    return 1.01 * place.predicted(z)
-
-
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "joint"])
 def test_one_per_cent_of_the_linear_side_is_not_met(name: str) -> None:
     """Of every limiter: its response scaled, and a gain that all of them feel."""
     design = load_design(name)
-    bench = Bench(design, design)
-    for place in bench.onsets():
-        (row,) = small_signal(replace(place, predicted=partial(one_per_cent_more, place)))
+    for place in Bench(design, design).onsets():
+        (row,) = small_signal(replace(place, predicted=lambda z, place=place: 1.01 * place.predicted(z)))
         assert row.verdict is Verdict.NOT_MET, row
         assert row.error == pytest.approx(0.01, rel=0.02)
     gain = 1.01 * design.controller.position.gain
@@ -92,9 +87,7 @@ def verdicts(design: Design, model: Design, place: str) -> set[Verdict]:
     [("ilr33-amber", cogging), ("fin", cogging), ("fin", gear_error)],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
-    name: str, effect: Callable[..., Design]
-) -> None:
+def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(name: str, effect: Callable[..., Design]):
     plain = load_design(name)
     design, wrong = effect(plain), effect(plain, 1.01)
     for place in ("velocity", "u"):
@@ -122,10 +115,6 @@ def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
         for drive, model in ((1.0, 1.01), (1.01, 1.0)):
             one, other = (design.with_values({key: factor * value}) for factor in (drive, model))
             assert Verdict.NOT_MET in {row.verdict for row in design_value_rows(one, other)}, key
-
-
-INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
-FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
 
 
 def pendulum(falls_Nm_rad: float) -> Design:

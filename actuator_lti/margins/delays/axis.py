@@ -1,7 +1,5 @@
 """Zeros of real functions of the axis, turns of a curve, smallest distances: by certified intervals."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Margins under exact delays by certified intervals: crossings, unstable poles, distances to -1."""
 
-from __future__ import annotations
-
 import math
 
 from flint import acb, arb, ctx

@@ -1,7 +1,5 @@
 """Crossings and smallest distances of an exact loop: each from a certified root."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from itertools import pairwise

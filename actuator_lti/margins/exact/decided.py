@@ -1,7 +1,5 @@
 """What the data decide: the crossings that neighbours 8 ulp away share with them, and what is said of it."""
 
-from __future__ import annotations
-
 import math
 from bisect import bisect_left
 from dataclasses import dataclass

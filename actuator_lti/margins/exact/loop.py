@@ -1,7 +1,5 @@
 """A loop as two polynomials with exact coefficients: its doubles, as the rationals they are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any

@@ -6,8 +6,6 @@ Polynomial real root isolation using Descartes' rule of signs, SYMSAC 1976). Of 
 thirtieth of the time in which all roots are found.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from contextlib import suppress

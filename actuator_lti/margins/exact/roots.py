@@ -1,7 +1,5 @@
 """Roots of polynomials with integer coefficients, each in an interval that is known to hold it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
