@@ -1,14 +1,13 @@
 """Margins and bandwidths of every loop: the tables that a reader looks for first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
+from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins.run import Margins
@@ -18,9 +17,6 @@ from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
-
-if TYPE_CHECKING:
-    from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE: dict[str, doc.State] = {
@@ -157,11 +153,11 @@ def _stability(named: Mapping[str, LoopFigures]) -> str:
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
     held = [
-        f"{label} with the {HELD[one.loop.name]} (by itself, {OPEN[one.loop.name]}, {AWAY})"
+        f"; the {label[:1].lower()}{label[1:]}, unstable by itself, is judged with the {HELD[one.loop.name]}"
         for label, one in named.items()
         if one.held is not None
     ]
-    return f"the drive is stable, all loops closed; {', '.join(held)}" if held else "every loop is stable"
+    return f"the drive is stable with all loops closed{''.join(held)}" if held else "every loop is stable"
 
 
 def _elsewhere(result: Margins) -> str:
@@ -170,8 +166,23 @@ def _elsewhere(result: Margins) -> str:
     for point in result.operating_points:
         for name, one in point.figures.items():
             if not one.sound and name in result.loops and result.loops[name].sound:
-                places.setdefault((DOUBTS[one.sound], point.place or "sliding"), []).append(LOOPS[name])
-    return "".join(f"; {' '.join(said)}: {', '.join(names)}" for said, names in places.items())
+                where = place_words(point.place), "not" if one.sound is False else "not known to be"
+                places.setdefault(where, []).append(name)
+    return "".join(
+        f"; {where} these loops are {doubt} stable: {', '.join(names)}"
+        for (where, doubt), names in places.items()
+    )
+
+
+def place_words(place: str) -> str:
+    """An operating point within a sentence.
+
+    Examples
+    --------
+    >>> place_words("motor driven by the load"), place_words("in the gap of the play"), place_words("")
+    ('with the motor driven by the load', 'in the gap of the play', 'sliding')
+    """
+    return f"with the {place}" if " driven by " in place else place or "sliding"
 
 
 def _cogging(result: Margins) -> str:

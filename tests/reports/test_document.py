@@ -55,6 +55,7 @@ def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(passed, waive
 BARE = doc.section("missing", "Missing parts", [], status="fail")
 OPEN = doc.section("margins", "Margins", [], status="warn", verdict=Verdict.NOT_PROVEN)
 CHECKED = doc.section("two", "Two", [doc.verdicts([judged("d", True)], what="checks")])
+REFUTED = doc.section("two", "Two", [doc.verdicts([judged("d", False)], what="checks")])
 GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
 
 
@@ -64,6 +65,8 @@ GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
         ([*made()["sections"], CHECKED], "report", "not met",  # wherever they stand
          ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]),
         ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
+        ([REFUTED], "report", "not met",  # what decides it first
+         ["0 of 1 checks by simulation met, 1 not met", "the design states no requirements"]),
         ([OPEN], "compare", "met", []),
         ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
         ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide

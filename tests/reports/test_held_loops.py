@@ -14,6 +14,7 @@ from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Requirement
 from actuator_lti.drive.operating import level
 from analyses.linear.loop_figures import all_loop_figures, held_loop
+from analyses.linear.loop_survey import survey_loops
 from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
@@ -72,6 +73,8 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert found["current"].value == pytest.approx(expected, abs=1e-6)
     assert "with the rotor locked" in found["current"].reason
     assert "held" not in found["velocity"].reason
+    budget = survey_loops(replace(design, requirements=())).budgets["current"]
+    assert (budget.rotor, 180.0 + budget.total_deg) == ("locked", pytest.approx(expected, abs=1e-6))
 
 
 def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:

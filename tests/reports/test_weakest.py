@@ -14,11 +14,14 @@ from actuator_lti.design import with_overrides, with_values
 from actuator_lti.design.model import Requirement
 from analyses.corners import corners
 from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
-from analyses.linear.responses import curve
+from analyses.linear.responses import curve, frequency_grid
+from analyses.margins import margins
 from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
 from reports.build import report
 from reports.sections.answer import weakest as words_of
+from reports.sections.loop_charts import open_bode
+from reports.sections.margins import section as margins_section
 
 FIN = replace(load_design("fin"), requirements=())
 
@@ -144,3 +147,27 @@ def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
     point = weakest(survey, bounds)
     assert mending(point, survey, bounds).path == "control.position.gain"
     assert mending(point, replace(survey, design=load_design("fin")), bounds) is None
+
+
+@pytest.mark.parametrize("name", ["fin", "ilr33-amber"])
+def test_a_bode_plot_names_the_margins_nearest_to_minus_one_and_shows_them_and_0_db(name: str) -> None:
+    """The fin's velocity loop has its nearest phase margin last, ilr33-amber cut at u its gain margin."""
+    found = survey_loops(load_design(name))
+    cut = [point.figures for point in found.break_points.values() if point.figures]
+    for one in (*found.figures.values(), *cut):
+        top, bottom = open_bode("x", one, frequency_grid(one), small=True)["chart"]["columns"][0]["panels"]
+        said = [item["words"] for panel in (top, bottom) for item in panel["items"] if item["kind"] == "note"]
+        gain = min((m.db for m in one.margins.gain_margins), key=abs)
+        phase = min((m.deg for m in one.margins.phase_margins), key=abs)
+        words = [f"GM {'down to ' * (gain < 0)}{gain:.1f} dB", f"PM {phase:.1f}°"]
+        assert [text.partition("\n")[0].replace("−", "-") for text in said] == words
+        assert all(top["y"]["low"] < level < top["y"]["high"] for level in (0.0, -gain))
+        assert top["y"]["high"] < 70.0 + max(0.0, -gain)
+
+
+def test_an_operating_point_at_which_a_loop_is_not_stable_is_told_in_a_sentence() -> None:
+    found = margins(FIN)
+    away = next(one for one in found.operating_points if one.place == "motor driven by the load")
+    figures = {n: replace(f, margins=replace(f.margins, stable=False)) for n, f in away.figures.items()}
+    made = margins_section(replace(found, operating_points=(replace(away, figures=figures),)))[0]["result"]
+    assert "; with the motor driven by the load these loops are not stable: velocity, position." in made
