@@ -14,10 +14,11 @@ from actuator_lti.margins.axis_parts import axis_parts
 from actuator_lti.margins.axis_search import Factored, Place
 from actuator_lti.margins.distances import DISK, MODULUS, Distance
 from actuator_lti.margins.factored import SAME, polished
-from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Complex, Real
 
 _ROUNDED = 1e-12
 _METHOD = "factors of the loop, bounded over whole intervals of frequency; crossings polished by Newton"

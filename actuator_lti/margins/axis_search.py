@@ -20,8 +20,8 @@ from actuator_lti.axis import _nearest, _search
 from actuator_lti.axis._factors import BOUNDS, slot
 from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Complex, Mask, Real
 
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
 _ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 17  # intervals: asked for first, each time more, and no more than that

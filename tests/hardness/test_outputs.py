@@ -62,7 +62,7 @@ def test_a_mark_of_direction_is_shown_not_obeyed(mark, capsys) -> None:
     assert mark not in escape(words)
 
 
-def test_names_of_records_may_hold_anything(tmp_path, monkeypatch, cli) -> None:
+def test_names_of_records_and_lines_on_standard_error(tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     name = "a\x1b[31mb\u202ec\x85d"
     record, judged = f"{name}.csv", ("correlate", "identify", "margins")
@@ -79,9 +79,6 @@ def test_names_of_records_may_hold_anything(tmp_path, monkeypatch, cli) -> None:
         assert cli(*words).status in (0, int(words[0] in judged)), words
     for page in (*Path().glob("?/*.html"), *Path().glob("?/*.json"), *Path().glob("?/*.toml")):
         assert set("\x1b\u202e\x85").isdisjoint(page.read_text(encoding="utf-8")), page
-
-
-def test_a_line_on_standard_error_is_one_that_can_be_read(cli) -> None:
     obeyed = "\x1b[31m\u202e\x85"
     long, options = "9" * 5000, ("--x" + "y" * 9000, "--no" + obeyed)
     files = (("init", long), ("margins", "--load", long), ("margins", "no" + obeyed))
@@ -149,17 +146,7 @@ def test_a_pipe_gets_everything_or_is_refused_at_once(tmp_path) -> None:
     assert stat.S_ISFIFO(pipe.stat().st_mode)
 
 
-def test_a_socket_and_a_name_with_a_zero_are_refused(tmp_path) -> None:
-    name = tmp_path / "s"
-    with socket.socket(socket.AF_UNIX) as server:
-        server.bind(str(name))
-        with pytest.raises(InputError, match="is no file"):
-            atomic.write_text(name, "x")
-    with pytest.raises(InputError, match="null"):
-        atomic.write_text(tmp_path / "a\0b", "x")
-
-
-def test_links_are_followed_and_stay_links(tmp_path) -> None:
+def test_links_are_followed_and_stay_links_and_a_socket_and_a_name_with_a_zero_are_refused(tmp_path) -> None:
     (tmp_path / "real").mkdir()
     file, link, dangling = tmp_path / "real" / "a", tmp_path / "link", tmp_path / "dangling"
     file.write_text("old")
@@ -173,6 +160,13 @@ def test_links_are_followed_and_stay_links(tmp_path) -> None:
     loop.symlink_to(loop)
     with pytest.raises(InputError, match="loop"):
         atomic.write_text(loop, "x")
+    name = tmp_path / "s"
+    with socket.socket(socket.AF_UNIX) as server:
+        server.bind(str(name))
+        with pytest.raises(InputError, match="is no file"):
+            atomic.write_text(name, "x")
+    with pytest.raises(InputError, match="null"):
+        atomic.write_text(tmp_path / "a\0b", "x")
 
 
 def night(site: Path, margin: float = 10.0, settings: Settings = INLINE, **more: Any) -> None:

@@ -18,7 +18,9 @@ def right() -> Columns:
     return columns_of(motion(2))
 
 
-def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path, identify, cli) -> None:
+def test_the_right_record_gives_its_drive_and_accounts_for_every_column(
+    right: Columns, tmp_path, identify, cli
+) -> None:
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     data, written = identify(right).data, tmp_path / "o" / "ilr33-amber-identified.toml"
     truth, result = load_design("ilr33-amber"), load_design(written)
@@ -31,6 +33,13 @@ def test_the_right_record_gives_the_drive_that_made_it(right: Columns, tmp_path,
     assert again["relative_error"] < 0.03
     own = cli.data("correlate", written, tmp_path / "r.csv")["records"][0]["signals"]["current"]
     assert own["relative_error"] == pytest.approx(again["relative_error"], rel=1e-9)
+    more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
+    inputs = {row["column"]: row["use"] for row in identify(more).data["inputs"]["r.csv"]}
+    assert set(inputs) == set(more)
+    assert inputs["current_A"].startswith("drive")
+    assert inputs["temperature_C"] == "no: no name that is known"
+    assert inputs["current_mA"] == "no: motor current is read from current_A"
+    assert inputs["motor_speed_rpm"].startswith("no: ")
 
 
 @pytest.mark.parametrize("key", ["motor.rotor_inertia", "load.inertia"])
@@ -46,9 +55,7 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
         inertia_share(design, 1e-6, "gear.worm.ratio")
 
 
-def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
-    right: Columns, tmp_path, identify, cli
-) -> None:
+def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_path, identify, cli) -> None:
     rng = np.random.default_rng(1)
     noisy = {**right, "current_A": right["current_A"] + 1.5 * rng.standard_normal(len(right["time_s"]))}
     for accepted in ((), ("--accept",)):
@@ -60,16 +67,6 @@ def test_a_residual_above_the_level_writes_nothing_unless_it_is_accepted(
     assert words in " ".join(cli.text("identify", tmp_path / "r.csv", *asked, status=1).split())
 
 
-def test_every_column_is_accounted_for(right: Columns, identify) -> None:
-    more = {**right, "temperature_C": right["time_s"], "current_mA": 1e3 * right["current_A"]}
-    inputs = {row["column"]: row["use"] for row in identify(more).data["inputs"]["r.csv"]}
-    assert set(inputs) == set(more)
-    assert inputs["current_A"].startswith("drive")
-    assert inputs["temperature_C"] == "no: no name that is known"
-    assert inputs["current_mA"] == "no: motor current is read from current_A"
-    assert inputs["motor_speed_rpm"].startswith("no: ")
-
-
 @pytest.mark.parametrize(
     ("signal", "reason"),
     [
@@ -79,9 +76,7 @@ def test_every_column_is_accounted_for(right: Columns, identify) -> None:
         ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
     ],
 )
-def test_a_signal_that_nothing_reads_is_refused(
-    signal: str, reason: str, right: Columns, tmp_path, cli
-) -> None:
+def test_a_signal_that_nothing_reads_is_refused(signal, reason, right, tmp_path, cli) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'
     (tmp_path / "r.toml").write_text(text)
@@ -146,16 +141,19 @@ def test_a_wrong_campaign_gives_no_design(fault: str, bench: Path, tmp_path, cli
     assert not list((tmp_path / "o").glob("*.toml"))
 
 
-def test_a_right_campaign_is_simulated_again_with_what_was_written(bench: Path, cli) -> None:
+def test_a_right_campaign_is_simulated_again_and_says_what_is_fixed_or_not_told(bench, cli, tmp_path) -> None:
     told = cli.data("identify", bench / "campaign.toml", "--suggest", "0")
     checks = {check["id"]: check for check in told["items"]}
     assert checks["written-the runs"]["value"] < 0.005
     inputs = {(row["file"], row["column"]) for row in told["result"]["inputs"]}
     assert inputs >= {("drive", "Current"), ("drive", "Position"), ("sensor", "torque")}
-
-
-def test_unloaded_runs_say_what_they_do_not_tell(bench: Path, tmp_path, cli) -> None:
-    """The commonest friction test: no load, so CM stays the design's, and that is said."""
+    words = ("identify", bench / "campaign.toml", "--fix")
+    fit = cli.data(*words, "friction.viscous=5.25 uN*m*s/rad", "--out", tmp_path)["result"]["fit"]
+    assert fit["fixed"]["Cv"]["reason"] == "fixed as asked"
+    assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
+    assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
+    assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")
+    # the commonest friction test: no load, so CM stays the design's, and that is said
     folder = tmp_path / "bench"
     shutil.copytree(bench, folder)
     head, *runs = (bench / "campaign.toml").read_text().split("[[run]]")
@@ -175,12 +173,3 @@ def test_a_drive_that_carries_its_load_is_not_what_the_law_of_a_campaign_says(be
     assert (law["id"], law["passed"]) == ("law", False)
     assert "1/N = 0.4209 mN m/(N m)" in law["reason"]
     assert 'load.path = "self-locking"' in law["reason"]
-
-
-def test_a_coefficient_of_a_campaign_can_be_fixed(bench: Path, tmp_path, cli) -> None:
-    words = ("identify", bench / "campaign.toml", "--fix")
-    fit = cli.data(*words, "friction.viscous=5.25 uN*m*s/rad", "--out", tmp_path)["result"]["fit"]
-    assert fit["fixed"]["Cv"]["reason"] == "fixed as asked"
-    assert load_design(tmp_path / "ilr33-amber-identified.toml").friction.viscous_Nms_rad == 5.25e-6
-    assert cli(*words, "friction.load_coefficient=0", "--json").status == 1
-    assert "can be fixed here" in cli.refused(*words, "motor.resistance=1 ohm", "--json")
