@@ -14,9 +14,7 @@ from tests.changed import changed
 GAINS = {"current": 0.01, "velocity": 1.0, "current velocity": 0.05}  # of the stage outside the gap
 
 
-def amber(
-    n_v: int = 1, n_p: int = 1, delay_s: float = 1e-4, feedforward: float = 0.0, **changes: Any
-) -> model.Design:
+def amber(n_v: int = 1, n_p: int = 1, delay_s: float = 0.0001, feedforward: float = 0.0, **changes: Any):
     """The shipped baseline with J = 1.05e-6 kg m2 in all, at its motor, and angles that are not counted."""
     base = load_design("ilr33-amber")
     bare = model.Design(

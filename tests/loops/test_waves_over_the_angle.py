@@ -54,7 +54,7 @@ each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 def rotor(
     viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
-) -> model.Design:
+):
     """A torque source without a controller, so that the rotor coasts."""
     return model.Design(
         name="rotor",

@@ -72,9 +72,7 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     return changed(design, load={"path": "back-drivable", "moment_slope_Nm_rad": slope})
 
 
-def _plant(
-    dice: Dice, delay: float, axis: str
-) -> tuple[model.Motor, float, tuple[model.Gear, ...], model.Load]:
+def _plant(dice: Dice, delay: float, axis: str):
     R, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
     L = R * delay * dice.decades(2.0, 60.0)
     inertia = dice.decades(1.0, 300.0) * (L / R) * k**2 / R
@@ -90,9 +88,7 @@ def _plant(
     return motor, inertia, gears, model.Load(inertia_kgm2=inertia * share * prod(ratios) ** 2)
 
 
-def _controller(
-    dice: Dice, motor: model.Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
-) -> model.Controller:
+def _controller(dice, motor, inertia, period, delay, current, velocity) -> model.Controller:
     """A cascade whose crossovers are fractions of each other."""
     R, L, k = motor.resistance_ohm, motor.inductance_H, motor.torque_constant_Nm_A
     inner = dice.rng.uniform(0.1, 0.5) / (period + delay)
