@@ -53,16 +53,11 @@ def traceback_of(line: str) -> str:
     return text
 
 
-@pytest.fixture
-def unpainted(monkeypatch) -> None:
-    """Reports without pictures, which take most of the time."""
-    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: '<svg viewBox="0 0 9 9"></svg>')
-
-
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("place", BROKEN)
 def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, monkeypatch, cli) -> None:
     module, _, name = place.partition(":")
+    unpainted = '<svg viewBox="0 0 9 9"></svg>'  # pictures take most of the time
+    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: unpainted)
     monkeypatch.setattr(import_module(module), name, broken)
     part, option = ("validation", "--quiet") if name == "validate" else ("linear", "--no-validation")
     ran = cli(*REPORT, option, "--out", tmp_path)

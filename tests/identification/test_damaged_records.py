@@ -55,12 +55,9 @@ def _later(seconds: float) -> Damage:
     return lambda c: {**c, "current": np.interp(c["time"] - seconds, c["time"], c["current"])}
 
 
-def _clipped(share: float) -> Damage:
-    def change(columns: Columns) -> Columns:
-        level = np.quantile(np.abs(columns["current"]), share)
-        return {**columns, "current": np.clip(columns["current"], -level, level)}
-
-    return change
+def _clipped(columns: Columns) -> Columns:
+    level = np.quantile(np.abs(columns["current"]), 0.95)
+    return {**columns, "current": np.clip(columns["current"], -level, level)}
 
 
 def _scaled(factor: float, *names: str) -> Damage:
@@ -115,7 +112,7 @@ def _is_the_truth(result: BenchResult, near: float) -> bool:
 
 RIGHTED: dict[str, tuple[Damage, float, str]] = {
     "nothing": (dict, 0.005, r"^(?!.*(at one time|clipped|drift|off, or the scale))"),
-    "clipped": (_clipped(0.95), 0.01, "clipped"),
+    "clipped": (_clipped, 0.01, "clipped"),
     "10 ms late": (_later(1e-2), 0.01, r"the current is (9\.9|10)\S* ms .* later than the motion"),
     "one row in 100 lost, with its time": (_lost(100, stamped=True), 0.005, r"^(?!.*(missing|at one time))"),
     "1 ms late": (_later(1e-3), 0.01, r"the current is (0\.9|1\.0|1 )\S* ?ms .* later than the motion"),

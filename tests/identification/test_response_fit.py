@@ -40,11 +40,6 @@ def _design(off: dict[str, float]) -> model.Design:
     return COUPLED.with_values({key: value * off.get(key, 1.0) for key, value in TRUTH.items()})
 
 
-def _file(folder: Path, off: dict[str, float]) -> Path:
-    (folder / "start.toml").write_text(write_design(_design(off)))
-    return folder / "start.toml"
-
-
 def open_loop(hertz: np.ndarray) -> np.ndarray:
     """P control of the motor angle, held over a tick and late by a part of it (Astrom, Wittenmark, 3.2)."""
     J, Jl, k, c, C, d = TRUTH.values()
@@ -70,11 +65,6 @@ HERTZ = np.geomspace(0.5, 400.0, 60)
 OFF = dict(zip(TRUTH, (1.15, 0.85, 1.1, 0.7, 1.3, 0.8), strict=True))
 
 
-def _seen(of: str) -> np.ndarray:
-    loop = open_loop(HERTZ)
-    return {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
-
-
 def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: float | None = None) -> Path:
     columns = {"frequency_hz": hertz, "real": response.real, "imag": response.imag}
     if deviation is not None:
@@ -86,7 +76,9 @@ def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: f
 
 def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: bool = True) -> Path:
     noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ))) / np.sqrt(2.0)
-    value = _seen(of) * (1.0 + deviation * (noise[0] + 1j * noise[1]))
+    loop = open_loop(HERTZ)
+    seen = {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
+    value = seen * (1.0 + deviation * (noise[0] + 1j * noise[1]))
     return _written(folder, HERTZ, value, deviation if stated else None)
 
 
@@ -136,7 +128,8 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
 
     Ten times the loop is that of a tenth of the inertia: less than the rotor's, which is held.
     """
-    file, design = _measured(tmp_path, "L", 0.01, 3), _file(tmp_path, OFF)
+    file, design = _measured(tmp_path, "L", 0.01, 3), tmp_path / "start.toml"
+    design.write_text(write_design(_design(OFF)))
     words = ("identify", "--response", file, "--design", design)
     assert cli(*words, "--out", tmp_path / "o").status == 0
     result = cli.data(*words, "--out", tmp_path / "o", "--fix", "coupling.stiffness=450", status=1)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from actuator_lti.design import load_design, parameter_value
-from actuator_lti.errors import InputError
 from analyses.identification.to_design import inertia_share
 from tests.identification.bench_records import Columns, columns_of, motion, write
+from tests.refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -49,10 +49,8 @@ def test_the_drives_own_total_gives_its_own_parts(key: str) -> None:
     value, slope = inertia_share(design, design.inertia_kgm2, key)
     assert value == pytest.approx(parameter_value(design, key), rel=1e-4)
     assert slope == (1.0 if key == "motor.rotor_inertia" else 2376.0**2)
-    with pytest.raises(InputError, match="beside"):
-        inertia_share(design, 1e-8, key)
-    with pytest.raises(InputError, match=r"motor\.rotor_inertia or load\.inertia"):
-        inertia_share(design, 1e-6, "gear.worm.ratio")
+    refused(inertia_share, design, 1e-8, key, words="beside")
+    refused(inertia_share, design, 1e-6, "gear.worm.ratio", words="motor.rotor_inertia or load.inertia")
 
 
 def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_path, identify, cli) -> None:

@@ -10,9 +10,7 @@ import pytest
 
 from actuator_lti import load_design, write_design
 from actuator_lti.design.model import Friction
-from actuator_lti.errors import InputError
 from analyses.motion.asked import OF
-from nonlinear import loads
 from tests.changed import changed
 
 TS = 1e-4
@@ -139,8 +137,6 @@ def test_a_load_keeps_its_own_clock_or_that_of_the_record(run, tmp_path) -> None
     load = run(f"--command hold --amplitude 0 --load-file {path} --duration 0.3")[1]["load_Nm"]
     assert not load[:1000].any()
     assert load[[1000, 1500, 2000, 2999]] == pytest.approx([2.0, 3.0, 4.0, 4.0], rel=1e-12)
-    with pytest.raises(InputError, match="must be 0 or later"):
-        loads.series([-2.0, -1.0], [1.0, 1.0])
     # a record from 5 s on, held at zero, and a load from 5.5 s on, of the same clock: half a second late
     record = table(tmp_path / "record.csv", "t,deg", 5.0 + 0.1 * np.arange(11), [0] * 11)
     load = table(tmp_path / "load.csv", "t,Nm", [5.5, 5.6, 5.7], [2] * 3)

@@ -83,6 +83,7 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
         (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
+        (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
     ],
 )
 def test_refusals(make: Callable[[], object], words: str) -> None:

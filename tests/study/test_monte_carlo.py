@@ -30,12 +30,6 @@ def study(design, tmp_path_factory):
     return monte_carlo(design, tmp_path_factory.mktemp("study"), replace(PLAIN, chunk=400))
 
 
-@pytest.fixture(scope="module")
-def searched(design, tmp_path_factory):
-    """The same with its worst cases, which take most of the time."""
-    return monte_carlo(design, tmp_path_factory.mktemp("searched"), replace(PLAIN, worst_cases=True))
-
-
 def test_odds_of_a_current_limit_are_the_closed_form(study, design):
     """i = (C0 + CM M + Cv w)/kM is linear in the uniform CM: P(i <= 4 A) by hand."""
     largest = (4.0 * 5.9e-3 - 2.25e-3 - 5.25e-6 * 942.5) / 8.0
@@ -59,7 +53,9 @@ def test_odds_of_a_current_limit_are_the_closed_form(study, design):
     assert all(one.swing <= first.swing for one in rest)
 
 
-def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(searched, design, tmp_path):
+def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(design, tmp_path):
+    settings = replace(PLAIN, worst_cases=True)
+    searched = monte_carlo(design, tmp_path / "searched", settings)
     case = next(w for w in searched.worst if w.requirement == "motor-current")
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3
     assert case.sampled < case.value == pytest.approx(corner, rel=1e-9)
@@ -69,8 +65,7 @@ def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(
     assert saved.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
     margin = next(w for w in searched.worst if w.requirement == "gain-margin/position")
     assert margin.value <= margin.sampled
-    settings = replace(PLAIN, chunk=77, worst_cases=True)
-    other = monte_carlo(design, tmp_path, settings, engine=Engine(threads=1))
+    other = monte_carlo(design, tmp_path / "other", replace(settings, chunk=77), engine=Engine(threads=1))
     assert other.columns == searched.columns
     assert other.odds == searched.odds
     assert [w.parameters for w in other.worst] == [w.parameters for w in searched.worst]
