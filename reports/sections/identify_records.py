@@ -64,10 +64,13 @@ def _result(result: BenchResult, axis: str) -> str:
         one = parameter(given, axis)
         name = one.label[:1].lower() + one.label[1:]
         parts[-1] += f", all at the design's {name}, {show(model[given], 'sig:4')} {one.unit}"
+    told = ", ".join(parts) or "the records tell neither inertia nor friction"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "its records" if len(result.resimulated) > 1 else worst.record
-    words = f"{', '.join(parts)}. The written design meets {met} within"
-    return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    written = "The written design" if result.passed or result.accepted else "A design of what is found"
+    return (
+        f"{capital(told)}. {written} meets {met} within {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    )
 
 
 def _intro(result: BenchResult) -> str:
