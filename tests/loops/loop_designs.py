@@ -43,6 +43,18 @@ def sprung(name: str, slope_Nm_rad: float, **more: Any) -> model.Design:
     )
 
 
+def source_drive(J: float, gain_Nm_V: float, period_s: float, voltage_V: float, **parts: Any) -> model.Design:
+    """An inertia on an ideal torque source, without delay or controller; and `parts` of it changed."""
+    bare = model.Design(
+        name="source",
+        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=gain_Nm_V),
+        controller=model.Controller(period_s=period_s, computing_delay_s=0.0),
+        limits=model.Limits(voltage_V=voltage_V),
+        validation=model.Validation(full_deflection_rad=1.0),
+    )
+    return changed(bare, **parts)
+
+
 def faster(design: model.Design, factor: float) -> model.Design:
     """The same continuous drive, sampled faster and later by less (its filters stay)."""
     times = {name: getattr(design.controller, name) / factor for name in ("period_s", "computing_delay_s")}
