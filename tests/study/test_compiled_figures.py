@@ -62,18 +62,6 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
             assert figures.quantity(quantity, loop)[k] == pytest.approx(getattr(truth, name), rel=1e-6)
 
 
-def of_response(system) -> dict[str, float | None]:
-    width, step = closed_loop_bandwidth(system), step_figures(system)
-    return {
-        "bandwidth": width.minus3db_hz,
-        "bandwidth_90deg": width.minus90deg_hz,
-        "resonance_peak": width.resonance_peak_db,
-        "overshoot": step.overshoot_percent,
-        "rise_time": step.rise_time_s,
-        "settling_time": step.settling_time_s,
-    }
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     population = scattered(name, 5, seed=8)
@@ -81,7 +69,16 @@ def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     for k, loop, own in each(population, figures):
         if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
             continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
-        for quantity, truth in of_response(own.closed_loop).items():
+        width, step = closed_loop_bandwidth(own.closed_loop), step_figures(own.closed_loop)
+        truths = {
+            "bandwidth": width.minus3db_hz,
+            "bandwidth_90deg": width.minus90deg_hz,
+            "resonance_peak": width.resonance_peak_db,
+            "overshoot": step.overshoot_percent,
+            "rise_time": step.rise_time_s,
+            "settling_time": step.settling_time_s,
+        }
+        for quantity, truth in truths.items():
             mine = figures.quantity(quantity, loop)[k]
             expected = np.nan if truth is None else truth
             assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)

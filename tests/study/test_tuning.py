@@ -32,14 +32,9 @@ def integrator(*requirements):
     )  # fmt: skip
 
 
-def integrator_gain(margin_deg):
-    """Of K T z^-q/(z - 1) with L = q T: crossover at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
-    omega = math.radians(90.0 - margin_deg) / (DELAY + 0.5 * PERIOD)
-    return 2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD
-
-
 @pytest.mark.parametrize("margin", [30.0, 45.0, 60.0])
 def test_an_integrator_with_delay_gets_its_known_gain(margin):
+    """Of K T z^-q/(z - 1) with L = q T: crossover at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
     design = integrator(need("phase_margin", margin, loop="position"))
     problem = problem_of(design, loop_requirements(design), {"control.position.gain": 20.0})
     corners = problem.all_corners
@@ -48,7 +43,8 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
         lambda x: problem.distances(np.exp(x), corners).reshape(len(x), -1),
         lambda x: np.exp(x) / 100.0,
     )  # fmt: skip
-    assert gains[0] == pytest.approx(integrator_gain(margin), rel=1e-3)
+    omega = math.radians(90.0 - margin) / (DELAY + 0.5 * PERIOD)
+    assert gains[0] == pytest.approx(2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, rel=1e-3)
 
 
 def test_what_cannot_be_met_is_refused_with_its_distance():
