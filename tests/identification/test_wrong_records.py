@@ -89,6 +89,16 @@ def _slow_sensor(folder: Path) -> None:
         file.write_text("\n".join([head, names, *(f"{float(t) * 1.05:.4f},{m}" for t, m in pairs)]) + "\n")
 
 
+def _late_loads(folder: Path) -> None:
+    """A brake that is put on 0.7 s after the motion began, in the loaded runs but one."""
+    for file in sorted(folder.glob("*_torque.csv"))[:-1]:
+        head, names, *rows = file.read_text().splitlines()
+        pairs = [row.split(",") for row in rows]
+        up = next((float(t) for t, m in pairs if abs(float(m)) > 1.0), 0.0) + 0.7
+        rows = [f"{t},{m if float(t) > up else 0.0}" for t, m in pairs]
+        file.write_text("\n".join([head, names, *rows]) + "\n")
+
+
 def _copied(run: str, to: str) -> Callable[[Path], object]:
     return lambda folder: shutil.copy(folder / f"run{run}.csv", folder / f"run{to}.csv")
 
@@ -111,6 +121,7 @@ WRONG_BENCH = {
     "N m read as N cm": (_replaced(('"torque", unit = "N*m"', '"torque", unit = "N*cm"')), "factor 100"),
     "two columns swapped": (_replaced(*SWAP), "usable runs"),
     "the sensor's clock 5 % off": (_slow_sensor, "a clock is off"),
+    "loads that come later than the motion": (_late_loads, "came or went at another time than the speed"),
     "another run's sensor file": (_copied("09_torque", "05_torque"), "that of run 09 as well"),
     "another run's drive file": (_copied("09_drive", "08_drive"), "set speed"),
 }
@@ -151,3 +162,12 @@ def test_a_right_campaign_is_simulated_again_and_says_what_is_fixed_or_not_told(
     assert kept == {"CM": "no run is loaded: the design's value kept"}
     assert fit["parameters"]["C0"]["value"] == pytest.approx(2.25e-3, rel=0.02)
     assert fit["parameters"]["CM"]["value"] == 1.34e-3
+
+
+def test_a_drive_that_carries_its_load_is_not_what_the_law_of_a_campaign_says(bench: Path, cli) -> None:
+    """The motor carries M/N besides: of a ratio of 2376 0.4209 mN m/(N m), which would be in CM."""
+    words = ("identify", bench / "campaign.toml", "--set", 'load.path="back-drivable"', "--suggest", "0")
+    law, *_ = cli.data(*words, status=1)["items"]
+    assert (law["id"], law["passed"]) == ("law", False)
+    assert "1/N = 0.4209 mN m/(N m)" in law["reason"]
+    assert 'load.path = "self-locking"' in law["reason"]
