@@ -27,6 +27,8 @@ WATCHED = """window.IntersectionObserver = class {
 EARLY = """window.watched = () => new MutationObserver(() => seen(true)).observe(
     document.getElementById("hands-on"), { attributes: true, attributeFilter: ["data-count"] });"""
 SLOW = "const now = performance.now.bind(performance); performance.now = () => 1000 * now();"
+PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
+    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
 
 
 @pytest.fixture
@@ -186,10 +188,6 @@ def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     page.mouse.move(x + 16.0, y)
     page.mouse.up()
     page.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
-
-
-PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
-    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
 
 
 @pytest.mark.parametrize("between", ["", PAGE_UP])
