@@ -227,3 +227,18 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
     assert "…" in words
     page.done()
     assert "…" not in page.inner_text("table.variants")
+
+
+def test_what_waits_is_not_started_once_a_value_moves(page: Page) -> None:
+    """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
+    page.evaluate(SLOW)
+    page.type_value(GAIN, 101.0)  # by this clock its run took long: the next is late
+    at_once(
+        page,
+        f"""const wait = (ms) => new Promise((go) => setTimeout(go, ms));
+        type("{GAIN}", "102");
+        await wait(30); // listed, not started
+        for (const end = Date.now() + 300; Date.now() < end;); // due by now
+        type("{GAIN}", "103");
+        while (root.dataset.behind !== "done") await wait(10);""",
+    )
