@@ -121,6 +121,7 @@ def answer(
     **chosen: Any,
 ) -> None:
     from actuator_lti.design import warnings_of
+    from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
     from reports import document as doc
     from reports.amperes import in_amperes
@@ -141,7 +142,10 @@ def answer(
     for each in asked:
         if isinstance(each, OnMachines) and each.engine.caution:
             print_note(f"actuator-lti: {each.engine.caution}")
-    for warning in warnings_of(drive) if one.warns else ():
+    kinds = {name: option.kind for name, (_, option) in options(one.request).items()}
+    loads = [values[name] for name, kind in kinds.items() if kind == "load" and values[name]]
+    beyond = [line for load in loads for line in beyond_largest(drive, "--load", load)]
+    for warning in (*(warnings_of(drive) if one.warns else ()), *beyond):
         print_warning(f"{drive.name}: {warning}")
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
