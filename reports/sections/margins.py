@@ -389,11 +389,12 @@ def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]
 
 
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
-    """Say of each loop that is unstable only by itself how it is judged; of one that returns what it lacks."""
+    """Say of each loop that is unstable only by itself how it is judged; of one that returns what is not."""
     returned = [(label, one.step) for label, one in named.items() if one.step and returns(one)]
     return [
-        f"{label}: after a peak of {step.peak_value:.3g} the response returns to {step.final_value:.3g} of its "
-        "command. Bandwidth, resonance, rise, overshoot and settling would be relative to that, and are left out."
+        f"{label}: after a peak of {step.peak_value:.3g} the response returns to {step.final_value:.3g} of "
+        "its command. Bandwidth, resonance, rise, overshoot and settling, which are relative to that, are "
+        "left out."
         for label, step in returned
     ] + [
         f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as {AWAY}. With all loops "
@@ -406,9 +407,8 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 def response_row(figures: LoopFigures) -> Tree:
     """Give the response of one loop by column; of one that returns what is not relative to its end."""
     row = {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
-    return (
-        {**dict.fromkeys(row), **{key: row[key] for key in ("t_peak_db", "dc")}} if returns(figures) else row
-    )
+    kept = ("t_peak_db", "dc") if returns(figures) else row
+    return {key: row[key] if key in kept else None for key in row}
 
 
 def returns(figures: LoopFigures) -> bool:
