@@ -1,7 +1,5 @@
 """Two places of a report that speak of one thing say the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 
