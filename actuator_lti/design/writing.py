@@ -61,12 +61,11 @@ def _changed(raw: Tree, old: Tree, new: Tree) -> Tree:
         was, said = old.get(key), raw.get(key)
         if value == was:
             continue
-        tables = isinstance(value, dict) and isinstance(was, dict) and isinstance(said, dict)
-        if tables and "value" not in value:
-            value = _changed(said, was, value)
-        elif isinstance(value, dict) and isinstance(said, str) and "source" in value:
-            value = {**value, "source": f"changed from {said}"}
         made[key] = value
+        if isinstance(value, dict) and isinstance(was, dict) and isinstance(said, dict):
+            made[key] = value if "value" in value else _changed(said, was, value)
+        elif isinstance(value, dict) and isinstance(said, str) and "source" in value:
+            made[key] = {**value, "source": f"changed from {said}"}
     return made
 
 
