@@ -123,7 +123,10 @@ def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
     gains = {row["path"]: row["rounded"] for row in made["sections"][0]["blocks"][1]["rows"]}
-    assert load_design(tmp_path / "tuned.toml").controller.position.gain == gains["control.position.gain"]
+    tuned = load_design(tmp_path / "tuned.toml")
+    assert tuned.controller.position.gain == gains["control.position.gain"]
+    asked = {item.id: item.minimum for item in tuned.requirements if item.quantity == "bandwidth"}
+    assert asked["position-bandwidth-wanted"] == 2000.0
 
 
 def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense():
