@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 from scipy.stats import chi2
 
 from actuator_lti.design import parameter_value, paths_of, read_design_text, with_values, write_design
@@ -16,7 +17,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
-from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.asked import Of
 from analyses.identification.output_error import fit_output
@@ -42,7 +43,8 @@ class ResponseFit(Fit):
     """Values by key with which a loop's response is the measured one.
 
     ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
-    Errors are widened by a misfit above 1; without deviations they are those of the residual.
+    Errors are widened by a misfit above 1; without deviations they are those of the residual, so large that
+    1.96 of them hold Student's 95 % interval at its degrees of freedom.
     """
 
     misfit: float | None
@@ -91,7 +93,8 @@ def identify_response(
     Raises
     ------
     InputError
-        If the response cannot be read, the design has no such loop, or nothing is determined.
+        If the response cannot be read, the design has no such loop, nothing is determined, or there are no
+        more numbers than unknowns.
     """
     measured = read_response(source)
     start = with_values(design, dict(fixed or {}))
@@ -106,6 +109,7 @@ def identify_response(
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
+    _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(
         start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
     )
@@ -163,6 +167,14 @@ def _model(
     return response
 
 
+def _refuse_too_few(numbers: int, unknowns: int, where: str) -> None:
+    """Without degrees of freedom there is no interval."""
+    if numbers <= unknowns:
+        told = f"{numbers // 2} frequencies are {numbers} numbers for {unknowns} unknowns"
+        allowed = f"{unknowns // 2 + 1} frequencies or more, or fewer unknowns (--fix KEY=VALUE)"
+        raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=where)
+
+
 def _determined(
     start: Design,
     names: tuple[str, ...],
@@ -182,8 +194,10 @@ def _determined(
             continue
         size = np.linalg.norm(found.slopes, axis=0)
         unit = found.slopes / size
-        variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
-        scale = max(variance, 1.0) if known else variance
+        freedom = len(found.rest) - len(size)
+        variance = float(found.rest @ found.rest) / freedom
+        student = float(stdtrit(freedom, 0.975)) / COVERAGE
+        scale = max(variance, 1.0) if known else variance * student**2
         covariance = np.asarray(scale * (np.linalg.inv(unit.T @ unit) / np.outer(size, size)))
         share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
         worst = int(np.argmax(share))

@@ -58,9 +58,9 @@ def _design(folder: Path, off: dict[str, float]) -> Path:
     return folder / "start.toml"
 
 
-def open_loop(hertz: np.ndarray) -> np.ndarray:
+def open_loop(hertz: np.ndarray, values: dict[str, float] = TRUTH) -> np.ndarray:
     """P control of the motor angle, held over a tick and late by a part of it (Astrom, Wittenmark, 3.2)."""
-    J, Jl, k, c, C, d = TRUTH.values()
+    J, Jl, k, c, C, d = values.values()
     spring = np.array([k / N, c / N, -k, -c])  # of motor angle and speed, load angle and speed
     a = np.zeros((4, 4))
     a[0, 1] = a[2, 3] = 1.0
@@ -125,6 +125,39 @@ def test_intervals_hold_what_they_say(tmp_path) -> None:
     assert abs(np.mean(np.square(shares)) - 1.0) < 3.0 * np.sqrt(2.0 / len(shares))
     assert [one.fit.misfit for one in results] == pytest.approx([1.0] * 6, abs=3.0 * np.sqrt(0.5 / 114))
     assert all(one.passed for one in results)
+
+
+STUDENT_2 = 4.302653
+"""97.5 % of Student's distribution of two degrees of freedom, of a table."""
+
+
+def test_few_degrees_of_freedom_widen_the_interval(tmp_path) -> None:
+    """Two inertias of two frequencies: slopes by differences of the exact loop, Student at 4 - 2."""
+    hertz, free = np.array([3.0, 40.0]), ("motor.rotor_inertia", "load.inertia")
+    file = _written(tmp_path, hertz, open_loop(hertz) * (1.0 + np.array([0.004 - 0.002j, 0.003j])))
+    held = {key: value for key, value in TRUTH.items() if key not in free}
+    fit = identify_response(load_design(_design(tmp_path, {})), file, fixed=held).fit
+    seen = np.loadtxt(file, delimiter=",", skiprows=1)[:, 1:] @ [1.0, 1.0j]
+
+    def parts(off: dict[str, float]) -> np.ndarray:
+        values = {key: off.get(key, 1.0) * {**TRUTH, **{n: fit[n] for n in free}}[key] for key in TRUTH}
+        share = open_loop(hertz, values) / np.abs(seen) - seen / np.abs(seen)
+        return np.concatenate([share.real, share.imag])
+
+    rest = parts({})
+    slopes = np.column_stack([(parts({k: 1.0 + 1e-5}) - parts({k: 1.0 - 1e-5})) / 2e-5 for k in free])
+    shares = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)) * (rest @ rest) / 2.0)
+    for key, share in zip(free, shares, strict=True):
+        low, high = fit.interval(key)
+        assert 0.5 * (high - low) == pytest.approx(STUDENT_2 * share * fit[key], rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_no_more_numbers_than_unknowns_are_refused(count: int, tmp_path, cli) -> None:
+    hertz = HERTZ[10 : 10 + count]
+    file, design = _written(tmp_path, hertz, open_loop(hertz)), _design(tmp_path, {})
+    said = cli.refused("identify", "--response", file, "--design", design)
+    assert "allowed: 4 frequencies or more" in said
 
 
 def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
