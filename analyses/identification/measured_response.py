@@ -19,10 +19,12 @@ from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import told_apart
+from analyses.estimation.parameters import parameter
 from analyses.identification.asked import Of
-from analyses.identification.output_error import fit_output
+from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
+from analyses.identification.output_error import STEP, fit_output
 from analyses.identification.to_design import design_with_fit
-from analyses.identification.verdict import Identified, Item, simulated_item
+from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 
 KEYS = (
     "motor.rotor_inertia",
@@ -32,6 +34,7 @@ KEYS = (
     "friction.viscous",
     "control.computing_delay",
 )
+CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
 RESOLVED = 1e-5
@@ -49,6 +52,7 @@ class ResponseFit(Fit):
 
     misfit: float | None
     at_bound: tuple[str, ...]
+    slopes: Floats = field(repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,8 +117,9 @@ def identify_response(
     fit, rest = _determined(
         start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
     )
-    fit = replace(fit, fixed={**held, **fit.fixed})
-    made = design_with_fit(start, fit, f"frequency response {measured.name}")
+    given = _given(start, fit, lambda tried: parts(model(tried))) if CONSTANT_KEYS.isdisjoint(held) else {}
+    fit = replace(fit, fixed={**held, **fit.fixed, **given})
+    made = design_with_fit(start, fit, f"frequency response {measured.name}{at_constant(fit)}")
     modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
@@ -125,6 +130,7 @@ def identify_response(
         items.insert(0, Item.of("misfit", label, "" if level > LEVEL else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
+    items += kept_items(fit, held)
     return ResponseResult(
         design=made,
         items=tuple(items),
@@ -134,6 +140,19 @@ def identify_response(
         of=of,
         fit=fit,
     )
+
+
+def _given(start: Design, fit: ResponseFit, parts: Callable[[Design], Floats]) -> dict[str, Fixed]:
+    """The constant that makes torques, which the response of a loop tells only with the values, to scale."""
+    name = next((name for name, of in CONSTANTS.items() if getattr(start.motor, of) is not None), None)
+    if name is None:
+        return {}
+    found = with_values(start, dict(zip(fit.names, fit.values.tolist(), strict=True)), check=False)
+    key = parameter(name).key
+    more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
+    size = np.linalg.norm(fit.slopes, axis=0)
+    moved = np.linalg.lstsq(fit.slopes / size, parts(more) - parts(found), rcond=None)[0] / size
+    return kept_constant(start, name, fit, moved / fit.values / STEP)
 
 
 def _model(
@@ -216,5 +235,6 @@ def _determined(
         fixed={key: Fixed(value=value, reason=told[key]) for key, value in kept_at.items()},
         misfit=float(np.sqrt(variance)) if known else None,
         at_bound=found.at_bound,
+        slopes=found.slopes,
     )
     return fit, found.rest

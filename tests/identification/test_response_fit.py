@@ -169,7 +169,19 @@ def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
     assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
     inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
     assert inertia == pytest.approx(total, rel=0.02)
-    assert all("not determined, the design's value kept" in one.reason for one in fit.fixed.values())
+    kept = {key: one.reason for key, one in fit.fixed.items() if key != "source_gain"}
+    assert all("not determined, the design's value kept" in reason for reason in kept.values())
+
+
+def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> None:
+    """A source 10 % stronger, with all inertias, stiffness and friction 10 % larger, is the same loop."""
+    result = _found(tmp_path, "L", 1e-7, 0, stated=False)
+    kept = result.fit.fixed["source_gain"]
+    shares = {key: -kept.moves[key] * kept.value / TRUTH[key] for key in TRUTH}
+    assert list(shares.values()) == pytest.approx([1.0] * 5 + [0.0], abs=0.01)
+    (item,) = (one for one in result.items if one.id == "kept-source_gain")
+    assert item.passed is None
+    assert "at motor.source_gain = 1 N m/V" in result.text
 
 
 def test_a_load_without_inertia_is_kept_without(tmp_path) -> None:
