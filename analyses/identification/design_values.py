@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2
 
+from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -170,7 +171,7 @@ def at_constant(fit: Fit) -> str:
 
 
 def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str = "") -> dict[str, Fixed]:
-    """The constant, kept at the design's, by its name; none where no value hangs on it.
+    """A constant (or load friction) kept at the design's, by its name; none where no value hangs on it.
 
     ``shares``: relative change of each value of the fit over that of the constant; ``told``: what a record
     says of it.
@@ -184,8 +185,8 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())
     if len(each) == 1 and sum(map(len, each.values())) == len(fit.names):
         words = f"{next(iter(each))} of every value"
-    scale = "" if name == "source_gain" else ", nor the scale of the current (rms read as DC: 0.82 times)"
-    value = float(getattr(design.motor, CONSTANTS[name]))
+    scale = ", nor the scale of the current (rms read as DC: 0.82 times)" * (name == "torque_constant")
+    value = parameter_value(design, parameter(name).key)
     reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
     moves = {n: -part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
     return {name: Fixed(value=value, reason=f"{reason}; {100.0 * STEP:+.2g} % of it is {words}", moves=moves)}

@@ -132,16 +132,18 @@ def identify_frequency(
 def _given(
     design: Design, record: Record, lines: Lines, held: Mapping[str, float], fit: TwoMass
 ) -> dict[str, Fixed]:
-    """The constant that makes torques, and what an error of it moves: found by a fit to larger torques."""
-    name = constant_of(design, record)
-    if name is None:
-        return {}
-    scale = np.ones(len(lines.names))
+    """What makes torques, and the load friction: what an error of each moves, found by another fit."""
+    name, scale, made = constant_of(design, record), np.ones(len(lines.names)), dict[str, Fixed]()
     scale[0] += STEP
     noise = lines.noise * np.outer(scale, scale)
     larger = replace(lines, means=lines.means * scale[:, None], noise=noise)
-    again = _fitted(larger, fit.reduction, held, fit.reaction)
-    return kept_constant(design, name, fit, np.array([again[n] / fit[n] - 1.0 for n in fit.names]) / STEP)
+    more = fit.reaction + STEP * (fit.reaction - 1.0 / fit.reduction)
+    for one, tried, reaction in ((name, larger, fit.reaction), ("load_coefficient", lines, more)):
+        if one is not None:
+            again = _fitted(tried, fit.reduction, held, reaction)
+            shares = np.array([again[n] / fit[n] - 1.0 for n in fit.names]) / STEP
+            made |= kept_constant(design, one, fit, shares)
+    return made
 
 
 def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:

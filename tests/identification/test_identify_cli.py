@@ -31,6 +31,22 @@ def test_a_campaign_as_json(campaign: Path, cli) -> None:
     assert len(result["suggestion"]["runs"]) == 2
 
 
+def test_a_campaign_that_takes_the_torque_constant_as_known_says_so(campaign: Path, cli) -> None:
+    """An error of kM that the campaign states is in the intervals; of none all three hang on the design's."""
+    said = [item["id"] for item in cli.data("identify", campaign, "--suggest", "0")["items"]]
+    known = campaign.with_name("known.toml")
+    told = campaign.read_text().replace("torque_constant = ", "torque_constant = 0.0 # ")
+    known.write_text(told)
+    (item,) = (
+        one
+        for one in cli.data("identify", known, "--suggest", "0")["items"]
+        if one["id"] == "kept-torque_constant"
+    )
+    assert item["passed"] is None
+    assert "+10 % of every value" in item["reason"]
+    assert "kept-torque_constant" not in said
+
+
 def test_a_campaign_on_paper_as_a_design_and_in_the_report(campaign: Path, tmp_path, cli) -> None:
     out = cli.text("identify", campaign, "--out", tmp_path, "--suggest", "0")
     assert "8 of 9 runs" in out
