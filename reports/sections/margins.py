@@ -1,14 +1,13 @@
 """Margins and bandwidths of every loop: the tables that a reader looks for first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
+from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins.run import Margins
@@ -18,9 +17,6 @@ from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
-
-if TYPE_CHECKING:
-    from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE: dict[str, doc.State] = {

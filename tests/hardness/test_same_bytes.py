@@ -91,12 +91,6 @@ def test_the_command_line_fixes_the_order_at_its_start_unless_told_otherwise() -
     told = settings_of_a_process("", OPENBLAS_NUM_THREADS="2")
     assert told["OPENBLAS_NUM_THREADS"] == "2"
     assert told["MKL_CBWR"] == same_order()["MKL_CBWR"]
-
-
-def test_a_process_that_adds_up_already_changes_nothing_for_those_that_it_starts() -> None:
-    """Their numbers would be others than its own."""
+    # one that adds up already changes nothing: those that it starts would have other numbers than its own
     assert set(settings_of_a_process("import numpy").values()) == {None}
-
-
-def test_the_tests_add_up_as_the_command_line_does() -> None:
     assert all(os.environ.get(name) for name in same_order())

@@ -19,25 +19,6 @@ from tests.identification.bench_records import columns_of, motion, record_of, wr
 AMBER = load_design("ilr33-amber")
 
 
-@pytest.mark.parametrize(
-    ("design", "motion"),
-    [
-        ("ilr33-amber", "--command step --amplitude 1 --duration 10"),
-        ("ballscrew", "--command chirp --amplitude 1 --duration 0.5"),
-        ("joint", "--command step --amplitude 1 --duration 0.5"),
-        ("emps", "--command step --amplitude 1 --duration 0.3"),
-    ],
-)
-def test_own_record(design: str, motion: str, tmp_path, cli) -> None:
-    path = tmp_path / "run.csv"
-    assert cli(*f"simulate {design} {motion} --csv {path} --quiet".split()).status == 0
-    data = cli("correlate", design, path, "--json").data
-    assert data["passed"] is True
-    for name, one in data["records"][0]["signals"].items():
-        assert one["relative_error"] < 1e-9, name
-    assert cli("correlate", design, path).out.startswith("PASS  ")
-
-
 def _noisy(clock: float = 1.0) -> Record:
     """A motion of 50 ms in a rest of 5 s, speed and angle in closed form, white noise on the speed."""
     t = np.arange(50_000) * 1e-4

@@ -190,10 +190,8 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     small = opens(AMBER, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     assert small.evaluate("document.documentElement.scrollWidth") <= 390
     before = small.read()
-    slider = small.locator('.row[data-path="control.position.gain"] input[type=range]')
-    slider.scroll_into_view_if_needed()
-    box = slider.bounding_box()
-    small.settled(lambda: small.touchscreen.tap(box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2))
+    place = small.spot('.row[data-path="control.position.gain"] input[type=range]', 0.8)
+    small.settled(lambda: small.touchscreen.tap(*place))
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
