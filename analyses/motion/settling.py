@@ -19,6 +19,7 @@ from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
 from nonlinear.settling.rest import Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
+NEAR = 0.02  # of the largest value: a run that ends within it has settled
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 
@@ -227,6 +228,12 @@ class Conduct:
     # load go on changing; or why the run stopped
     status: str
     detail: str = ""  # with figures; empty where there is nothing to say
+    later: str = ""  # that it ends so only after the run, and how far from there the run's end is
+
+    @property
+    def said(self) -> str:
+        """What there is to say beside the status."""
+        return "; ".join(filter(None, (self.later, self.detail)))
 
     @property
     def wanted(self) -> bool:
@@ -259,8 +266,11 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
         return Conduct("sits on a limit", ", ".join(limits))
-    left = faint_words(rest, factor, unit) if rest.amplitude else ""
-    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", left)
+    faint = faint_words(rest, factor, unit) if rest.amplitude else ""
+    left = abs(float(run.reference_rad[-1] - run.followed[-1]) - rest.error)
+    far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()
+    later = f"after the run, which ends {factor * left:.3g} {unit} short of that" if far else ""
+    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", faint, later)
 
 
 def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
@@ -279,7 +289,7 @@ def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
     out = {
         "design": run.design_name,
         "status": ended.status,
-        "status_detail": ended.detail,
+        "status_detail": ended.said,
         "rows": run.time_s.size,
         "period_s": run.period_s,
         f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),

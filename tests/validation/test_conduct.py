@@ -40,6 +40,7 @@ def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command,
     assert result.status == ends
     assert ("Hz" in result.detail) == (ends == "limit cycle")
     assert result.detail == "" or ends not in ("comes to rest", "following")
+    assert bool(result.later) == (duration_s == 0.02)  # 20 ms into a step that takes longer
     wanted = ends in ("comes to rest", "following")
     assert section(Motion(design, Asked(), run))["status"] == ("info" if wanted else "warn")
 
