@@ -1,17 +1,18 @@
 """From a campaign to coefficients: import, steady parts, surface, the question of a richer law."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.design_values import design_value
+from actuator_lti.types import Floats
+from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
-from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
+from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
 from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
@@ -115,6 +116,9 @@ def identify_campaign(
         words = f"{none} but those set aside ({lost})"
         kept = {name: replace(f, reason=f.reason.replace(none, words)) for name, f in fit.fixed.items()}
         fit = replace(fit, fixed=kept)
+    if not tools.torque_constant:  # else the intervals hold its error
+        given = kept_constant(design, "torque_constant", fit, _constant_shares(fit))
+        fit = replace(fit, fixed={**fit.fixed, **given})
     return CampaignResult(
         imported=imported,
         fit=fit,
@@ -124,6 +128,18 @@ def identify_campaign(
         torque_constant_Nm_A=constant,
         findings=findings,
     )
+
+
+def _constant_shares(fit: SurfaceFit) -> Floats:
+    """Relative change of each coefficient over that of the torque constant, beside those that are held."""
+    rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
+    torque = np.array([p.torque_Nm for p in fit.points]) / fit.residual_stds_Nm
+    told, held = list(fit.told), [k for k in range(len(NAMES)) if k not in fit.told]
+    both = np.column_stack([torque, torque - rows[:, held] @ fit.values[held]])
+    change, value = np.linalg.lstsq(rows[:, told], both, rcond=None)[0].T
+    shares = np.zeros(len(NAMES))
+    shares[told] = change / value
+    return shares
 
 
 def check_run(
@@ -161,7 +177,11 @@ def _values_of(design: Design) -> dict[str, float]:
 
 
 def campaign_items(
-    design: Design, result: CampaignResult, simulated: float | None, limit: float
+    design: Design,
+    result: CampaignResult,
+    simulated: float | None,
+    limit: float,
+    held: Collection[str] = (),
 ) -> tuple[Item, ...]:
     """The verdict on a campaign: runs, residual, size, and the written design simulated again."""
     fit, aside = result.fit, sorted(result.set_aside, key=lambda run: not run.contradicts)
@@ -177,6 +197,7 @@ def campaign_items(
         Item(id="runs", label=label, passed=False if aside and aside[0].contradicts else passed, reason=why),
         size_item(design, [one for one in compared if one], kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
+        *kept_items(fit, held),
     ]
     if simulated is not None:
         items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))

@@ -35,6 +35,21 @@ def test_a_campaign_as_json_and_the_example_of_one(campaign: Path, cli, tmp_path
     assert load_campaign(tmp_path / "c.toml").runs[0].load_Nm == 2.0
 
 
+def test_a_campaign_that_takes_the_torque_constant_as_known_says_so(campaign: Path, cli) -> None:
+    """An error of kM that the campaign states is in the intervals; of none all three hang on the design's."""
+    stated = campaign.with_name("stated.toml")
+    told = campaign.read_text().replace("torque_constant = 0", "torque_constant = 0.01")
+    stated.write_text(told)
+    known, open_ = (
+        {one["id"]: one for one in cli.data("identify", file, "--suggest", "0")["items"]}
+        for file in (stated, campaign)
+    )
+    item = open_["kept-torque_constant"]
+    assert item["passed"] is None
+    assert "+10 % of every value" in item["reason"]
+    assert "kept-torque_constant" not in known
+
+
 def test_a_campaign_on_paper_as_a_design_and_in_the_report(campaign: Path, tmp_path, cli) -> None:
     out = cli.text("identify", campaign, "--out", tmp_path, "--suggest", "0")
     assert "8 of 9 runs" in out

@@ -7,6 +7,7 @@ import pytest
 from scipy.linalg import expm
 
 from actuator_lti.design import model, parameter_value, write_design
+from actuator_lti.errors import InputError
 from analyses.identification.measured_response import ResponseResult, identify_response
 from reports.charts.chart import Curve
 from reports.charts.data import chart_of
@@ -40,9 +41,9 @@ def _design(off: dict[str, float]) -> model.Design:
     return COUPLED.with_values({key: value * off.get(key, 1.0) for key, value in TRUTH.items()})
 
 
-def open_loop(hertz: np.ndarray) -> np.ndarray:
+def open_loop(hertz: np.ndarray, values: dict[str, float] = TRUTH) -> np.ndarray:
     """P control of the motor angle, held over a tick and late by a part of it (Astrom, Wittenmark, 3.2)."""
-    J, Jl, k, c, C, d = TRUTH.values()
+    J, Jl, k, c, C, d = values.values()
     spring = np.array([k / N, c / N, -k, -c])  # of motor angle and speed, load angle and speed
     a = np.zeros((4, 4))
     a[0, 1] = a[2, 3] = 1.0
@@ -106,6 +107,49 @@ def test_intervals_hold_what_they_say(tmp_path) -> None:
     assert all(one.passed for one in results)
 
 
+STUDENT_2 = 4.302653
+"""97.5 % of Student's distribution of two degrees of freedom, of a table."""
+
+
+def test_few_degrees_of_freedom_widen_the_interval(tmp_path) -> None:
+    """Two inertias of two frequencies: slopes by differences of the exact loop, Student at 4 - 2."""
+    hertz, free = np.array([3.0, 40.0]), ("motor.rotor_inertia", "load.inertia")
+    file = _written(tmp_path, hertz, open_loop(hertz) * (1.0 + np.array([0.004 - 0.002j, 0.003j])))
+    held = {key: value for key, value in TRUTH.items() if key not in free}
+    fit = identify_response(_design({}), file, fixed=held).fit
+    seen = np.loadtxt(file, delimiter=",", skiprows=1)[:, 1:] @ [1.0, 1.0j]
+
+    def parts(off: dict[str, float]) -> np.ndarray:
+        values = {key: off.get(key, 1.0) * {**TRUTH, **{n: fit[n] for n in free}}[key] for key in TRUTH}
+        share = open_loop(hertz, values) / np.abs(seen) - seen / np.abs(seen)
+        return np.concatenate([share.real, share.imag])
+
+    rest = parts({})
+    slopes = np.column_stack([(parts({k: 1.0 + 1e-5}) - parts({k: 1.0 - 1e-5})) / 2e-5 for k in free])
+    shares = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)) * (rest @ rest) / 2.0)
+    for key, share in zip(free, shares, strict=True):
+        low, high = fit.interval(key)
+        assert 0.5 * (high - low) == pytest.approx(STUDENT_2 * share * fit[key], rel=1e-3)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_no_more_numbers_than_unknowns_are_refused(count: int, tmp_path) -> None:
+    hertz = HERTZ[10 : 10 + count]
+    with pytest.raises(InputError, match="allowed: 4 frequencies or more"):
+        identify_response(_design({}), _written(tmp_path, hertz, open_loop(hertz)))
+
+
+def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> None:
+    """A source 10 % stronger, with all inertias, stiffness and friction 10 % larger, is the same loop."""
+    result = _found(tmp_path, "L", 1e-7, 0, stated=False)
+    kept = result.fit.fixed["source_gain"]
+    shares = {key: -kept.moves[key] * kept.value / TRUTH[key] for key in TRUTH}
+    assert list(shares.values()) == pytest.approx([1.0] * 5 + [0.0], abs=0.01)
+    (item,) = (one for one in result.items if one.id == "kept-source_gain")
+    assert item.passed is None
+    assert "at motor.source_gain = 1 N m/V" in result.text
+
+
 @pytest.mark.parametrize(
     ("J", "Jl"), [(2e-5, 0.04), (5e-5, 0.0)], ids=["on one shaft", "the rotor has it all"]
 )
@@ -119,7 +163,8 @@ def test_what_a_rigid_drive_s_response_does_not_determine_is_kept_and_said(J, Jl
     inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
     assert inertia == pytest.approx(2e-5 + 0.04 / N**2, rel=0.02)
     said = "not determined, the design's value kept"
-    assert all(said in one.reason for one in fit.fixed.values()) == (Jl > 0.0)
+    kept = {key: one.reason for key, one in fit.fixed.items() if key != "source_gain"}
+    assert all(said in reason for reason in kept.values()) == (Jl > 0.0)
     assert Jl > 0.0 or fit.fixed["load.inertia"].value == 0.0
 
 

@@ -123,6 +123,23 @@ def test_a_two_mass_model_of_something_else_is_refused() -> None:
     assert not result.passed
 
 
+def test_what_the_design_alone_tells_is_said_with_what_it_moves() -> None:
+    """The records have no load friction: a design that has some gives the same resonance, and another k.
+
+    With r = 1/N + CM in the place of 1/N the same lines are those of k, c, J_l and Cv_l over N r.
+    """
+    plain = identify_frequency(_design(), _record(5))
+    assert "+10 % of every value" in plain.fit.fixed["torque_constant"].reason
+    assert "load_coefficient" not in plain.fit.fixed
+    design = replace(_design(), friction=replace(_design().friction, load_coefficient=0.005))
+    result = identify_frequency(design, _record(5))
+    (item,) = (one for one in result.items if one.id == "kept-load_coefficient")
+    assert item.passed is None
+    assert "of load_inertia, stiffness, damping, load_viscous" in item.reason
+    assert result.fit["stiffness"] * (1.0 + 0.005 * N) == pytest.approx(plain.fit["stiffness"], rel=1e-4)
+    assert result.fit.resonance_rad_s == pytest.approx(plain.fit.resonance_rad_s, rel=1e-4)
+
+
 def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
     record = _record(5)
     result = identify_frequency(_design(), record, fixed={"coupling.damping": 0.02})

@@ -28,19 +28,13 @@ def phase_gaps(design: Design, omega: np.ndarray) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize(
-    "encoder",
-    [
-        Encoder(),
-        Encoder(speed="difference", difference_samples=3),
-        Encoder(speed="difference", filter_time_s=5e-4),
-    ],
-)
-def test_delays_are_placed_right(encoder: Encoder) -> None:
+@pytest.mark.parametrize("difference", [{}, {"difference_samples": 3}, {"filter_time_s": 5e-4}])
+def test_delays_are_placed_right(difference: dict[str, Any]) -> None:
     """With P controllers the phases of sampled and continuous differ only to second order in Ts.
 
     A hold counted twice, or missing, would leave a first-order difference: halving, not quartering.
     """
+    encoder = Encoder(speed="difference", **difference) if difference else Encoder()
     proportional = {stage: {"integral_time_s": None} for stage in ("velocity", "current")}
     design = controlled(amber(2, 10, delay_s=1.5e-4, encoder=encoder), **proportional)
     omega, gaps = np.array([30.0, 100.0]), []

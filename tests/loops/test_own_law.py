@@ -145,16 +145,11 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
             if k % every:
                 continue
             place = counted if control_.position.sensor == "motor" else N * out
+            amperes = drive.value("current_reference")
             reference, own, top, step, ours = {
                 "position": (N * command, place, 30.0, 4e4 * T, drive.value("speed_command")),
-                "velocity": (
-                    drive.value("speed_reference"),
-                    speed,
-                    2.0,
-                    4e3 * T,
-                    drive.value("current_reference"),
-                ),
-                "current": (drive.value("current_reference"), i, 24.0, inf, u),
+                "velocity": (drive.value("speed_reference"), speed, 2.0, 4e3 * T, amperes),
+                "current": (amperes, i, 24.0, inf, u),
             }[stage]
             seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
             v = law.output(seen | {"command": reference, "error": reference - own})

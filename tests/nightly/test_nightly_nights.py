@@ -121,11 +121,16 @@ def test_a_regression_counts_until_it_is_approved_by_itself_however_slow_the_dri
     assert {d.name: d.state for d in night.designs} == {"one": "pass", "two": "regression"}
 
 
-def test_an_approval_needs_a_name_a_reason_and_a_result(nights) -> None:
+def test_an_approval_needs_a_name_a_reason_and_a_result_and_a_site_its_own_folder(nights, tmp_path) -> None:
     refused(nights.approve, job("a"), words="no night has been built")
     nights(job("a"), job("b", mode="raise"))
     refused(nights.approve, job("a"), reason=" ", words="needs a name and a reason")
     refused(nights.approve, job("a"), names=["b"], words="'b' has no result")
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "thesis.tex").write_text("x")
+    refused(run_night, study(job("a")), other, INLINE, code=CODE, words="not empty and no site")
+    assert sorted(p.name for p in other.iterdir()) == ["thesis.tex"]
 
 
 def test_missing_results_are_no_changes(nights) -> None:
@@ -183,12 +188,6 @@ def test_old_reports_go_and_old_figures_stay(nights) -> None:
     page = next((nights.site / "nights").glob("000008-*/a-*.html")).read_text()
     assert page.count('aria-label="Report of') == 3
     assert "between 10.00 and 17.00 over 8 nights" in page
-
-
-def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
-    (tmp_path / "thesis.tex").write_text("x")
-    refused(run_night, study(job("a")), tmp_path, INLINE, code=CODE, words="not empty and no site")
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["thesis.tex"]
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,6 @@
 """The parts of the nightly: texts, cache, tolerances, figures of a report, lock."""
 
 import subprocess
-from functools import partial
 
 import numpy as np
 import pytest
@@ -63,14 +62,10 @@ def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     assert cache.read("cd34") is None
 
 
-def flipped(data: bytes, where: int) -> bytes:
-    return data[:where] + bytes([data[where] ^ 1]) + data[where:][1:]
-
-
 @pytest.mark.parametrize(
     "damage",
     [
-        *(partial(flipped, where=where) for where in (0, 10, 60, 120, -1)),
+        *(lambda data, k=k: data[:k] + bytes([data[k] ^ 1]) + data[k:][1:] for k in (0, 10, 60, 120, -1)),
         *(lambda data, size=size: data[:size] for size in (0, 1, 50, 200, -1)),
         lambda _: sealed("ab34", {}, {"report.html": b"x"}),
     ],

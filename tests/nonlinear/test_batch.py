@@ -16,7 +16,7 @@ from nonlinear.runs.reduced import whole_periods
 AMBER = load_design("ilr33-amber")
 
 
-def mixed_runs() -> list[Run]:
+def test_bits_of_single_runs_for_any_number_of_threads() -> None:
     designs = [load_design(n) for n in ("ilr33-amber", "emps", "ilr33-amber-multirate")]
     table = commands.sampled([0.0, 0.1, 0.2], [0.0, 0.01, -0.01])
     runs, kept = [], Reducers(extremes=True)
@@ -24,11 +24,6 @@ def mixed_runs() -> list[Run]:
         command = commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table
         how = {"duration_s": 0.2 + 0.01 * k, "load_Nm": loads.proportional(3.0 * k, 1.0), "reducers": kept}
         runs.append(Run(design=designs[k % 3], command=command, **how))
-    return runs
-
-
-def test_bits_of_single_runs_for_any_number_of_threads() -> None:
-    runs = mixed_runs()
     batches = [simulate_many(runs, threads=n) for n in (1, 2, 5)]
     for batch in batches[1:]:
         assert np.array_equal(batch.outs, batches[0].outs)

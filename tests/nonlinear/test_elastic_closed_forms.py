@@ -103,41 +103,6 @@ def test_damped_contact_parts_at_no_torque() -> None:
     assert run.states[90, 1] / N - run.states[90, 2] == pytest.approx(rate, rel=1e-11)
 
 
-def quarter(x: float, bends: list[tuple[float, float, float]]) -> list[tuple[float, ...]]:
-    """Free swing of the reduced inertia from rest at a twist to zero, by piece: (t, w, centre, size, phase).
-
-    On a piece T = T0 + k (x - x0) the twist is centre + amplitude cos(w (t - t0) + phase).
-    """
-    t, v, made = 0.0, 0.0, []
-    for x0, T0, k in reversed([piece for piece in bends if piece[0] < x]):
-        w, centre = np.sqrt(k / REDUCED), x0 - T0 / k
-        amplitude, phase = np.hypot(x - centre, v / w), np.arctan2(-v / w, x - centre)
-        made.append((t, w, centre, amplitude, phase))
-        ends = np.arccos((x0 - centre) / amplitude)
-        t, v, x = t + (ends - phase) / w, -amplitude * w * np.sin(ends), x0
-    return [*made, (t, 0.0, 0.0, 0.0, 0.0)]
-
-
-def test_free_swing_on_a_spring_of_three_pieces() -> None:
-    """K1 to T1, K2 to T2, K3 beyond, as data sheets of strain wave gears have it."""
-    T1, K2, T2, K3 = 3.0, 500.0, 8.0, 900.0
-    bends = {"torque_1_Nm": T1, "stiffness_2_Nm_rad": K2, "torque_2_Nm": T2, "stiffness_3_Nm_rad": K3}
-    design = two_mass(1e-3, source=True, coupling=TIGHT | bends)
-    start = 0.06
-    run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, start * N, 0.0))
-    x1, x2 = T1 / K, T1 / K + (T2 - T1) / K2
-    pieces = quarter(start, [(0.0, 0.0, K), (x1, T1, K2), (x2, T2, K3)])
-    assert len(pieces) == 4
-    period, wanted = 4.0 * pieces[-1][0], []
-    for t in np.arange(201) * 1e-3:
-        turn = np.mod(t, period) / period
-        near = min(turn, 1.0 - turn)  # even about every extreme, odd about every zero
-        sign, near = (1.0, near) if near <= 0.25 else (-1.0, 0.5 - near)
-        t0, w, centre, amplitude, phase = next(p for p in reversed(pieces[:-1]) if near * period >= p[0])
-        wanted.append(sign * (centre + amplitude * np.cos(w * (near * period - t0) + phase)))
-    np.testing.assert_allclose(twist_of(run), wanted, atol=1e-13)
-
-
 SPENT = [getattr(layout, f"ENERGY_{name}") for name in (
     "COPPER", "DRY", "VISCOUS", "DAMPING", "PARTING", "LOAD_DRY", "LOAD_VISCOUS",
     "OFFSET", "LOAD", "CONVERSION", "LOAD_OFFSET")]  # fmt: skip

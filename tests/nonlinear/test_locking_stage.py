@@ -75,12 +75,6 @@ def _integrator(position: PositionLoop | None) -> Design:
     )  # fmt: skip
 
 
-def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
-    """Speed at the ticks under voltages held over them: the sum of what each tick adds."""
-    step = design.effective_motor.source_gain_Nm_V * TICK / design.inertia_kgm2
-    return np.concatenate([[0.0], step * np.cumsum(voltage_V)[:-1]])
-
-
 def test_the_bus_limits_the_voltage_at_each_tick_and_a_constant_one_changes_nothing() -> None:
     design = _integrator(None)
     wanted = 9.0 * np.sin(6.0 * TIME)
@@ -88,7 +82,9 @@ def test_the_bus_limits_the_voltage_at_each_tick_and_a_constant_one_changes_noth
     applied = np.clip(wanted, -BUS, BUS)
     assert np.any(applied != wanted)
     np.testing.assert_allclose(run.voltage_V, applied, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(run.motor_speed_rad_s, _sampled_motion(design, applied), atol=1e-9)
+    step = design.effective_motor.source_gain_Nm_V * TICK / design.inertia_kgm2  # of a volt over a tick
+    speed = np.concatenate([[0.0], step * np.cumsum(applied)[:-1]])
+    np.testing.assert_allclose(run.motor_speed_rad_s, speed, atol=1e-9)
     assert run.limits["voltage"].fraction == pytest.approx(np.mean(applied != wanted))
     command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
     plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)

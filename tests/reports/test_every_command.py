@@ -74,6 +74,7 @@ def test_json_of_commands_that_write(tmp_path, cli) -> None:
         (["duty", "joint"], True),
         (["cycles", "ballscrew"], True),
         (["compare", "ilr33-amber", "--no-validate", "--set", "control.position.gain=1560 1/s"], False),
+        (["simulate", "--set", "control.position.gain=9000 1/s", "--no-limits", "--duration", "0.03"], False),
         (["tune", "--no-curve", "--require", "position.bandwidth>=2000 Hz"], False),
     ],
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else str(value),

@@ -27,6 +27,8 @@ WATCHED = """window.IntersectionObserver = class {
 EARLY = """window.watched = () => new MutationObserver(() => seen(true)).observe(
     document.getElementById("hands-on"), { attributes: true, attributeFilter: ["data-count"] });"""
 SLOW = "const now = performance.now.bind(performance); performance.now = () => 1000 * now();"
+PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
+    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
 
 
 @pytest.fixture
@@ -188,10 +190,6 @@ def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     page.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
 
 
-PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
-    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
-
-
 @pytest.mark.parametrize("between", ["", PAGE_UP])
 def test_a_curve_that_is_held_moves_from_where_it_was_taken(page: Page, between: str) -> None:
     """Whatever else moved it meanwhile: there and back is where it was."""
@@ -229,3 +227,18 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
     assert "…" in words
     page.done()
     assert "…" not in page.inner_text("table.variants")
+
+
+def test_what_waits_is_not_started_once_a_value_moves(page: Page) -> None:
+    """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
+    page.evaluate(SLOW)
+    page.type_value(GAIN, 101.0)  # by this clock its run took long: the next is late
+    at_once(
+        page,
+        f"""const wait = (ms) => new Promise((go) => setTimeout(go, ms));
+        type("{GAIN}", "102");
+        await wait(30); // listed, not started
+        for (const end = Date.now() + 300; Date.now() < end;); // due by now
+        type("{GAIN}", "103");
+        while (root.dataset.behind !== "done") await wait(10);""",
+    )

@@ -62,18 +62,6 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
             assert figures.quantity(quantity, loop)[k] == pytest.approx(getattr(truth, name), rel=1e-6)
 
 
-def of_response(system) -> dict[str, float | None]:
-    width, step = closed_loop_bandwidth(system), step_figures(system)
-    return {
-        "bandwidth": width.minus3db_hz,
-        "bandwidth_90deg": width.minus90deg_hz,
-        "resonance_peak": width.resonance_peak_db,
-        "overshoot": step.overshoot_percent,
-        "rise_time": step.rise_time_s,
-        "settling_time": step.settling_time_s,
-    }
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     population = scattered(name, 5, seed=8)
@@ -81,13 +69,22 @@ def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     for k, loop, own in each(population, figures):
         if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
             continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
-        for quantity, truth in of_response(own.closed_loop).items():
+        width, step = closed_loop_bandwidth(own.closed_loop), step_figures(own.closed_loop)
+        truths = {
+            "bandwidth": width.minus3db_hz,
+            "bandwidth_90deg": width.minus90deg_hz,
+            "resonance_peak": width.resonance_peak_db,
+            "overshoot": step.overshoot_percent,
+            "rise_time": step.rise_time_s,
+            "settling_time": step.settling_time_s,
+        }
+        for quantity, truth in truths.items():
             mine = figures.quantity(quantity, loop)[k]
             expected = np.nan if truth is None else truth
             assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)
 
 
-def test_an_unstable_loop_is_called_so_and_the_angle_under_an_elastic_load_is_none():
+def test_an_unstable_loop_is_called_so_and_what_cannot_vary_refused():
     """With a hinge moment that follows the angle, the velocity loop keeps an eigenvalue at 1."""
     changes = {"load.path": "back-drivable", "load.moment_slope": "-20 N*m/rad"}
     design = with_overrides(load_design("ilr33-amber"), changes)
@@ -107,6 +104,9 @@ def test_an_unstable_loop_is_called_so_and_the_angle_under_an_elastic_load_is_no
     assert figures.quantity("delay_margin", "current")[1] == 0.0
     assert figures.quantity("gain_margin", "current")[1] < 0.0
     assert np.isnan(figures.quantity("bandwidth", "current")[1])
+    design = load_design("ilr33-amber")
+    refused(Population, design, {"motor.color": np.ones(2)}, 2, words="motor.color")
+    refused(Population, design, {"motor.resistance": np.array([np.nan])}, 1, words="finite")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant", "ballscrew"])
@@ -139,12 +139,6 @@ def test_rest_and_describing_function_change_the_slope_as_the_loops_do(point, ex
     mine = linear_figures(Population(design, {}, 1), **at).quantity("phase_margin", "velocity")[0]
     truth = stability_margins(assemble_loops(design, **at).velocity.open_loop)
     assert mine == pytest.approx(truth.phase_margin_deg, rel=1e-6)
-
-
-def test_what_cannot_vary_is_refused():
-    design = load_design("ilr33-amber")
-    refused(Population, design, {"motor.color": np.ones(2)}, 2, words="motor.color")
-    refused(Population, design, {"motor.resistance": np.array([np.nan])}, 1, words="finite")
 
 
 @pytest.mark.parametrize("above", [1e-2, 1.0, 1e3, 1e5])

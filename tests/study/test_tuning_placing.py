@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
 from analyses.tuning.start import allowed_range, place, step_of_gain
+from tests.changed import changed
 
 
 def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
@@ -35,12 +36,8 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
 
 
 RESONANT = 0.5e-4 * (2 * np.pi * 700.0) ** 2  # 700 Hz, where the delay turns by more than 90 deg
+DIRECT = changed(servo(), controller={"velocity": None, "position": PositionLoop(gain=1.0)})
 WIDE = (need("gain_margin", 6.0, unit="dB"), need("phase_margin", 30.0), need("bandwidth", 60.0, unit="Hz"))
-
-
-def direct():
-    control = replace(servo().controller, velocity=None, position=PositionLoop(gain=1.0))
-    return replace(servo(), controller=control)
 
 
 def seen(design):
@@ -150,7 +147,7 @@ def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
 @pytest.mark.parametrize(("words", "design", "message"), [
     (("filter",), servo(), "notch, lowpass, feedforward"),
     (("feedforward",), servo(), "no control.position"),
-    (("notch",), direct(), "no control.velocity"),
+    (("notch",), DIRECT, "no control.velocity"),
 ])  # fmt: skip
 def test_what_has_no_place_is_refused(words, design, message):
     asked = replace(design, requirements=(need("gain_margin", 6.0, loop="every", unit="dB"),))
