@@ -36,7 +36,7 @@ from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.stated import Frame
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import ampere_unit, parse_limit, si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -336,7 +336,7 @@ class Reader:
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")
         try:
-            return UNREAD if known is None else parse_limit(raw, known.unit_for(self.structure.axis))
+            return UNREAD if known is None else self.frame.limit(raw, known.unit_for(self.structure.axis))
         except (InputError, ValueError) as error:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 

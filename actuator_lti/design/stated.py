@@ -7,8 +7,9 @@ from math import isinf, pi, sqrt
 from typing import Any
 
 from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.plant import MotorConstants
-from actuator_lti.design.units import AdvisedError, ampere_unit, parse_quantity
+from actuator_lti.design.units import AdvisedError, ampere_unit, parse_limit, parse_quantity
 from actuator_lti.errors import InputError
 
 CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|p|phase)\b\)?", re.IGNORECASE)
@@ -73,6 +74,10 @@ class Frame:
                 return turned * factor / (sqrt(3.0) if line else 1.0)
         refused = [one for one in refused if isinstance(one, AdvisedError)] or refused
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]
+
+    def limit(self, text: Any, unit: str) -> float:
+        """A limit of a requirement, in the unit in which its quantity is reported; amperes as of [limits]."""
+        return self.quantity(text, FIELDS["limits.peak_current"]) if unit == "A" else parse_limit(text, unit)
 
     def _said(self, text: Any, field: Field, unit: str, value: float) -> float:
         """The value, unless an AC motor has several amperes that the text may mean."""

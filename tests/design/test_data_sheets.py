@@ -214,6 +214,30 @@ def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: st
     assert parameter_value(again, path) == 30.5
 
 
+@pytest.mark.parametrize(
+    ("text", "amperes"),
+    [
+        ("2.74 Arms", 2.74 * sqrt(1.5)),
+        ("9.5 A pk", 9.5 * sqrt(3) / 2),
+        ("6.72 A rms", 6.72 * sqrt(1.5)),
+        ("5.4 A dc", 5.4),
+        ("8.2 A", None),
+    ],
+)
+@pytest.mark.parametrize("quantity", ["motor_current", "duty_current"])
+def test_a_required_current_is_read_as_limits_read_theirs(
+    text: str, amperes: float | None, quantity: str
+) -> None:
+    asked = f'[[requirement]]\nid = "i"\nquantity = "{quantity}"\nmaximum = "{text}"\n'
+    if amperes is None:
+        with pytest.raises(InputError, match=r"requirement\.i\.maximum = .*A rms .* or A dc "):
+            read_design_text(SERVO + asked)
+        return
+    design = read_design_text(SERVO + asked)
+    assert design.requirements[0].maximum == pytest.approx(amperes, rel=1e-14)
+    assert read_design_text(write_design(design)) == design
+
+
 def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -> None:
     items = {item.path: item for item in explained(read_design_text(SERVO, "servo"))}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"

@@ -254,3 +254,33 @@ def test_a_gear_that_speeds_up_is_suspicious(ratio: str, told_of: bool) -> None:
     warnings = warnings_of(read_design_text(DRIVE.replace("ratio = 19.2", f"ratio = {ratio}")))
     assert any("faster than the motor" in line for line in warnings) is told_of
     assert (ratio != '"1/86"') or any('written "86:1"' in line for line in warnings)
+
+
+GEAR = '[[gear]]\nname = "R22"\nratio = 19.2\n'
+SAFE = {"": True, '[load]\npath = "back-drivable"\n': False, "[friction]\nload_coefficient = 1\n": False}
+
+
+@pytest.mark.parametrize(("more", "warned"), SAFE.items())
+@pytest.mark.parametrize("gear", ["", GEAR])
+def test_a_load_that_nothing_feels_is_warned_of(more: str, warned: bool, gear: str) -> None:
+    """Where friction takes less than 1/N of it no drive locks itself."""
+    lines = warnings_of(read_design_text(DRIVE.replace(GEAR, gear + more)))
+    assert any('load.path = "back-drivable"?' in line for line in lines) is warned
+    assert any("load.path: self-locking is assumed" in line for line in lines) is (warned and not gear)
+
+
+def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
+    file = tmp_path / "direct.toml"
+    file.write_text(
+        DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n', encoding="utf-8"
+    )
+    data = cli.data("keys", "--explain", f"{file}")
+    rows = {one["path"]: (one["written"], one["read"]) for one in data["keys"]}
+    assert rows["load.path"] == ("not written", "self-locking, assumed")
+    assert rows["control.current.gain"][0] == "from 9 Hz"
+    said = [one["text"] for one in data["warnings"]]
+    assert any("turns the output faster than the motor" in line for line in said)
+    assert [f"warning: first: {line}" for line in said] == cli("margins", f"{file}").err.splitlines()
+    assert "load.path" not in [one["path"] for one in cli.data("keys", "--explain", "joint")["keys"]]
+    ran = cli("simulate", f"{file}", "--set", "load.inertia=30 gcm2", "--json", "--duration", "0.01")
+    assert any(said[-1] in line for line in ran.err.splitlines())
