@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_lti.design import Design, read_design_text
+from actuator_lti.design import Design, load_design, read_design_text, write_design
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.errors import InputError, Mistakes
 
@@ -165,6 +165,50 @@ def test_a_warm_torque_constant_is_told_from_a_convention(
     text = told(motor(constants, torque_constant=kM, back_emf_constant=kE))
     assert words in text
     assert ("the ratio is that" in text) is ("motor.constants" in words)
+
+
+@pytest.mark.parametrize(("warm", "words"), [(0.75, ""), (0.85, "here 0.85"), (2**-0.5, "")])
+def test_a_cause_is_told_only_where_its_ratio_is_near(warm: float, words: str) -> None:
+    """A kE of peak volts is sqrt(2) too large; magnets warm to 0.8 to 0.95."""
+    text = told(motor("dc", torque_constant=f"{0.1 * warm} Nm/A", back_emf_constant="0.1 V*s/rad"))
+    assert ("sheets give kM warm" in text) is bool(words)
+    assert words in text
+    assert ("the ratio is sqrt(2), rms against peak" in text) is (warm == 2**-0.5)
+
+
+def test_constants_that_disagree_are_told_by_the_convention_that_relates_them() -> None:
+    """Of peak amperes and volts of a phase kE is kM over 3/2."""
+    text = told(motor("peak-phase", torque_constant="0.75 Nm/A", back_emf_constant="0.75 V*s/rad"))
+    assert 'with motor.constants = "peak-phase" kE is kM over 3/2 in SI' in text
+    assert "in SI the two are one" not in text
+    stepper = told(motor("dc", torque_constant="1 Nm/A", back_emf_constant="1 V*s/rad/phase"))
+    assert 'with "dc" of a stepper those of a phase' in stepper
+
+
+@pytest.mark.parametrize("key", ["magnet_pitch", "pole_pitch"])
+def test_a_linear_motor_is_asked_for_the_period_of_its_cogging(key: str) -> None:
+    """2 pi/24 mm."""
+    linear = load_design("emps").with_values
+    given = {"motor.cogging": "10 N", "limits.speed": "0.1 m/s"}
+    with pytest.raises(InputError, match=r"cogging_periods: missing; motor.cogging needs it.*24 mm"):
+        linear(given)
+    periods = linear(given | {"motor.cogging_periods": "24 mm"}).motor.cogging_periods
+    assert periods == pytest.approx(2 * np.pi / 0.024, rel=1e-14)
+    with pytest.raises(InputError, match=r'takes "24 mm" too: 261.799 rad/m'):
+        linear({f"motor.{key}": "24 mm"})
+    one = linear(given | {"motor.cogging_periods": "1 rad/m"})
+    assert read_design_text(write_design(one), one.origin) == one
+
+
+@pytest.mark.parametrize(("peak", "shown"), [("2.034 A", "2.034 A, but the supply gives only 2.0339 A"),
+    ("3 A", "3 A, but the supply gives only 2.03 A"), ("2.03 A", "")])  # fmt: skip
+def test_amperes_that_differ_are_told_with_digits_that_do(peak: str, shown: str) -> None:
+    """12 V/5.9 ohm are 2.033898 A."""
+    current = '[control.current]\ngain = "9 V/A"\n'
+    lines = warnings_of(
+        read_design_text(DRIVE.replace("[control]", f'peak_current = "{peak}"\n[control]') + current)
+    )
+    assert any(f"limits.peak_current: {shown} at stall" in line for line in lines) is bool(shown)
 
 
 @pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])

@@ -162,6 +162,7 @@ def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
 @pytest.mark.parametrize(("words", "message"), [
     ("bandwidth>30", "allowed"), ("tail.bandwidth>=3 Hz", "current, velocity, position"),
     ("position.colour>=3 Hz", "bandwidth"), ("position.bandwidth>=3 kg", "kg"),
+    ("position.bandwith>=3 Hz", 'nearest known: "bandwidth"'), ("every.phase_margin>=40", "like deg$"),
 ])  # fmt: skip
 def test_wishes_that_make_no_sense_are_refused(words, message):
     with pytest.raises(InputError, match=message):
@@ -169,7 +170,7 @@ def test_wishes_that_make_no_sense_are_refused(words, message):
 
 
 def test_a_design_without_requirements_on_loops_is_refused():
-    with pytest.raises(InputError, match="no requirement"):
+    with pytest.raises(InputError, match=r"no requirement.*--require"):
         tune(integrator())
 
 
