@@ -3,20 +3,15 @@
 The compiled code is measured.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.model import Design
+from analyses.linear.code_check import CodeCheck
 from reports.cli.options import folder_for_results, refuse_existing
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.linear.code_check import CodeCheck
-    from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
+from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 
 
 @dataclass(frozen=True)

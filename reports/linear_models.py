@@ -5,23 +5,19 @@ The sampled form is exact; the continuous one carries its delays apart
 written is one tree of names, units, matrices and margins.
 """
 
-from __future__ import annotations
-
 import io
 import json
 from dataclasses import asdict
 from math import isfinite
 from pprint import pformat
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.loops import Form, Loop, Loops
+from actuator_lti.loops import Form, Loop, Loops
 
 SCHEMA = "actuator-lti/linear"
 SUFFIXES = {"json": ".json", "mat": ".mat", "python": ".py"}

@@ -157,12 +157,13 @@ def _side_by_side(side: SideBySide) -> Table:
     """Lay tables of the same rows out as one: a line a figure, a column a row of the blocks."""
     made = _empty(side.title)
     made.add_column("")
-    rows = (str(row[block["columns"][0]["key"]]) for block in side.blocks for row in block["rows"])
-    for name in dict.fromkeys(rows):
+    named = [{str(row[block["columns"][0]["key"]]): row for row in block["rows"]} for block in side.blocks]
+    names = list(dict.fromkeys(name for rows in named for name in rows))
+    for name in names:
         made.add_column(Text(name), justify="right")
-    for block in side.blocks:
+    for block, rows in zip(side.blocks, named, strict=True):
         for column in block["columns"][1:]:
-            own = [row.get(column["key"]) for row in block["rows"]]
+            own = (rows[name].get(column["key"]) if name in rows else "" for name in names)
             made.add_row(Text(_label(column)), *(_cell(value, column["format"]) for value in own))
     return made
 

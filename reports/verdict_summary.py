@@ -14,6 +14,7 @@ WORDS = {
     "checks": "checks by simulation",
     "odds": "requirements under tolerances",
 }
+ROLES: tuple[Role, ...] = ("fail", "warn", "pass", "info")
 SEVERITIES = ("fail", "warn", "info")
 _SECTIONS: tuple[tuple[str, str, Role], ...] = (
     ("failed_sections", "failed", "fail"),
@@ -123,7 +124,7 @@ def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
 
 
 def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
-    """Say a document's verdict in words, each with its colour: failed sections, then each kind of verdict.
+    """Say a document's verdict in words, each with its colour: what decides it first.
 
     Examples
     --------
@@ -139,4 +140,4 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
         count = Tally(**counts)
         words = count.words(WORDS.get(what, what))
         lines.append((words if count.total else f"the design states {words}", count.role))
-    return lines
+    return sorted(lines, key=lambda line: ROLES.index(line[1]))

@@ -134,8 +134,14 @@ def _loads(design: Design) -> Iterator[str]:
     asked = [("validation.loads", load) for load in design.validation.loads_Nm]
     asked += [(f"requirement.{item.id}.load", item.load_Nm or 0.0) for item in design.requirements]
     for key, load in asked:
-        if abs(load) > largest:
-            yield f"{key}: {load:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+        yield from beyond_largest(design, key, load)
+
+
+def beyond_largest(design: Design, key: str, load_Nm: float) -> Iterator[str]:
+    """What is said of a load that is asked for and lies above the largest one of the design."""
+    largest, unit = design.load.moment_max_Nm, "N" if design.axis == "linear" else "N*m"
+    if abs(load_Nm) > largest:
+        yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:

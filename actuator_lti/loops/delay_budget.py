@@ -10,26 +10,20 @@ phase of the exact sampled loop:
     + sampling effects (digital PI against PI(s), aliasing, exact hold) -> sampled form
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.blocks import centre_rad_s
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, OperatingPoint, RotorState
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.continuous import open_loop
 from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.sampled import loop
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Filter
-    from actuator_lti.drive.operating import OperatingPoint
 
 _GRID = 1000
 _LOW = 1e-4  # of the frequency asked for: where unwrapping starts
@@ -51,6 +45,7 @@ class DelayBudget:
     sampling_deg: float  # the rest up to the exact sampled loop: digital instead of continuous PI, aliasing
     total_deg: float  # phase of the sampled loop, the sum of the items
     one_more_sample_deg: float  # what one more base period of computing delay would add (not in the total)
+    rotor: RotorState = "free"  # of a current loop
     # Each filter in or inside the loop, in the order of the signal, by kind and frequency
     filters_deg: Mapping[str, float] = field(default_factory=dict)
 
@@ -74,6 +69,9 @@ def delay_budget(
     frequency_rad_s: float,
     operating_point: OperatingPoint = "sliding",
     load_Nm: float = 0.0,
+    *,
+    rotor: RotorState = "free",
+    torques_held: bool = False,
 ) -> DelayBudget:
     """Degrees spent by each part of a loop at a frequency, usually its crossover.
 
@@ -83,13 +81,17 @@ def delay_budget(
         The loop broken at its own error, inner loops closed.
     frequency_rad_s : float
         Positive, below the Nyquist frequency of this loop.
+    rotor, torques_held
+        As in `Operating`: how a loop is held that is unstable by itself.
 
     Raises
     ------
     InputError
         For a loop that the design does not have, or a frequency out of range.
     """
-    wired = wire(design, Operating(point=operating_point, load_Nm=load_Nm))
+    wired = wire(
+        design, Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor, torques_held=torques_held)
+    )
     if loop_name not in wired.stages:
         raise InputError(f"loop {loop_name!r}: one of {', '.join(wired.stages)}")
     if design.controller.own_law is not None:
@@ -116,6 +118,7 @@ def delay_budget(
     }
     return DelayBudget(
         loop=loop_name,
+        rotor=rotor,
         frequency_rad_s=frequency_rad_s,
         total_deg=sum(items.values()) + sum(steps.values()),
         one_more_sample_deg=_from_low(later / sampled),

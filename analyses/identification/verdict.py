@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -83,6 +83,14 @@ def residual_item(residual: float, limit: float) -> Item:
     """The relative residual of the fit."""
     why = "the model does not explain these records"
     return share_item("residual", "Relative residual of the fit", residual, limit, why)
+
+
+def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
+    """What the records neither confirm nor deny: the design's values, but for those held as asked."""
+    for name, kept in fit.fixed.items():
+        if kept.value and name not in held:
+            label = parameter(name, axis).label
+            yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
 
 
 def sampling_items(record: Record) -> Iterator[Item]:

@@ -220,12 +220,14 @@ def operating_points(
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:
     """Give the delay budget at the lowest gain crossover of each loop."""
     budgets: dict[str, DelayBudget] = {}
-    for name, result in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
-        crossovers = [m.frequency_rad_s for m in result.margins.phase_margins if m.frequency_rad_s > 0.0]
+    for name, one in figures.items() if design.controller.own_law is None else ():  # else of unknown parts
+        margins = one.judged.margins
+        crossovers = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0.0]
         if crossovers:
-            quoted = result.margins.phase_margin
+            quoted = margins.phase_margin
             at = quoted.frequency_rad_s if quoted and quoted.frequency_rad_s > 0 else min(crossovers)
-            budgets[name] = delay_budget(design, name, at)
+            held = {"rotor": "locked"} if one.held and name == "current" else {"torques_held": bool(one.held)}
+            budgets[name] = delay_budget(design, name, at, **held)
     return budgets
 
 

@@ -107,7 +107,8 @@ def frequency_grid(figures: LoopFigures, points: int = 240) -> np.ndarray:
     The crossovers themselves are points of it.
     """
     margins = figures.margins
-    every = [m.frequency_rad_s for m in (*margins.gain_margins, *margins.phase_margins)]
+    quoted = [m for m in (margins.gain_margin, margins.phase_margin) if m]
+    every = [m.frequency_rad_s for m in (*quoted, *margins.gain_margins, *margins.phase_margins)]
     marks = [mark for mark in every if math.isfinite(mark) and mark > 0.0]
     nyquist = math.pi / margins.period_s if margins.period_s else None
     crossings = [m.frequency_rad_s for m in margins.phase_margins if m.frequency_rad_s > 0] or marks

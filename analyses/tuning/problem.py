@@ -175,11 +175,16 @@ def size_of(requirement: Requirement) -> float:
     return abs(limit_of(requirement)) or QUANTITIES[requirement.quantity].size
 
 
-def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
-    """Requirements on loops: those of the design, replaced by extra ones on the same figure."""
+def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
+    """Requirements of the design, replaced by extra ones on the same figure."""
     replaced = {(r.quantity, r.loop) for r in extra}
-    kept = [r for r in design.requirements if (r.quantity, r.loop) not in replaced]
-    chosen = tuple(r for r in (*kept, *extra) if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
+    return (*(r for r in design.requirements if (r.quantity, r.loop) not in replaced), *extra)
+
+
+def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
+    """Those of `asked_for` that are on loops."""
+    every = asked_for(design, extra)
+    chosen = tuple(r for r in every if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
     if not chosen:
         raise InputError(
             "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "

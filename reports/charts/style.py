@@ -37,11 +37,22 @@ def frequency(panel: Panel, ends: Sequence[float] | np.ndarray | None = None) ->
         panel.x.limits(ends[0], ends[-1])
 
 
-def bound(panel: Panel, values: Iterable[float | None], *, span: float, top_room: float) -> None:
-    """Set the y limits to the values, at most so much below the highest, with some room above."""
-    there = known(values)
+def bound(
+    panel: Panel,
+    values: Iterable[float | None],
+    *,
+    span: float,
+    top_room: float,
+    marks: Sequence[float] = (),
+) -> None:
+    """Set the y limits to the values, at most so much below the highest, with some room above.
+
+    With ``marks``, which are always shown, the span lies about them: 0.6 of it above, 0.4 below.
+    """
+    there = [*known(values), *marks]
     high, low = max(there, default=1.0), min(there, default=0.0)
-    low = max(low, high - span)
+    first, last = (min(marks) - 0.4 * span, max(marks) + 0.6 * span) if marks else (high - span, high)
+    low, high = max(low, first), min(high, last)
     height = max(high - low, 1.0)
     panel.y.limits(low - 0.04 * height, high + top_room * height)
 
@@ -62,9 +73,11 @@ def bode_axes(top: Panel, bottom: Panel, phase: Iterable[float | None]) -> None:
     phase_axis(bottom, phase)
 
 
-def phase_axis(panel: Panel, values: Iterable[float | None], *, span: float = 900.0) -> None:
+def phase_axis(
+    panel: Panel, values: Iterable[float | None], *, span: float = 900.0, marks: Sequence[float] = ()
+) -> None:
     """Set limits and ticks of a phase: multiples of 15, 45, 90, ... degrees."""
-    bound(panel, values, span=span, top_room=0.08)
+    bound(panel, values, span=span, top_room=0.08, marks=marks)
     low, high = panel.y.span()
     step = next((s for s in (15.0, 45.0, 90.0, 180.0, 360.0, 720.0) if (high - low) / s <= 7), 1440.0)
     panel.y.ticks = multiples(step, low, high)

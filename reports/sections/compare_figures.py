@@ -53,7 +53,8 @@ def _bode(name: str, title: str, drawn: tuple[Compared, ...], closed: bool) -> l
         curves.append((one.variant.name[:60], replace(response, values=values)))
     chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, {which}")
     whole = math.inf  # curves are cut nowhere: where two differ is what is looked for
-    both(curves, None, *chart.column(1.0, 1.0), span=whole, phase_span=whole, look=_look)
+    marks = [0.0]  # of both: that of the crossover, and where a closed loop starts
+    both(curves, None, *chart.column(1.0, 1.0), span=whole, phase_span=whole, marks=marks, look=_look)
     return [doc.figure("overlay", chart, f"{title}, {which}: the base and its variants.")]
 
 

@@ -26,7 +26,7 @@ def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
 
     parts = _parts(budgets)
     columns = [
-        doc.of(lambda one: loop_words(one[0]), "loop", "Loop"),
+        doc.of(lambda one: loop_words(one[0], one[1].rotor), "loop", "Loop"),
         doc.of(lambda one: hertz(one[1].frequency_rad_s), "crossover_hz", "Crossover", "Hz", format="sig:4"),
         *(part(key, label.capitalize()) for key, label in parts.items()),
         doc.of(lambda one: one[1].total_deg, "total", "Phase in all", **DEG),
@@ -45,9 +45,10 @@ def section(budgets: Mapping[str, DelayBudget]) -> doc.Section:
     digital = ("measurement", "hold", "computing delay", "sampling")
     lost = {name: -sum(budget.items[key] for key in digital) for name, budget in budgets.items()}
     name = max(lost, key=lambda key: lost[key])
+    loop = loop_words(name, budgets[name].rotor).lower()
     words = (
         f"Speed measurement, hold, computing delay and sampling take {lost[name]:.1f} deg at the crossover "
-        f"of the {loop_words(name).lower()}{', more than at any other' * (len(lost) > 1)}; "
+        f"of the {loop}{', more than at any other' * (len(lost) > 1)}; "
         f"{180.0 + budgets[name].total_deg:.1f} deg are left."
     )
     intro = "The phase at the gain crossover of each loop, divided into its causes."

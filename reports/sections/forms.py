@@ -72,7 +72,7 @@ def _overlay(forms: Mapping[str, Mapping[str, LoopFigures]]) -> doc.Block:
         known = [(form, result[name]) for form, result in forms.items() if name in result]
         curves = [(FORMS[form], curve(one.loop.plain_open, grid)) for form, one in known]
         top, bottom = chart.column(1.0, 1.0, title=loop_words(name))
-        both(curves, nyquist_hz(sampled), top, bottom, span=120.0)
+        both(curves, nyquist_hz(sampled), top, bottom, span=120.0, marks=[0.0])
         top.rule_y(0.0, colour=style.INK)
         bottom.rule_y(-180.0, colour=style.INK)
     caption = "Open loops in the three forms, each up to its Nyquist frequency (dotted line)."

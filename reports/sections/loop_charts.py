@@ -3,6 +3,7 @@
 import cmath
 import math
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from analyses.linear.responses import Curve, answer_curve, curve, nyquist_curve,
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin
-from reports.sections.margins import finite, margin_row
+from reports.sections.margins import finite, margin_row, returns
 
 Curves = Sequence[tuple[str, Curve]]
 LABELLED = 3  # margins with words
@@ -30,11 +31,15 @@ def open_bode(
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 410.0)
     chart = style.Chart(width=width, height=height, loop=name)
     top, bottom = chart.column(1.15, 1.0)
-    drawn, margins, shown = curve(figures.loop.plain_open, grid), figures.margins, 1 if small else LABELLED
-    both([("open loop", drawn)], nyquist_hz(figures), top, bottom, span=100.0)
+    drawn, shown = curve(figures.loop.plain_open, grid), 1 if small else LABELLED
+    gains, phases = seen_margins(figures.margins, drawn)
+    marks = [0.0, *(level for level, _ in gains[:1])]
+    turned = [at - part * deg for deg, _, at in phases[:1] for part in (0, 1)]
+    one = [("open loop", drawn)]
+    both(one, nyquist_hz(figures), top, bottom, span=100.0, marks=marks, phase_marks=turned)
     top.rule_y(0.0, colour=style.INK)
-    _gain_margins(drawn, margins, top, shown)
-    _phase_margins(drawn, margins, top, bottom, shown)
+    _gain_margins(gains, RED if figures.margins.stable is False else ORANGE, top, shown)
+    _phase_margins(phases, top, bottom, shown)
     caption = f"{title}, open loop: gain margins at the phase crossovers (■), phase margins at the gain "
     caption += "crossovers (●)."
     return doc.figure("bode", chart, caption, alt=margin_words(title, figures), layout="half")
@@ -48,33 +53,46 @@ def margin_words(title: str, figures: LoopFigures) -> str:
     return f"Open-loop Bode diagram of the {name}: gain margin {gain}, phase margin {phase}."
 
 
-def _gain_margins(curve: Curve, margins: StabilityMargins, top: style.Panel, shown: int) -> None:
-    first, last = curve.frequency_hz[[0, -1]]
-    inside = [(-m.db, m.frequency_rad_s / (2.0 * math.pi)) for m in margins.gain_margins]
+def seen_margins(
+    margins: StabilityMargins, curve: Curve
+) -> tuple[list[tuple[float, float]], list[tuple[float, float, float]]]:
+    """Margins in the band of a curve, those nearest to -1 first.
+
+    At each phase crossover the level in dB and the frequency in Hz; at each gain crossover the phase margin
+    in deg, the frequency, and the phase of the curve.
+    """
+    hertz = curve.frequency_hz
+
+    def seen(found: Sequence[Any], size: str) -> list[tuple[float, float]]:
+        every = [(getattr(m, size), m.frequency_rad_s / (2.0 * math.pi)) for m in found]
+        return sorted((m for m in every if hertz[0] <= m[1] <= 1.001 * hertz[-1]), key=lambda m: abs(m[0]))
+
+    def phase(f: float) -> float:
+        return float(np.interp(math.log(f), np.log(hertz), curve.phase_deg))
+
+    gains = [(-db, f) for db, f in seen(margins.gain_margins, "db")]
+    return gains, [(deg, f, phase(f)) for deg, f in seen(margins.phase_margins, "deg")]
+
+
+def _gain_margins(found: Sequence[tuple[float, float]], colour: str, top: style.Panel, shown: int) -> None:
     low, high = top.y.span()
-    look: style.Style = {"colour": RED if margins.stable is False else ORANGE, "read": False}
-    for k, (level, f) in enumerate((level, f) for level, f in inside if first <= f <= 1.001 * last):
+    look: style.Style = {"colour": colour, "read": False}
+    for k, (level, f) in enumerate(found):
         seen = min(max(level, low), high)
         top.curve([f, f], [0.0, seen], width=2.6, **look)
         top.points([f], [seen], marker="s", size=6.0, **look)
-        if k < shown and (k == 0 or low < level < high):
-            off = "" if low < level < high else " (off scale)"
-            top.note(f"GM {gain_margin(-level, 1)} dB{off}\n{style.hertz(f)}", (f, seen))
+        if k < shown and seen == level:
+            top.note(f"GM {gain_margin(-level, 1)} dB\n{style.hertz(f)}", (f, seen))
 
 
 def _phase_margins(
-    curve: Curve, margins: StabilityMargins, top: style.Panel, bottom: style.Panel, shown: int
+    found: Sequence[tuple[float, float, float]], top: style.Panel, bottom: style.Panel, shown: int
 ) -> None:
     """Draw each phase margin as the distance to the odd multiple of 180 deg at its gain crossover."""
     (top_low, _), (low, high) = top.y.span(), bottom.y.span()
     for level in range(math.ceil((low / 180.0 - 1) / 2), math.floor((high / 180.0 - 1) / 2) + 1):
         bottom.rule_y(180.0 * (2 * level + 1), colour=style.INK)
-    hertz = curve.frequency_hz
-    for k, margin in enumerate(margins.phase_margins):
-        f, deg = margin.frequency_rad_s / (2.0 * math.pi), margin.deg
-        if not hertz[0] <= f <= 1.001 * hertz[-1]:
-            continue
-        phase = float(np.interp(math.log(f), np.log(hertz), curve.phase_deg))
+    for k, (deg, f, phase) in enumerate(found):
         limit = 180.0 * (2 * round(((phase - deg) / 180.0 - 1) / 2) + 1)
         thin: style.Style = {"colour": GREEN, "width": 0.9, "dash": 4, "read": False}
         top.points([f], [0.0], colour=GREEN, size=6.5, read=False)
@@ -82,7 +100,7 @@ def _phase_margins(
         bottom.curve([f, f], [high, phase], **thin)
         bottom.curve([f, f], [limit, limit + deg], colour=GREEN, width=2.6, read=False)
         bottom.points([f], [limit + deg], colour=GREEN, size=6.5, read=False)
-        if k < shown:
+        if k < shown and low < limit + deg < high:
             bottom.note(f"PM {style.to_minus(f'{deg:.1f}')}°\n{style.hertz(f)}", (f, limit + deg / 2))
 
 
@@ -95,6 +113,8 @@ def both(
     span: float,
     phase_span: float = 900.0,
     top_room: float = 0.06,
+    marks: Sequence[float] = (),
+    phase_marks: Sequence[float] = (),
     look: Callable[[int], style.Style] = style.series,
 ) -> None:
     for k, (label, one) in enumerate(curves):
@@ -103,8 +123,11 @@ def both(
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     hertz = [one.frequency_hz for _, one in curves]
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
-    style.phase_axis(bottom, [y for _, one in curves for y in one.phase_deg], span=phase_span)
-    style.bound(top, [y for _, one in curves for y in one.magnitude_db], span=span, top_room=top_room)
+    style.phase_axis(
+        bottom, [y for _, one in curves for y in one.phase_deg], span=phase_span, marks=phase_marks
+    )
+    levels = [y for _, one in curves for y in one.magnitude_db]
+    style.bound(top, levels, span=span, top_room=top_room, marks=marks)
     if nyquist_hz:
         for panel in (top, bottom):
             panel.rule_x(nyquist_hz, dash=2)
@@ -113,7 +136,7 @@ def both(
 def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> doc.Block:
-    other, band = figures.reference, figures.bandwidth
+    other, band = figures.reference, None if returns(figures) else figures.bandwidth
     first = "rotor free" if locked else "to the command" if other else "closed loop"
     curves = [(first, answer_curve(figures, grid))]
     curves += [("to the reference", answer_curve(other, grid))] if other is not None else []

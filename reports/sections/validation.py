@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import asdict, replace
+from decimal import ROUND_UP, Context
 from typing import Any, cast
 
 from actuator_lti.asked.verdict import Verdict
@@ -37,6 +38,7 @@ for _limiter in LIMITERS.values():
     MORE[f"{_onset}_integral"] = f"integral that the {_limiter.words} clamps"
 PLACES = {"command": "Command to output", "load": "Load torque to output", "drive": "Numbers of the design"}
 NOISE = 1e-9  # of the value: a smaller error changes with the order in which sums are taken
+UP = Context(prec=2, rounding=ROUND_UP)
 
 
 def section(validation: Validation) -> list[doc.Section]:
@@ -54,13 +56,18 @@ def section(validation: Validation) -> list[doc.Section]:
 def brief(validation: Validation) -> Brief:
     """The verdict, why it is none where it is none, and every check by loop."""
     made = section(validation)
-    items = [item for part in made for item in doc.judged(part["blocks"]) if item["verdict"] != "met"]
+    every = [item for part in made for item in doc.judged(doc.walk(part))]
+    items = [item for item in every if item["verdict"] != "met"]
     items = [item for item in items if not item["reason"] or item["reason"] not in validation.words]
+    others = [item["label"] for item in every if "gathers" not in item]
+    others += ["those of --large"] * (validation.friction is None)
+    more = [f"a report counts more checks than these predictions: {'; '.join(others)}"] if others else []
     said = [f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items]
     large = [part["result"] for part in made if part["id"] == "conditional"]
     grouped = by_loop(validation.rows).items()
     tables = [_short_table(name, rows) for name, rows in grouped]
-    return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
+    blocks = [*map(doc.text, said), *tables, *map(doc.text, large)]
+    return Brief(validation.words, blocks, [*validation.notes, *more])
 
 
 def _short_table(name: str, rows: Sequence[Check]) -> doc.Block:
@@ -85,7 +92,8 @@ def summary(validation: Validation) -> doc.Section:
         "Every prediction is held against the derivative of the running simulator, taken on its compiled "
         "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands, "
         "then without dry friction and friction by load: its figures differ from those of sliding by that. "
-        "What is large, starts from rest, or is shaken by counts is a finding of its own."
+        "What is large, starts from rest, or is shaken by counts is a finding of its own. An error of less "
+        "than 10⁻⁹ of its value is rounding: that bound stands for it."
     )
     words = " ".join(f"{capital(each)}." for each in validation.sentences())
     return doc.section(
@@ -161,15 +169,17 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
-    def error(row: Check) -> float:
-        return max(row.error, NOISE * abs(row.predicted or 1.0))  # no digits that are noise of the last bit
+    def at_most(row: Check) -> float:
+        """A bound of the error: no digits that are noise of the last bit."""
+        bound = _scaled(row)[0] * max(row.error, NOISE * abs(row.predicted or 1.0))
+        return float(UP.create_decimal(f"{bound:.12g}"))
 
     columns = [
         doc.of(quantity_name, "quantity", "Prediction"),
         doc.of(lambda row: _rounded(row, row.predicted, 12), "predicted", "Predicted", format="sig:6"),
         doc.of(lambda row: _rounded(row, row.found, 10), "found", "Simulated", format="sig:6"),
         doc.of(lambda row: _scaled(row)[1], "unit", "Unit"),
-        doc.of(lambda row: _rounded(row, error(row), 2), "error", "Error", format="sig:2"),
+        doc.of(at_most, "error", "Error at most", format="sig:2"),
         doc.of(lambda row: _rounded(row, row.allowed, 2), "allowed", "Allowed", format="sig:2"),
         doc.of(lambda row: str(row.verdict), "verdict", "Verdict"),
         doc.of(lambda row: prose(row.because), "because", "Where"),

@@ -3,9 +3,20 @@
 import numpy as np
 import pytest
 
-from actuator_lti.design import Design, load_design, read_design_text, write_design
+from actuator_lti.design import (
+    Design,
+    design_hash,
+    load_design,
+    read_design_text,
+    with_values,
+    write_design,
+)
 from actuator_lti.design.suspicions import warnings_of
+from actuator_lti.design.writing import write_changed
 from actuator_lti.errors import InputError, Mistakes
+from actuator_lti.loops import assemble_loops
+from analyses.linear.loop_figures import all_loop_figures
+from reports.sections.margins import by_itself_notes, response_row
 
 DRIVE = """
 [design]
@@ -328,3 +339,40 @@ def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> N
     assert "load.path" not in [one["path"] for one in cli.data("keys", "--explain", "joint")["keys"]]
     ran = cli("simulate", f"{file}", "--set", "load.inertia=30 gcm2", "--json", "--duration", "0.01")
     assert any(said[-1] in line for line in ran.err.splitlines())
+
+
+def test_a_changed_design_keeps_the_keys_of_its_data_sheet(tmp_path) -> None:
+    """A gear's efficiency and a gain as a bandwidth stay what the file says; the new gain says of what."""
+    file = tmp_path / "first.toml"
+    gains = {"current": "1 kHz", "velocity": "0.01 A*s/rad", "position": "20 1/s"}
+    loops = "".join(f'[control.{loop}]\ngain = "{gain}"\n' for loop, gain in gains.items())
+    file.write_text(DRIVE.replace("ratio = 19.2", 'ratio = 19.2\nefficiency = "85 %"') + loops)
+    before = load_design(file)
+    after = with_values(before, {"control.position.gain": 30.0})
+    text = write_changed(before, after)
+    assert design_hash(read_design_text(text)) == design_hash(after) != design_hash(before)
+    for words in ('efficiency = "85 %"', 'gain = "1 kHz"', 'source = "changed from 20 1/s"'):
+        assert words in text
+    assert "load_coefficient" not in text
+    file.unlink()
+    assert write_changed(before, after).startswith("# What its file derives")
+
+
+def test_a_current_that_returns_has_no_figures_relative_to_its_end() -> None:
+    """A free rotor turns until back-EMF has the voltage: g/(R + g + kM kE/b) of the command is left."""
+    R, k, b, g = 5.9, 0.0127, 1e-8, 5.0
+    text = DRIVE + f'[control.current]\ngain = "{g} V/A"\n[friction]\nviscous = "{b} N*m*s/rad"\n'
+    figures = all_loop_figures(assemble_loops(read_design_text(text)), locked=True)["current"]
+    row, locked = response_row(figures), response_row(figures.locked)
+    assert row["dc"] == pytest.approx(g / (R + g + k * 1.33 * 60 / (2000 * np.pi) / b), rel=1e-6)
+    assert locked["dc"] == pytest.approx(g / (R + g), rel=1e-9)
+    names = ("minus3db_hz", "resonance_db", "rise_ms", "overshoot_percent", "settling_ms")
+    assert [row[name] for name in names] == [None] * 5
+    assert None not in [locked[name] for name in names[1:]]
+    assert "the response returns to" in by_itself_notes({"Current loop": figures})[0]
+
+
+def test_a_load_of_the_command_line_beyond_the_largest_is_warned_of(cli) -> None:
+    said = cli("margins", "ilr33-amber", "--load", "1e9 N*m").err
+    assert "--load: 1e+09 N*m lies above load.moment_max = 8 N*m" in said
+    assert "--load" not in cli("margins", "ilr33-amber", "--load", "8 N*m").err

@@ -26,7 +26,6 @@ def imports(module: str) -> Iterator[Any]:
 
 @cache
 def later(module: str) -> set[int]:
-    """Lines of the imports in functions."""
     path = Path(__file__).resolve().parents[2].joinpath(*module.split("."))
     tree = ast.parse((path / "__init__.py" if path.is_dir() else path.with_suffix(".py")).read_text())
     functions = [one for one in ast.walk(tree) if isinstance(one, ast.FunctionDef | ast.AsyncFunctionDef)]

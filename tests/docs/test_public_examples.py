@@ -22,7 +22,6 @@ PACKAGES = (
 
 
 def code_of_pages() -> tuple[str, str]:
-    """All Python, and all commands, that the build of the documentation runs."""
     result = [match for page in PAGES for match in RUN.findall(page.read_text(encoding="utf-8"))]
     python = "\n".join(code for kind, code in result if kind != "shell-run")
     return python, "\n".join(code for kind, code in result if kind == "shell-run")
@@ -44,7 +43,6 @@ THINGS = {name: thing for package in PACKAGES for name, thing in public(package)
 
 
 def has_doctest(thing: Any) -> bool:
-    """Whether the docstring, or for a class that of a member, has an example."""
     docs = [inspect.getdoc(thing) or ""]
     if inspect.isclass(thing):
         members = (member for name, member in vars(thing).items() if not name.startswith("__"))
@@ -53,7 +51,6 @@ def has_doctest(thing: Any) -> bool:
 
 
 def used(name: str, thing: Any) -> bool:
-    """Whether a page uses it by name."""
     short = name.rpartition(".")[2]
     word = rf"\b{re.escape(short)}\b"
     if isinstance(thing, ModuleType):

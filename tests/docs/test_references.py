@@ -22,8 +22,7 @@ def sources() -> list[Path]:
 def test_every_section_that_a_source_cites_exists() -> None:
     missing, result = [], 0
     for path in sources():
-        text = path.read_text(encoding="utf-8")
-        for match in CITED.finditer(text):
+        for match in CITED.finditer(path.read_text(encoding="utf-8")):
             result += 1
             numbers = set(re.findall(r"[0-9]+", match[1]))
             missing += [f"{path.relative_to(ROOT)}: section {n}" for n in sorted(numbers - SECTIONS)]

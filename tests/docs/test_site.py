@@ -18,6 +18,7 @@ PAGES = [
     ROOT / "README.md",
     *sorted(p for p in (ROOT / "docs").rglob("*.md") if p.parent.name != "generated"),
 ]
+MOST = {"plant effect": 6, "limiter": 4, "controller block": 3, "figure": 3, "requirement quantity": 2}
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +64,7 @@ def test_every_part_of_a_drive_has_its_place_in_the_diagram(monkeypatch: pytest.
 
 def test_every_file_that_the_architecture_names_exists() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("## Six changes")[1]
-    section = ""
-    result = 0
+    section, result = "", 0
     for first in re.findall(r"(?m)^\| (`[^|]+) \|", text):
         for name in re.findall(r"`([\w/.]+\.(?:py|md))`", first):
             section = section if "/" not in name else str(Path(name).parent)
@@ -72,9 +72,6 @@ def test_every_file_that_the_architecture_names_exists() -> None:
             assert path.exists() or path.stem == "NAME", name  # a file still to be written
             result += 1
     assert result >= 17
-
-
-MOST = {"plant effect": 6, "limiter": 4, "controller block": 3, "figure": 3, "requirement quantity": 2}
 
 
 @pytest.mark.parametrize("change", MOST)
@@ -100,8 +97,7 @@ def test_the_list_of_quantities_holds_every_quantity(made: ModuleType) -> None:
 
 
 def test_the_list_of_commands_holds_every_command_and_option(made: ModuleType) -> None:
-    page = made.commands_page()
-    root = typer.main.get_command(build())
+    page, root = made.commands_page(), typer.main.get_command(build())
     for panel, names in PANELS.items():
         assert f"## {panel}" in page
         for name in names:

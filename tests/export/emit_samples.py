@@ -17,19 +17,16 @@ def small(x, limit):
 
 @kernel
 def pair(x, y):
-    """Two results, one a test."""
     return x * y + GAIN, x > y
 
 
 @kernel
 def passed_on(x):
-    """Results of another function."""
     return pair(x, x)
 
 
 @kernel
 def push(s, at, x):
-    """Write a row and return what was there."""
     old = s[at]
     s[at] = x
     return old
@@ -91,19 +88,16 @@ def gated(p, x):
 
 @kernel
 def through(p, x):
-    """Calls it."""
     return gated(p, x)
 
 
 @kernel
 def power(x):
-    """Outside the subset."""
     return x**2
 
 
 @kernel
 def two_types(x):
-    """One variable, two types."""
     y = 0
     y = x + 1.0
     return 2.0 * y
@@ -123,7 +117,6 @@ def twice(s):
 
 @kernel
 def truth(x):
-    """A float as a condition."""
     if x:
         return 1.0
     return 2.0
@@ -131,5 +124,4 @@ def truth(x):
 
 @kernel
 def sliced(s):
-    """A slice."""
     s[0:2] = 1.0

@@ -25,6 +25,8 @@ needs_compiler = pytest.mark.skipif(
 )
 Refused = pytest.importorskip("fmpy.fmi1").FMICallException
 fmi2, fmi3 = pytest.importorskip("fmpy.fmi2"), pytest.importorskip("fmpy.fmi3")
+# the text of a message comes behind its format, "%s"
+_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
 
 
 def written(folder: Path, design: Design, version: Version = 2, platform: str = "linux64") -> Path:
@@ -71,8 +73,7 @@ class Host:
 @contextmanager
 def hosted(path: Path, count: int = 1) -> Iterator[tuple[Host, ...]]:
     """Instances of one unit, each instantiated only."""
-    description = fmpy.read_model_description(str(path))
-    folder = fmpy.extract(str(path))
+    description, folder = fmpy.read_model_description(str(path)), fmpy.extract(str(path))
     hosts = tuple(_instance(description, folder, f"unit{n}") for n in range(count))
     try:
         yield hosts
@@ -80,10 +81,6 @@ def hosted(path: Path, count: int = 1) -> Iterator[tuple[Host, ...]]:
         for host in hosts:
             host.unit.freeInstance()
         shutil.rmtree(folder)
-
-
-# the text of a message comes behind its format, "%s"
-_LOGGER = CFUNCTYPE(None, c_void_p, c_char_p, c_int, c_char_p, c_char_p, c_char_p)
 
 
 def _instance(description: Any, folder: str, name: str) -> Host:

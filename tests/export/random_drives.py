@@ -49,20 +49,11 @@ def random_drive(rng: Rng) -> model.Design:
     load |= {"gravity": draw.maybe(model.Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None)}
     load |= {"moment_damping_Nms_rad": own.maybe(own.near(0.05)), "gear_error_Nm": own.maybe(own.near(0.3))}
     load |= {"gear_error_periods": own.near(10.0), "gear_error_phase_rad": own.rng.uniform(0.0, 3.0)}
-    made = changed(
-        design,
-        motor=motor,
-        controller=controller,
-        friction=friction,
-        load=load,
-        encoder=_encoder(draw),
-        output_encoder={"counts_per_rev": draw.maybe(4096, None)},
-        command=_command(draw),
-        instruments=draw.maybe({}, _instruments(draw)),
-        supply=draw.maybe(None, _supply(draw)),
-        limits=_limits(draw),
-    )
-    return _with_law(own.rng.spawn(1)[0], made)
+    parts: Parts = {"motor": motor, "controller": controller, "friction": friction, "load": load}
+    parts |= {"encoder": _encoder(draw), "output_encoder": {"counts_per_rev": draw.maybe(4096, None)}}
+    parts |= {"command": _command(draw), "instruments": draw.maybe({}, _instruments(draw))}
+    parts |= {"supply": draw.maybe(None, _supply(draw)), "limits": _limits(draw)}
+    return _with_law(own.rng.spawn(1)[0], changed(design, **parts))
 
 
 def _with_law(rng: Rng, design: model.Design) -> model.Design:
@@ -84,7 +75,7 @@ def law_at(rng: Rng, design: model.Design, stage: str, n: int) -> model.Design:
     D[0] = gain
     law = Law(inputs=inputs, A=tuple(map(tuple, A.tolist())), B=tuple(map(tuple, (1e-2 * B).tolist())),
               C=tuple(C.tolist()), D=tuple(D.tolist()), L=tuple((0.1 * rng.standard_normal(n)).tolist()),
-              gain=Draw(rng).near(1.0))  # type: ignore[arg-type]  # fmt: skip
+              gain=Draw(rng).near(1.0))  # fmt: skip
     own = (key for key in ("every", "sensor", "back_emf_feedforward") if hasattr(loop, key))
     part = type(loop)(**{key: getattr(loop, key) for key in own}, law=law)
     if (velocity := design.controller.velocity) is not None:
@@ -156,7 +147,7 @@ def _encoder(draw: Draw) -> model.Encoder:
         "difference_samples": int(draw.rng.integers(1, 5)),
     }
     own |= {"filter_time_s": draw.maybe(5e-4), "bandwidth_rad_s": draw.near(2000.0)}
-    return model.Encoder(speed=speed, **own)  # type: ignore[arg-type]
+    return model.Encoder(speed=speed, **own)
 
 
 def _command(draw: Draw) -> Parts:

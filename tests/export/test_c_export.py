@@ -147,14 +147,11 @@ def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
 @needs_compiler
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "emps", *ELASTIC])
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
-def test_the_example_builds_without_a_warning_and_is_the_simulator(
-    name: str, compiler: str, tmp_path
-) -> None:
+def test_the_example_builds_without_a_warning_and_is_the_simulator(name: str, compiler: str, tmp_path):
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} on this machine")
     design = load_design(name)
-    texts = c_export(design)
-    ours = {file: text for file, text in texts.items() if file != "README.md"}
+    ours = {file: text for file, text in c_export(design).items() if file != "README.md"}
     said = said_by(tmp_path, ours, "400", "0.01", compiler=[compiler])
     table = np.array([[float(x) for x in line.split(",")] for line in said.splitlines()[1:]])
     run = simulate(design, commands.step(0.01), 400 * design.controller.period_s, loads.constant(0.0))

@@ -48,9 +48,7 @@ def without_library(folder: Path) -> set[str]:
 
 @pytest.mark.parametrize("single", [False, True])
 @pytest.mark.parametrize("name", shipped_designs())
-def test_vectors_of_the_simulator_hold_and_no_library_is_called(
-    name: str, single: bool, tmp_path: Path
-) -> None:
+def test_vectors_of_the_simulator_hold_and_no_library_is_called(name: str, single: bool, tmp_path: Path):
     folder = written(tmp_path, load_design(name), single=single)
     assert without_library(folder) <= (MATHEMATICS if name in ("joint", "ballscrew") else set())
     worst = worst_of(folder)
@@ -114,7 +112,7 @@ def test_it_links_for_a_cortex_m4f_with_no_library_at_all(name: str, tmp_path: P
 @pytest.mark.parametrize("seed", [1, 2, 6, 12])
 @pytest.mark.parametrize("make", [random_drive, random_elastic_drive])
 def test_vectors_hold_for_random_drives(make: object, seed: int, tmp_path: Path) -> None:
-    design = make(np.random.default_rng(seed))  # type: ignore[operator]
+    design = make(np.random.default_rng(seed))
     folder = written(tmp_path, design, single=bool(seed % 2))
     assert without_library(folder) <= MATHEMATICS
     worst_of(folder)
@@ -129,7 +127,7 @@ def test_a_law_of_one_s_own_has_the_simulator_s_bits(stage: str, order: int, tmp
     assert without_library(folder) == set()
     assert {difference for difference, _ in worst_of(folder).values()} == {0.0}
     assert max(worst_of(written(tmp_path, design, single=True)).values())[0] > 0.0
-    taken = design.controller.own_law[1].inputs  # type: ignore[index]
+    taken = design.controller.own_law[1].inputs
     header = (folder / "controller.h").read_text()
     assert ("output_speed_rad_s" in header) == ("output_speed" in taken)
     assert f"law_states[{order}];" in header or not order

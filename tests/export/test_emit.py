@@ -1,8 +1,6 @@
 """The emitter: C that gives the same bits, and a refusal for whatever it does not know."""
 
 import ctypes
-import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,23 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 from emit_samples import FIRST, everything, open_order, power, sliced, through, truth, twice, two_types
+from programs import needs_compiler
 
 from actuator_lti.compiled import EmitError, emit_c
+from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.form import Form
 
-COMPILER = shutil.which("gcc") or shutil.which("clang") or shutil.which("cc")
-STRICT = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror"]
+STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-Werror", "-shared", "-fPIC")
 
 
 def library(folder: Path, entries: dict[Any, list[str]], forms: Sequence[Form] = ()) -> ctypes.CDLL:
-    source, binary = folder / "t.c", folder / "t.so"
-    source.write_text(emit_c(entries, "t_", forms).source)
-    assert COMPILER is not None
-    subprocess.run([COMPILER, *STRICT, "-shared", "-fPIC", str(source), "-o", str(binary), "-lm"], check=True)
+    source, binary = {"t.c": emit_c(entries, "t_", forms).source}, folder / "t.so"
+    binary.write_bytes(compile_files(source, "t.so", "linux64", STRICT))
     return ctypes.CDLL(str(binary))
 
 
-@pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
+@needs_compiler
 def test_every_construct_gives_the_same_bits(tmp_path) -> None:
     lib = library(tmp_path, {everything: ["row", "row", "int"]})
     row = np.ctypeslib.ndpointer(np.float64)
@@ -41,7 +38,7 @@ def test_every_construct_gives_the_same_bits(tmp_path) -> None:
         assert ours.tobytes() == theirs.tobytes()
 
 
-@pytest.mark.skipif(COMPILER is None, reason="no C compiler on this machine")
+@needs_compiler
 def test_a_form_leaves_out_what_known_numbers_rule_out_and_gives_the_same_bits(tmp_path) -> None:
     form = Form("gated", "bare", "p", {FIRST: 0.0})
     lib = library(tmp_path, {through: ["row", "float"]}, [form])

@@ -10,26 +10,24 @@ from actuator_lti import load_design
 from examples import firmware_controller as firmware
 
 pytestmark = needs_compiler
+LAW_OF_JOINT = [("joint", stage) for stage in ("current", "velocity", "position")]
 
 
 def test_the_unit_confirms_the_gain_margin_of_the_autopilot(tmp_path: Path) -> None:
     """Linear loop on one side, the compiled drive in a flight on the other: the border lies between."""
-    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
-    from fmu_host import written
+    from fmu_host import written  # or skip, where there is no FMPy
 
     from examples.autopilot_loop import GAIN_S, fly, margins
 
     design = load_design("ilr33-amber")
     result = margins(design)
     assert result.stable
-    limit = GAIN_S * result.gain_margins[0].ratio
-    path = written(tmp_path, design)
+    limit, path = GAIN_S * result.gain_margins[0].ratio, written(tmp_path, design)
     assert fly(design, path, 0.97 * limit, 0.6).growth < 1.0 < fly(design, path, 1.03 * limit, 0.6).growth
 
 
 def test_a_host_with_an_integrator_of_its_own_flies_the_same(tmp_path: Path) -> None:
     """solve_ivp with the C inside, FMPy with the unit: 1e-7, a fourth at half the step; held: 2.6e-3."""
-    pytest.importorskip("fmpy", reason="FMPy is not installed (pip install 'actuator-lti[export]')")
     from fmu_host import written
 
     from examples.autopilot_loop import fly, fly_inside, smooth
@@ -59,9 +57,6 @@ def test_the_lag_misses_what_friction_and_play_do_to_the_roll(tmp_path: Path) ->
     alone, with_drive, smooth = rms
     assert with_drive > 10.0 * max(alone, smooth)
     assert min(alone, smooth) > 0.0
-
-
-LAW_OF_JOINT = [("joint", stage) for stage in ("current", "velocity", "position")]
 
 
 @pytest.mark.parametrize(

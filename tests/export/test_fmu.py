@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import zipfile
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import pytest
 from executed import executed
 from fmu_host import fmpy, hosted, needs_compiler, written
 
-from actuator_lti.compiled.compiler import compile_files, system_compiler, zig_command
+from actuator_lti.compiled.compiler import compile_files, zig_command
 from actuator_lti.design import Design, load_design, parameter_value, paths_of, with_values
 from nonlinear import commands, loads, simulate
 from nonlinear.export import fmu_bytes
@@ -86,8 +87,7 @@ def test_parameters_are_the_keys_of_the_design(unit: Path) -> None:
 def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
     """The statements, run as Python, against `design_row` of the design with these values."""
     design = load_design(name)
-    trace = trace_keys(design)
-    rng = np.random.default_rng(5)
+    trace, rng = trace_keys(design), np.random.default_rng(5)
     free = [key for key in trace.keys if not key.fixed and key.path != "friction.breakaway_ratio"]
     tried = 0
     for _ in range(40):
@@ -96,7 +96,6 @@ def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
         }
         k = [values.get(key.path, key.value) for key in trace.keys]
         p = executed(trace.lines, k)
-        assert p is not None
         row = design_row(with_values(design, values, check=False))
         for place, value in p.items():
             assert value == pytest.approx(row[place], rel=1e-14)
@@ -114,11 +113,14 @@ def test_one_hour_in_one_step(unit: Path) -> None:
     assert result["output.angle"][-1] == 0.0
 
 
-def unpacked(folder: Path, design: Design, platform: str) -> str:
-    """Unpacks the unit of a design; its GUID."""
+def own_host(folder: Path, design: Design, platform: str, *flags: str) -> str:
+    """Unpacks the unit of a design beside a host in C; the unit's GUID."""
     path = written(folder, design, platform=platform)
     with zipfile.ZipFile(path) as archive:
         archive.extractall(folder)
+    source = {"host.c": Path(__file__).with_name("c_host.c").read_text(encoding="utf-8")}
+    (folder / "host.exe").write_bytes(compile_files(source, "host.exe", platform, flags))
+    (folder / "host.exe").chmod(0o755)
     return str(fmpy.read_model_description(str(path)).guid)
 
 
@@ -126,13 +128,9 @@ def unpacked(folder: Path, design: Design, platform: str) -> str:
 @pytest.mark.parametrize(("step", "save_at"), [(1e-4, 50), (1.0 / 60.0, 7), (2.5e-5, 42), (1e-3, 0)])
 def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_path) -> None:
     design = load_design("ilr33-amber-multirate")
-    guid = unpacked(tmp_path, design, "linux64")
-    compiler = system_compiler()
-    assert compiler is not None
-    source = Path(__file__).with_name("c_host.c")
-    subprocess.run([compiler, str(source), "-o", str(tmp_path / "host"), "-ldl"], check=True)
+    guid = own_host(tmp_path, design, "linux64", "-ldl")
     library = tmp_path / "binaries/linux64/drive.so"
-    call = [str(tmp_path / "host"), str(library), guid, "100", repr(step), "0.05"]
+    call = [str(tmp_path / "host.exe"), str(library), guid, "100", repr(step), "0.05"]
     done = subprocess.run([*call, str(save_at)], capture_output=True, text=True, check=True)
     through = subprocess.run([*call, "-1"], capture_output=True, text=True, check=True)
     assert done.stdout == through.stdout
@@ -166,8 +164,7 @@ def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, 
     path = written(tmp_path, design)
     assert set(change) <= {key.path for key in trace_keys(design).keys if not key.fixed}
     p, s = parameters(exported_row(design))
-    p = np.concatenate([p, np.zeros(spare_parameters(p))])
-    row = np.zeros(at.IO_SIZE)
+    p, row = np.concatenate([p, np.zeros(spare_parameters(p))]), np.zeros(at.IO_SIZE)
     row[at.IN_COMMAND] = 0.05
     period = design.controller.period_s
     with hosted(path) as (host,):
@@ -211,18 +208,12 @@ def wine_prefix(tmp_path_factory) -> Path:
 def test_win64_binary_runs_under_wine(name: str, wine_prefix: Path, tmp_path) -> None:
     """Another C library's sine and exponential: equal to 1e-11 of full scale, events at the same ticks."""
     design = load_design(name)
-    period_s = design.controller.period_s
-    guid = unpacked(tmp_path, design, "win64")
-    source = {"host.c": Path(__file__).with_name("c_host.c").read_text(encoding="utf-8")}
-    (tmp_path / "host.exe").write_bytes(compile_files(source, "host.exe", "win64"))
+    period_s, guid = design.controller.period_s, own_host(tmp_path, design, "win64")
     call = ["wine", "host.exe", "binaries/win64/drive.dll", guid, "300", repr(period_s), "0.05", "100"]
-    quiet = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix)}
-    try:
-        said = subprocess.run(
-            call, cwd=tmp_path, capture_output=True, text=True, env=quiet, timeout=120
-        ).stdout
-    except subprocess.TimeoutExpired:
-        said = ""
+    quiet, said = {**os.environ, "WINEDEBUG": "-all", "WINEPREFIX": str(wine_prefix)}, ""
+    with suppress(subprocess.TimeoutExpired):
+        options = {"cwd": tmp_path, "capture_output": True, "text": True, "env": quiet, "timeout": 120}
+        said = subprocess.run(call, **options).stdout
     if not said:
         pytest.skip("wine does not start here")
     angles = np.array([float.fromhex(line) for line in said.split()])

@@ -19,6 +19,7 @@ from nonlinear.export.variables import structured
 
 pytestmark = needs_compiler
 PERIOD = 1e-4
+NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
 def refused(host: Host, because: str, call: Any, *arguments: Any) -> None:
@@ -137,9 +138,6 @@ def test_what_no_longer_applies_is_not_refused(tmp_path) -> None:
     with hosted(path) as (host,):
         host.start(**{structured(key): value for key, value in none.items()})
         refused(host, "load.gear_error_periods = .*at most", host.put, {"load.gear_error": 0.01})
-
-
-NUMBER = re.compile(r"-?\d+(\.\d*)?(e[+-]?\d+)?")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "joint", "ballscrew", "fin"])

@@ -71,14 +71,9 @@ def propagated(design: Design, voltage: np.ndarray) -> np.ndarray:
     c = design.controller
     late = round(c.computing_delay_s / c.period_s * FINE)
     held = np.concatenate([np.zeros(late), np.repeat(voltage, FINE)])[: voltage.size * FINE]
-    bare = replace(
-        design,
-        controller=Controller(period_s=c.period_s / FINE, computing_delay_s=0.0),
-        limits=Limits(voltage_V=inf),
-        supply=None,
-        instruments=Instruments(),
-        command=Command(),
-    )
+    free = {"limits": Limits(voltage_V=inf), "supply": None, "command": Command()}
+    control = Controller(period_s=c.period_s / FINE, computing_delay_s=0.0)
+    bare = replace(design, controller=control, instruments=Instruments(), **free)
     fine = run(bare, held.size, held, tanh_tolerance=1e-13)
     return np.transpose([fine.output_angle_rad, fine.motor_angle_rad, fine.motor_speed_rad_s, fine.current_A])
 
@@ -89,20 +84,14 @@ def wanted(t: float | np.ndarray, design: Design) -> Any:
     return 0.1 * size * np.sin(2.0 * np.pi * t / (60.0 * design.controller.period_s))
 
 
-def latched(step: float, ticks: int, period: float) -> np.ndarray:
-    """Number of the communication point at or before each tick."""
-    return np.floor((np.arange(ticks) * period) / step + 1e-6)
-
-
 @pytest.mark.parametrize("name", drives())
 def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     design = drives()[name]
-    period = design.controller.period_s
-    path = written(tmp_path, design)
+    period, path = design.controller.period_s, written(tmp_path, design)
     for part in (1, 5, 10, 15, 27) if name in ALL_STEPS else (1, 27):
         step = part / FINE * period
-        command = np.asarray(wanted(latched(step, TICKS, period) * step, design))
-        plain = run(design, TICKS, command)
+        points = np.floor((np.arange(TICKS) * period) / step + 1e-6)  # at or before each tick
+        plain = run(design, TICKS, np.asarray(wanted(points * step, design)))
         truth = propagated(design, plain.voltage_V)
         with hosted(path) as (host,):
             host.start(hinge_moment=MOMENT)
@@ -122,8 +111,7 @@ def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
 def test_a_command_between_ticks_is_seen_at_the_next(tmp_path) -> None:
     """At 0.9 Ts it is that of a run whose command steps at Ts; voltages are of the tick they are in."""
     design = load_design("ilr33-amber")
-    period = design.controller.period_s
-    path = written(tmp_path, design, 3)
+    period, path = design.controller.period_s, written(tmp_path, design, 3)
     command = np.full(40, 0.05)
     command[0] = 0.0
     plain = run(design, 40, command)
@@ -165,10 +153,8 @@ def lifted(design: Design, K: float, Ts: float, parts: int, common: int) -> np.n
     gain = design.motor.source_gain_Nm_V
     h, m = Ts / FINE, design.encoder.difference_samples
     y, v, u, z, seen, r = range(6)
-    angles = list(range(6, 6 + m))
-    n = 6 + m
-    plant = np.eye(n)
-    e = np.exp(-b / J * h)
+    angles, n = list(range(6, 6 + m)), 6 + m
+    plant, e = np.eye(n), np.exp(-b / J * h)
     plant[y, v], plant[v, v] = (1.0 - e) * J / b, e
     plant[v, u] = (1.0 - e) * gain / b
     plant[y, u] = (h - (1.0 - e) * J / b) * gain / b

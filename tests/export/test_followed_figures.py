@@ -33,11 +33,6 @@ def drives() -> list[Design]:
     return made + [load_design(name) for name in ("fin", "emps", "joint")]
 
 
-def followed_keys(design: Design) -> dict[str, float]:
-    keys = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
-    return {path: value for path, value in keys.items() if value != 0.0}
-
-
 def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -> list[float]:
     """Every value over decades; the speeds of a friction map together, as their order is its structure."""
     together = 10.0 ** rng.uniform(-spread, spread)
@@ -51,22 +46,19 @@ def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -
 @pytest.mark.parametrize("place", range(len(drives())))
 def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
     """Over a decade of every key at once the statements give what the drive asked anew gives."""
-    design = drives()[place]
-    rng = np.random.default_rng(place)
-    keys = followed_keys(design)
-    compared = 0
+    design, rng = drives()[place], np.random.default_rng(place)
+    known = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
+    keys, compared = {path: value for path, value in known.items() if value != 0.0}, 0
     for name in NAMES:
         if name == "motor_current" and not design.motor.has_electrical_dynamics:
             continue
         for load in (0.0, 0.3 * (design.load.moment_max_Nm or 5.0)):
             lines = figure_statements(design, keys, name, load)
-            assert lines is not None
             for spread in (0.0, 0.1, 0.5, 1.0):
                 values = scattered(keys, spread, rng)
                 got = executed([line.c for line in lines], values)
                 changed = stacked(design, dict(zip(keys, values, strict=True)))
                 wanted = float(drive_figure(changed, name, load))
-                assert got is not None
                 assert got[0] == pytest.approx(wanted, rel=1e-12, nan_ok=True), (design.name, name, load)
                 compared += math.isfinite(wanted)
     assert compared > 10

@@ -98,8 +98,7 @@ def test_the_python_file_makes_python_control_systems(written) -> None:
     scope: dict[str, Any] = {}
     exec(written("emps", "python").read_text(encoding="utf-8"), scope)
     ours = scope["system"](scope["MODELS"]["sampled"]["loops"]["position"]["open_loop"])
-    known = assemble_loops("emps").position
-    z = np.exp(1j * 100.0 * ours.dt)
+    known, z = assemble_loops("emps").position, np.exp(1j * 100.0 * ours.dt)
     assert ours(z) == pytest.approx(known.open_loop(z), rel=1e-12)
     delayed = scope["system"](scope["MODELS"]["continuous"]["loops"]["position"]["open_loop"])
     continuous = assemble_loops("emps", "continuous").position

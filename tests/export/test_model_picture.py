@@ -14,6 +14,8 @@ from actuator_lti.design import load_design, shipped_designs
 from nonlinear.export import fmu_bytes
 from reports.model_picture import HEIGHT, WIDTH, model_png, model_svg, train_boxes
 
+needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst is not installed")
+
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_every_stage_and_gear_has_its_box(name: str) -> None:
@@ -36,15 +38,10 @@ def test_the_coupling_stands_behind_its_gear() -> None:
     assert [title for title, _ in train_boxes(motor)] == ["motor", "coupling", "load"]
 
 
-needs_typesetter = pytest.mark.skipif(find_spec("typst") is None, reason="typst is not installed")
-
-
 @needs_typesetter
 def test_names_cannot_break_the_picture() -> None:
     design = replace(load_design("fin"), name='a<b>&"c', title="x" * 300)
-    data = model_png(design)
-    assert data is not None
-    made = matplotlib.image.imread(io.BytesIO(data))
+    made = matplotlib.image.imread(io.BytesIO(model_png(design)))
     assert made.shape[:2] == (2 * HEIGHT, 2 * WIDTH)
     assert made.std() > 0.05  # something is drawn
 

@@ -20,6 +20,8 @@ from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
 
+quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
+
 
 def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
     """A run that is the same, to the bit, by the compiled kernels and by those as written."""
@@ -32,9 +34,6 @@ def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
     assert (ours.status, ours.limits) == (theirs.status, theirs.limits)
     assert repr((ours.final, ours.energy)) == repr((theirs.final, theirs.energy))  # NaN where a run failed
     return ours
-
-
-quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
 
 @quiet
@@ -65,9 +64,7 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
         ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
     ],
 )  # fmt: skip
-def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(
-    name: str, delay_ticks: float, form: str
-) -> None:
+def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(name: str, delay_ticks: float, form: str):
     """Through stick, slip and limits; the last form that fits, which is taken, is this drive's own."""
     design = load_design(name)
     period_s = design.controller.period_s
@@ -146,9 +143,7 @@ def _margins() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("work", "library"), [(_figures, FIGURES), (_margins, AXIS)])
-def test_figures_are_those_of_the_kernels_as_written(
-    work: Callable[[], np.ndarray], library: Library
-) -> None:
+def test_figures_are_those_of_the_kernels_as_written(work: Callable[[], np.ndarray], library: Library):
     """To rounding: Python's hypot is not the C library's."""
     ours = work()
     with library.written():

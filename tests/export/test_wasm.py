@@ -18,6 +18,11 @@ from nonlinear.export.c_files import exported_row
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
 from nonlinear.native import parameters, tick
 
+AT = {
+    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
+    "current": at.IO_CURRENT,
+}  # fmt: skip
+
 
 def test_kept_module_is_made_of_these_sources() -> None:
     known, data = record(), kept_wasm()
@@ -37,12 +42,6 @@ def _same_compiler() -> bool:
 @pytest.mark.skipif(not _same_compiler(), reason="the ziglang that made the module is not installed")
 def test_building_again_gives_the_same_bytes() -> None:
     assert build_wasm() == kept_wasm()
-
-
-AT = {
-    "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
-    "current": at.IO_CURRENT,
-}  # fmt: skip
 
 
 def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:

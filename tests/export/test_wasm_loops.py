@@ -93,8 +93,7 @@ def around_once(blocks: list[Block], z: complex) -> complex:
     gone, driven = np.eye(n), np.zeros((n, 1), dtype=complex)
     for m, each in enumerate(closed):
         gone, driven = each.A @ gone, each.A @ driven + each.B * z**m
-    x = np.linalg.solve(z ** len(closed) * np.eye(n) - gone, driven)
-    total = 0.0j
+    x, total = np.linalg.solve(z ** len(closed) * np.eye(n) - gone, driven), 0.0j
     for m, each in enumerate(closed):
         total += (each.C @ x)[0, 0] / z**m
         x = each.A @ x + each.B * z**m
@@ -137,8 +136,7 @@ def limiters_agree(design: Design, ours: dict[str, Any]) -> int:
     if ours["limiters"]["n"] <= 0:
         assert every > linear.MOST_TICKS
         return 0
-    sizes = numbers(ours["limiters"]["sizes"]).reshape(6, -1)
-    count = 0
+    sizes, count = numbers(ours["limiters"]["sizes"]).reshape(6, -1), 0
     for name, path in loops.limiters.items():
         signal = line_of(LIMITERS[name])
         if signal is None:
@@ -279,8 +277,7 @@ def test_periodic_points_have_the_margins_of_the_fundamental(tmp_path) -> None:
     for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
         loop = assemble_loops(design).break_points["i_ref"]
         assert loop.periodic
-        wanted = stability_margins(loop.open_loop)
-        got = figures_of(ours["i_ref"])
+        wanted, got = stability_margins(loop.open_loop), figures_of(ours["i_ref"])
         known = wanted.gain_margin_db, wanted.phase_margin_deg, wanted.delay_margin_s, wanted.modulus_margin
         names = ("gain_margin", "phase_margin", "delay_margin", "modulus_margin")
         assert [got[name] for name in names] == pytest.approx(known, rel=1e-9)

@@ -39,8 +39,7 @@ def test_a_locked_rotor_is_a_resistance_and_an_inductance() -> None:
     found = plant(design, "ideal", "locked")
     assert found.output_labels == ["current"]
     assert entry(found, "current", "u") == pytest.approx(1 / (1j * W * p["L"] + p["R"]), rel=1e-12)
-    decay = exp(-p["R"] * Ts / p["L"])
-    sampled = plant(design, "sampled", "locked")
+    decay, sampled = exp(-p["R"] * Ts / p["L"]), plant(design, "sampled", "locked")
     assert sampled.dt == Ts
     assert sampled.A[0, 0] == pytest.approx(decay, rel=1e-12)
     assert sampled.B[0, 0] == pytest.approx((1 - decay) / p["R"], rel=1e-12)
@@ -118,8 +117,7 @@ def test_a_current_command_closes_the_current_loop() -> None:
 def test_a_controller_can_be_closed_around_it() -> None:
     """Proportional speed feedback by python-control: the poles are those of A - B k C."""
     system = plant("ilr33-amber")["speed", "u"]
-    closed = control.feedback(system, 1e-3)
-    found = np.sort_complex(closed.poles())
+    found = np.sort_complex(control.feedback(system, 1e-3).poles())
     wanted = np.sort_complex(np.linalg.eigvals(system.A - 1e-3 * system.B @ system.C))
     assert found == pytest.approx(wanted, rel=1e-9)
 

@@ -15,6 +15,8 @@ from actuator_lti.drive.blocks import biquad, pi
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from nonlinear.row.filters import section
 
+RNG = np.random.default_rng(7)
+
 
 @given(st.floats(0, 5), st.floats(1e-6, 10))
 def test_first_order_lag_behind_any_delay(ticks: float, period: float) -> None:
@@ -65,9 +67,6 @@ def test_pi_forms_agree_up_to_half_a_period_of_gain() -> None:
     np.testing.assert_allclose(gap, 2.0 * 0.001 / 0.1, rtol=5e-3)
 
 
-RNG = np.random.default_rng(7)
-
-
 def skewed(zero: float, pole: float, width: float, depth: float) -> Filter:
     return Filter(kind="skewed-notch", zero_rad_s=zero, pole_rad_s=pole, width_rad_s=width, depth=depth)
 
@@ -101,8 +100,7 @@ def test_with_one_frequency_it_is_the_notch() -> None:
 @given(designs(), st.floats(0.01, 0.8))
 @example(everything(), 0.02)
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
-    loops = assemble_loops(design)
-    for name, loop in loops.present.items():
+    for name, loop in assemble_loops(design).present.items():
         omega = fraction * np.pi / loop.period_s
         budget = delay_budget(design, name, omega)
         assert sum(budget.items.values()) == pytest.approx(budget.total_deg, abs=1e-9)

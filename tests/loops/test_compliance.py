@@ -16,6 +16,8 @@ from nonlinear import commands, simulate
 from tests.changed import changed
 from tests.loops.two_mass import drive_e
 
+AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
+
 
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
 def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -> None:
@@ -38,9 +40,7 @@ def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -
          ("least_stiffness",)),
     ],
 )  # fmt: skip
-def test_stacked_designs_have_the_figures_of_each_alone(
-    name: str, values: dict[str, list[float]], quantities: tuple[str, ...]
-) -> None:
+def test_stacked_designs_have_the_figures_of_each_alone(name, values, quantities):
     design, count = load_design(name), len(next(iter(values.values())))
     stacked = {path: np.array(each) for path, each in values.items()}
     for quantity in quantities:
@@ -68,9 +68,6 @@ def test_lost_motion_is_a_requirement() -> None:
     (result,) = evaluate_requirements(replace(load_design("fin"), requirements=(lost,)))
     assert result.value == pytest.approx(np.degrees(1.5e-3 + 2 * 0.36 / 800.0), rel=1e-12)
     assert result.verdict == "met"
-
-
-AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
 
 
 def test_torque_margin_by_hand() -> None:

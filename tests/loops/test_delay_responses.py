@@ -22,8 +22,7 @@ BENDS = (0, 10, 11, 25, 60)  # samples at which the input changes its slope
 
 def random_loop(rng: np.random.Generator, feedthrough: bool) -> tuple[list[Rational], np.ndarray]:
     """Gains and lags of first and second order, each behind a delay of its own."""
-    delays = rng.uniform(0.3, 2.0, int(rng.integers(1, 4)))
-    parts = []
+    delays, parts = rng.uniform(0.3, 2.0, int(rng.integers(1, 4))), []
     for _ in delays:
         w, zeta = rng.uniform(0.5, 4.0), rng.uniform(0.1, 0.9)
         dens = ([1.0, 0.0], [1.0, rng.uniform(0.2, 5.0)], [1.0, 2.0 * zeta * w, w**2])
@@ -59,16 +58,13 @@ def round_the_loop(parts: list[Rational], delays: np.ndarray, end: float) -> dic
 
 
 def in_one_loop(parts: list[Rational], delays: np.ndarray) -> DelaySystem:
-    """The open loop: the sum of all parts."""
     loop = DelaySystem.from_system(0.0)
     for part, delay in zip(parts, delays, strict=True):
         loop += DelaySystem.from_system(control.tf(*part)) * DelaySystem.delay(delay)
     return loop
 
 
-def truth(
-    parts: list[Rational], delays: np.ndarray, times: np.ndarray, u: np.ndarray, patch: pytest.MonkeyPatch
-) -> np.ndarray:
+def truth(parts, delays, times, u, patch) -> np.ndarray:
     """Response of 1/(1 + L) to an input that jumps to its first value and is straight between its bends."""
     fastest, end = max(np.abs(np.roots(den)).max() for _, den in parts), times.max()
     patch.setattr(flint.ctx, "cap", int(4.0 * fastest * end) + 80)
@@ -89,9 +85,7 @@ def truth(
 
 @pytest.mark.parametrize("feedthrough", [False, True])
 @pytest.mark.parametrize("seed", range(6))
-def test_loops_of_delays_without_a_common_measure(
-    feedthrough: bool, seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_loops_of_delays_without_a_common_measure(feedthrough, seed, monkeypatch):
     rng = np.random.default_rng([seed, feedthrough])
     parts, delays = random_loop(rng, feedthrough)
     times = np.linspace(0.0, rng.uniform(2.0, 6.0) * delays.max(), POINTS)
@@ -103,9 +97,7 @@ def test_loops_of_delays_without_a_common_measure(
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_step_figures_of_loops_of_delays_without_a_common_measure(
-    seed: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_step_figures_of_loops_of_delays_without_a_common_measure(seed: int, monkeypatch: pytest.MonkeyPatch):
     parts, delays = random_loop(np.random.default_rng([seed, 2]), False)
     f = step_figures(in_one_loop(parts, delays).feedback())
     early = np.flatnonzero(f.time_s < 4.0 * delays.max())
@@ -113,8 +105,7 @@ def test_step_figures_of_loops_of_delays_without_a_common_measure(
     chosen = f.time_s[early[np.linspace(0, early.size - 1, POINTS).astype(int)]]
     times = np.concatenate((special, chosen))
     wanted = 1.0 - truth(parts, delays, times, np.ones(times.size), monkeypatch)  # L/(1 + L)
-    found = np.interp(times, f.time_s, f.response)
-    size = np.abs(wanted).max()
+    found, size = np.interp(times, f.time_s, f.response), np.abs(wanted).max()
     assert found[len(special) :] == pytest.approx(wanted[len(special) :], abs=1e-7 * size)
     for t, value in zip(special, wanted, strict=False):
         if t == f.peak_time_s:

@@ -16,6 +16,9 @@ from actuator_lti.systems import delay_stepper
 S = 1j * np.geomspace(0.01, 1e4, 40)
 LAG = control.tf([2.0], [0.1, 1.0])
 LEAD = control.tf([0.3, 1.0], [0.01, 1.0])
+FORMS = ("sampled", "continuous", "ideal")
+NAMES = ("current", "velocity", "position")
+INTEGRATOR = control.tf([1], [1, 0])
 
 
 def lag(s: Any) -> Any:
@@ -101,11 +104,6 @@ def test_refusals() -> None:
         DelaySystem.from_system(float("nan"))
 
 
-FORMS = ("sampled", "continuous", "ideal")
-NAMES = ("current", "velocity", "position")
-INTEGRATOR = control.tf([1], [1, 0])
-
-
 @pytest.fixture(scope="module")
 def loops() -> dict:
     return {form: assemble_loops("ilr33-amber", form=form) for form in FORMS}
@@ -163,8 +161,7 @@ def test_an_integrator_behind_a_delay(gain: float, delay: float) -> None:
 
     times = np.linspace(0.0, 6.3 * delay, 190)
     terms = [-((-gain) ** k) * np.maximum(times - k * delay, 0.0) ** k / factorial(k) for k in range(1, 8)]
-    closed = loop.feedback()
-    response = control.step_response(closed, times)
+    response = control.step_response(loop.feedback(), times)
     np.testing.assert_allclose(response.y[0, 0], sum(terms), rtol=1e-4, atol=1e-4 * gain * delay)
 
 

@@ -20,12 +20,13 @@ from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 from actuator_lti.batch import Population, drive_figures, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Gravity
 
+LOUD = controlled(load_design("ilr33-amber"), position={"gain": 4800.0})  # S of its position loop has no peak
+
 
 @st.composite
 def wider_designs(draw: st.DrawFn) -> Design:
     """Also under gravity, with a friction map or another friction backwards, sizes over two decades."""
-    design = draw(wide_designs())
-    size = 10.0 ** draw(st.floats(-1.0, 1.0))
+    design, size = draw(wide_designs()), 10.0 ** draw(st.floats(-1.0, 1.0))
     torque = design.friction.dry_torque_Nm or 1e-3
     shape = ((0.0, 1.0), (50.0, 0.6), (400.0, 1.4))
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=part * torque) for w, part in shape)
@@ -47,9 +48,6 @@ def test_drive_figures(design: Design, load_Nm: float) -> None:
         if name == "motor_current" and not design.motor.has_electrical_dynamics:
             continue
         assert drive_figures(many, name, load_Nm) == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), name
-
-
-LOUD = controlled(load_design("ilr33-amber"), position={"gain": 4800.0})  # S of its position loop has no peak
 
 
 @settings(max_examples=8)

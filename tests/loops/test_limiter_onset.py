@@ -28,8 +28,7 @@ def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[st
 def test_onset_of_each_limiter_in_the_multirate_drive(cycles: int, feedforward: float) -> None:
     """At the onset amplitude the largest steady sample is the limit, whichever sub-tick it falls in."""
     design, window = amber(2, 10, feedforward=feedforward), 14_000
-    loops = assemble_loops(design)
-    omega = 2 * np.pi * cycles / (window * 1e-4)
+    loops, omega = assemble_loops(design), 2 * np.pi * cycles / (window * 1e-4)
     seen = peaks(design, cycles, window, 1e-3)
     signals = {"speed": "w_ref", "acceleration": "change", "current": "i_ref", "voltage": "u"}
     for name, path in loops.limiters.items():
@@ -49,15 +48,13 @@ def test_speed_clamp_of_a_p_position_loop_with_ideal_inner_loops() -> None:
 
 
 def test_the_active_limiter_and_its_bias() -> None:
-    loops = assemble_loops(amber())
-    omega = np.array([6.0, 60.0, 600.0])
+    loops, omega = assemble_loops(amber()), np.array([6.0, 60.0, 600.0])
     border = onset(loops, omega)
     assert border.active == ("speed", "current", "current")
     np.testing.assert_array_equal(border.amplitude_rad, np.min(list(border.each_rad.values()), axis=0))
     half = onset(loops, omega, bias={"speed": -942.5 / 2})
     assert half.amplitude_rad[0] == pytest.approx(border.amplitude_rad[0] / 2)
-    gone = onset(loops, omega, bias={"speed": 2000.0})
-    assert gone.amplitude_rad[0] == 0
+    assert onset(loops, omega, bias={"speed": 2000.0}).amplitude_rad[0] == 0
 
 
 def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
@@ -67,7 +64,7 @@ def test_the_command_of_a_speed_drive_is_that_of_the_output() -> None:
     a_speed = motor.back_emf_constant_Vs_rad + motor.resistance_ohm * viscous / motor.torque_constant_Nm_A
     wanted = design.limits.voltage_V / (design.total_ratio * a_speed)
     for form in ("sampled", "continuous", "ideal"):
-        border = onset(assemble_loops(design, form), [1e-3])  # type: ignore[arg-type]
+        border = onset(assemble_loops(design, form), [1e-3])
         assert border.each_rad["voltage"] == pytest.approx(wanted, rel=1e-6)
 
 
@@ -92,8 +89,7 @@ def test_results_end_at_nyquist() -> None:
 
 
 def test_three_forms_agree_at_low_frequency() -> None:
-    omega = np.array([1.0, 10.0])
-    design = amber(feedforward=0.5)
+    omega, design = np.array([1.0, 10.0]), amber(feedforward=0.5)
     reference = assemble_loops(design, "ideal").limiters
     for form in ("sampled", "continuous"):
         for name, path in assemble_loops(design, form).limiters.items():

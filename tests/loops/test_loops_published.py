@@ -85,8 +85,7 @@ def test_g6_ctms_motor_position() -> None:
     J, b, K, R, L = 3.2284e-6, 3.5077e-6, 0.0274, 4.0, 2.75e-6
     loops = assemble_loops(ctms_position(), "ideal")
     assert loops.velocity is None
-    omega = np.geomspace(0.1, 1e7, 50)
-    s = 1j * omega
+    s = 1j * np.geomspace(0.1, 1e7, 50)
     expected = K / (s * ((J * s + b) * (L * s + R) + K**2))
     np.testing.assert_allclose(loops.position.open_loop(s), expected, rtol=1e-10)
 
@@ -94,11 +93,9 @@ def test_g6_ctms_motor_position() -> None:
 def test_g6_sampled_with_a_stiff_electrical_pole() -> None:
     """CTMS, Digital Controller Design: ZOH at 1 ms; partial fractions of P(s)/s give the same P(z)."""
     J, b, K, R, L = 3.2284e-6, 3.5077e-6, 0.0274, 4.0, 2.75e-6
-    loop = assemble_loops(ctms_position()).position
-    T = 1e-3
+    loop, T = assemble_loops(ctms_position()).position, 1e-3
     poles = np.roots([J * L, J * R + b * L, b * R + K**2])
-    z = np.exp(1j * np.array([1.0, 10, 100, 1000, 3000]) * T)
-    gain = K / (J * L)
+    z, gain = np.exp(1j * np.array([1.0, 10, 100, 1000, 3000]) * T), K / (J * L)
     # P(s)/s = gain / (s^2 (s - p1)(s - p2)): residues at p1, p2 and the double pole at 0
     c0 = gain / (poles[0] * poles[1])
     c1 = c0 * (1 / poles[0] + 1 / poles[1])

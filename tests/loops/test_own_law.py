@@ -42,7 +42,6 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
         rows["ticks"], rows["load"] = TICKS, 0.1
         rows.series("command", command)
         system = assemble_loops(design).tick_system
-        assert system is not None
         with np.errstate(over="ignore", invalid="ignore"):
             run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
         for name, ours in SIGNALS.items():
@@ -56,9 +55,7 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
 
 @pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
 def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
-    found = drawn(case, stable=True)
-    assert found is not None
-    design, _ = found
+    design, _ = drawn(case, stable=True)
     for place in (*design.controller.stages, *assemble_loops(design).break_points):
         setup = loop_setup(design, place, limits_on=False)
         loops = loops_at(design, setup.bias.operating(design))
@@ -82,7 +79,7 @@ def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
     same = ([], [], [], [[gain]]) if rate is None else ([[0.0]], [[rate]], [[1.0]], [[gain]])
     mine = as_law(design, stage, continuous=same)
     for form in ("sampled", "continuous", "ideal"):
-        ours, theirs = (assemble_loops(each, form) for each in (mine, design))  # type: ignore[arg-type]
+        ours, theirs = (assemble_loops(each, form) for each in (mine, design))
         omega = np.geomspace(1.0, 0.9 * pi / T, 60)
         for name, loop in {**theirs.present, **theirs.break_points}.items():
             other = {**ours.present, **ours.break_points}[name]
@@ -135,8 +132,8 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
         design = base.with_law(stage, system, inputs, L=L, gain=0.7)
         control_, drive = design.controller, Drive(design)
         law, N = PlainLaw(getattr(control_, stage).law), design.total_ratio
-        n_v, n_p = control_.velocity.every, control_.position.every  # type: ignore[union-attr]
-        line, w_ref, i_ref, speed, limited = [0.0, 0.0], 0.0, 0.0, 0.0, 0
+        n_v, every = control_.velocity.every, getattr(getattr(control_, stage), "every", 1)
+        line, last, speed, limited = [0.0, 0.0], 0.0, 0.0, 0
         for k in range(300):
             i, w, th, W = (float(value) for value in rng.standard_normal(4) * (1.0, 5.0, 0.5, 0.1))
             y, command = th / N + 1e-3 * float(rng.standard_normal()), 0.3 * float(np.sin(0.05 * k))
@@ -144,34 +141,22 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
             q, qo = 4096 / (2 * pi), (1 << 14) / (2 * pi)
             counted, out = floor(th * q) / q, floor(y * qo) / qo
             if k % n_v == 0:
-                speed = (counted - line[0]) / (2 * n_v * 1e-4)
-                line = [line[1], counted]
+                speed, line = (counted - line[0]) / (2 * n_v * 1e-4), [line[1], counted]
+            if k % every:
+                continue
+            place = counted if control_.position.sensor == "motor" else N * out
+            amperes = drive.value("current_reference")
+            reference, own, top, step, ours = {
+                "position": (N * command, place, 30.0, 4e4 * T, drive.value("speed_command")),
+                "velocity": (drive.value("speed_reference"), speed, 2.0, 4e3 * T, amperes),
+                "current": (amperes, i, 24.0, inf, u),
+            }[stage]
             seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
-            if stage == "position" and k % n_p == 0:
-                own = counted if control_.position.sensor == "motor" else N * out  # type: ignore[union-attr]
-                v = law.output(seen | {"command": N * command, "error": N * command - own})
-                clamped = min(max(v, -30.0), 30.0)
-                step = 4e4 * T
-                new = w_ref + min(max(clamped - w_ref, -step), step)
-                limited += new != v
-                w_ref = new
-                law.step(w_ref)
-                assert drive.value("speed_command") == pytest.approx(w_ref, rel=1e-12, abs=1e-12)
-            if stage == "velocity" and k % n_v == 0:
-                reference = drive.value("speed_reference")
-                v = law.output(seen | {"command": reference, "error": reference - speed})
-                clamped, step = min(max(v, -2.0), 2.0), 4e3 * T
-                new = i_ref + min(max(clamped - i_ref, -step), step)
-                limited += new != v
-                i_ref = new
-                law.step(i_ref)
-                assert drive.value("current_reference") == pytest.approx(i_ref, rel=1e-12, abs=1e-12)
-            if stage == "current":
-                reference = drive.value("current_reference")
-                v = law.output(seen | {"command": reference, "error": reference - i})
-                limited += abs(v) > 24.0
-                law.step(min(max(v, -24.0), 24.0))
-                assert u == pytest.approx(min(max(v, -24.0), 24.0), rel=1e-12, abs=1e-12)
+            v = law.output(seen | {"command": reference, "error": reference - own})
+            last = float(np.clip(np.clip(v, -top, top), last - step, last + step))
+            limited += last != v
+            law.step(last)
+            assert ours == pytest.approx(last, rel=1e-12, abs=1e-12)
         assert 5 < limited < 290, (stage, limited)
 
 
@@ -202,11 +187,11 @@ def test_every_source_gives_the_same_law(tmp_path: Path) -> None:
         assert read_design_text(write_design(read)).controller == read.controller
     z = np.exp(1j * np.geomspace(1e-3, 3.0, 30))
     tf = control.tf([0.2, -0.15], [1.0, -0.9], T)
-    mine = base.with_law("velocity", tf, ["error"]).controller.velocity.law.sampled  # type: ignore[union-attr]
+    mine = base.with_law("velocity", tf, ["error"]).controller.velocity.law.sampled
     made = control.ss(mine.A, mine.B, mine.C[None], mine.D[None], T)
     np.testing.assert_allclose(made(z), tf(z), rtol=1e-12)
     slow = base.with_law("velocity", control.tf([2.0, 30.0], [1.0, 100.0]), ["error"], method="tustin")
-    law = slow.controller.velocity.law  # type: ignore[union-attr]
+    law = slow.controller.velocity.law
     made = control.ss(law.sampled.A, law.sampled.B, law.sampled.C[None], law.sampled.D[None], T)
     s = 2 / T * (z - 1) / (z + 1)
     np.testing.assert_allclose(made(z), (2 * s + 30) / (s + 100), rtol=1e-9)
@@ -218,8 +203,8 @@ def test_hash_tolerance_and_values_follow() -> None:
     mine = as_law(base, "velocity")
     assert design_hash(mine) != design_hash(base)
     more = mine.with_values({"control.velocity.law.gain": {"value": 1.2, "tolerance": "10 %"}})
-    assert more.parameters["control.velocity.law.gain"].tolerance.half_width == pytest.approx(0.12)  # type: ignore[union-attr]
-    nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))  # type: ignore[union-attr]
+    assert more.parameters["control.velocity.law.gain"].tolerance.half_width == pytest.approx(0.12)
+    nominal, up = (stability_margins(assemble_loops(each).velocity.open_loop) for each in (mine, more))
     assert up.gain_margins[-1].ratio == pytest.approx(nominal.gain_margins[-1].ratio / 1.2, rel=1e-9)
     assert "control.velocity.gain" not in {item.path for item in mine.parameters.values()}
 
@@ -228,7 +213,7 @@ def test_a_law_unstable_of_itself_is_allowed_and_said() -> None:
     base = load_design("ilr33-amber")
     mine = base.with_law("velocity", ([[1.05]], [[0.01]], [[0.01]], [[0.1]], 1e-4), ["error"])
     assert any("unstable of itself, a pole of size 1.05" in line for line in warnings_of(mine))
-    assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None  # type: ignore[union-attr]
+    assert stability_margins(assemble_loops(mine).velocity.open_loop) is not None
 
 
 def refused(call: Any, *arguments: Any) -> str:

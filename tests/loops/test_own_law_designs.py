@@ -16,7 +16,6 @@ from nonlinear import Rows, tangent
 def poles(design: Design) -> np.ndarray:
     """Of the whole closed drive over its period (one tick here)."""
     system = assemble_loops(design).tick_system
-    assert system is not None
     assert system.ticks == 1
     return np.linalg.eigvals(system.matrices(0)[0])
 
@@ -37,18 +36,16 @@ def test_lqg_velocity_controller() -> None:
     system, T = plant(base, command="i_ref"), period_s(base, "velocity")
     seen = [k for k, name in enumerate(system.state_labels) if name != "th"]
     A, B = system.A[np.ix_(seen, seen)], system.B[seen, :1]
-    C = system.C[system.output_labels.index("speed")][None, seen]
-    n = len(A)
+    C, n = system.C[system.output_labels.index("speed")][None, seen], len(A)
     S = solve_discrete_are(A, B, 1e-3 * C.T @ C + 1e-12 * np.eye(n), [[1.0]])
     K = np.linalg.solve(1.0 + B.T @ S @ B, B.T @ S @ A)
     P = solve_discrete_are(A.T, C.T, 1e2 * B @ B.T + 1e-9 * np.eye(n), [[1.0]])
-    G = np.linalg.solve(1.0 + C @ P @ C.T, C @ P @ A.T).T
-    closed = A - B @ K
+    G, closed = np.linalg.solve(1.0 + C @ P @ C.T, C @ P @ A.T).T, A - B @ K
     pre = 1.0 / (C @ np.linalg.solve(np.eye(n) - closed, B)).item()
     law = (closed - G @ C, np.hstack([G, pre * B]), -K, [[0.0, pre]], T)
     mine = base.with_law("velocity", law, ["speed", "command"], L=B)
     same_poles(poles(mine), np.concatenate([np.linalg.eigvals(closed), np.linalg.eigvals(A - G @ C)]), 1e-7)
-    assert stability_margins(assemble_loops(mine).velocity.open_loop).stable  # type: ignore[union-attr]
+    assert stability_margins(assemble_loops(mine).velocity.open_loop).stable
     # the observer knows what the limit left of its output: a step far into the current limit does not wind up
     limited = replace(mine, limits=replace(load_design("ilr33-amber").limits, speed_rad_s=np.inf))
     rows = Rows.of(limited)
@@ -60,9 +57,7 @@ def test_lqg_velocity_controller() -> None:
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
 
 
-def bilinear(
-    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0
-) -> tuple[np.ndarray, ...]:
+def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0):
     """s = (z - 1)/(z + 1): sampled to continuous, or back with ``way`` -1; the unit circle is the axis."""
     one = np.eye(len(A))
     inverse = np.linalg.inv(one + way * A)
@@ -78,7 +73,7 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
     T, k = period_s(base, "position"), 100.0
     gain = base.controller.position_loop.gain
-    open_loop = assemble_loops(base).position.open_loop  # type: ignore[union-attr]
+    open_loop = assemble_loops(base).position.open_loop
     A, B, C, D = bilinear(open_loop.A, open_loop.B * k / gain, open_loop.C, np.zeros((1, 1)))
     n, R = len(A), 1.0 + D.item() ** 2
     assert n == 6
@@ -86,26 +81,21 @@ def test_h_infinity_position_controller_of_order_6() -> None:
     Z = solve_continuous_are(left.T, C.T, B @ B.T / R, np.array([[R]]))
     X = solve_continuous_are(left, B, C.T @ C / R, np.array([[R]]))
     optimum = float(np.sqrt(1.0 + np.max(np.abs(np.linalg.eigvals(X @ Z)))))
-    gamma = 1.1 * optimum
-    F = -(D.T @ C + B.T @ X) / R
+    gamma, F = 1.1 * optimum, -(D.T @ C + B.T @ X) / R
     W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
     H = gamma**2 * W @ Z @ C.T
     continuous = A + B @ F + H @ (C + D @ F)
     Ak, Bk, Ck, Dk = bilinear(continuous, H, B.T @ X, -D.T, -1.0)
     mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
-    law = mine.controller.position_loop.law
-    assert law is not None
-    assert len(law.A) == 6
+    assert len(mine.controller.position_loop.law.A) == 6
     loop = assemble_loops(mine).position
-    assert loop is not None
     assert stability_margins(loop.open_loop).stable
     z = np.exp(1j * np.geomspace(1e-4, np.pi * 0.9999, 4000))
     L, P = loop.open_loop(z), open_loop(z) * k / gain
     K = L / P  # of what runs, in units of the shaped plant
     norm = np.sqrt((1.0 + np.abs(K) ** 2) * (1.0 + np.abs(P) ** 2)) / np.abs(1.0 + L)
     assert optimum * (1 - 1e-6) < norm.max() < gamma * (1 + 1e-6)
-    model = tangent(mine, "position")
-    assert np.abs(model.open(z[::100]) / L[::100] - 1.0).max() < 1e-6
+    assert np.abs(tangent(mine, "position").open(z[::100]) / L[::100] - 1.0).max() < 1e-6
 
 
 def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
@@ -134,9 +124,7 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     rows["ticks"] = int(0.3 / T)
     rows.step("command", 0.1)
     assert abs(rows.trajectory().output_angle_rad[-1] - 0.1) < 1e-7
-    loop = assemble_loops(mine).position
-    assert loop is not None
-    z = np.exp(1j * np.geomspace(1e-3, 3.0, 50))
+    loop, z = assemble_loops(mine).position, np.exp(1j * np.geomspace(1e-3, 3.0, 50))
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)
@@ -146,7 +134,6 @@ def test_torque_loop_on_the_twist() -> None:
     """PI on the spring's torque: the loop is k times the plant's response; at rest the torque is exact."""
     base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
     coupling = base.coupling
-    assert coupling is not None
     base = replace(controlled(base, position=None), load=replace(base.load, inertia_kgm2=1e9))
     T, k = period_s(base, "velocity"), coupling.stiffness_Nm_rad
     kp, ki, per_command = 2e-3, 0.4, 5.0  # A/(N m), A/(N m s), N m per rad/s of the command
@@ -154,7 +141,6 @@ def test_torque_loop_on_the_twist() -> None:
     law = ([[1.0]], [ki * T * row], [[1.0]], [(kp + ki * T) * row], T)
     mine = base.with_law("velocity", law, ["command", "angle", "output_angle"])
     loop = assemble_loops(mine).velocity
-    assert loop is not None
     assert stability_margins(loop.open_loop).stable
     system, ticks = plant(base, command="i_ref"), round(T / base.controller.period_s)
     A, B, C = system.A, system.B[:, :1], system.C[[system.output_labels.index("twist")]]
@@ -167,4 +153,4 @@ def test_torque_loop_on_the_twist() -> None:
     rows["ticks"] = int(4.0 / base.controller.period_s)
     rows.step("command", 3.0 / base.total_ratio)
     run = rows.trajectory()
-    assert abs(run.coupling_torque_Nm[-1] / (3.0 * per_command) - 1.0) < 1e-6  # type: ignore[index]
+    assert abs(run.coupling_torque_Nm[-1] / (3.0 * per_command) - 1.0) < 1e-6

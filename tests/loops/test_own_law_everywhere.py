@@ -75,10 +75,8 @@ def test_many_designs_have_the_gain_of_the_law() -> None:
 
 def test_torque_at_rest() -> None:
     """Of a static law the product of the gains; a law that integrates has no end of it."""
-    design = load_design("ilr33-amber")
-    base = controlled(design, velocity={"integral_time_s": None})
-    gain = base.controller.velocity.gain  # type: ignore[union-attr]
-    T = period_s(base, "velocity")
+    base = controlled(load_design("ilr33-amber"), velocity={"integral_time_s": None})
+    gain, T = base.controller.velocity.gain, period_s(base, "velocity")
     static = base.with_law("velocity", ([[0.5]], [[0.5]], [[0.4 * gain]], [[0.6 * gain]], T), ["error"])
     assert torque_gain_Nm_rad(static) == pytest.approx(torque_gain_Nm_rad(base), rel=1e-12)
     assert torque_gain_Nm_rad(lead("velocity")) == np.inf

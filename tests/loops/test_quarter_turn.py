@@ -15,6 +15,7 @@ from actuator_lti.drive.operating import Operating, moment_slope
 from analyses.linear.loop_figures import all_loop_figures
 
 QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
+SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 
 
 def level(offset_rad: float) -> Gravity:
@@ -31,8 +32,7 @@ def test_level_is_without_slope(name: str, offset: float) -> None:
         for loop in theirs:
             a, b = ours[loop].plain_open, theirs[loop].plain_open
             np.testing.assert_array_equal(a.A, b.A)
-    sampled = assemble_loops(with_it)
-    for loop in sampled.present.values():
+    for loop in assemble_loops(with_it).present.values():
         m = stability_margins(loop.open_loop)
         assert m.stable is True
         assert all(abs(g.db) < 200.0 for g in m.gain_margins)
@@ -58,9 +58,6 @@ def test_a_slope_beside_it_stays() -> None:
     many = slope(replace(level(0.0), offset_rad=offsets))
     assert many.tolist() == [slope(level(each)) for each in offsets]
     assert (many == 0.0).tolist() == [False, True, False, True]
-
-
-SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
 
 
 @pytest.mark.parametrize("slope", SLOPES)

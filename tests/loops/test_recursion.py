@@ -56,6 +56,8 @@ ESTIMATES = (
     model.Encoder(speed="difference", difference_samples=3),
     model.Encoder(speed="difference", difference_samples=2, filter_time_s=8e-4),
 )
+LATE = [{"delay_s": delay * TICK} for delay in DELAYS]
+ESTIMATED = [{"delay_s": 1.5e-4, "feedforward": 0.8, "encoder": encoder} for encoder in ESTIMATES]
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -64,13 +66,7 @@ def test_every_kind_of_drive(name: str) -> None:
 
 
 @pytest.mark.parametrize("rates", RATES)
-@pytest.mark.parametrize(
-    "changes",
-    [
-        *({"delay_s": delay * TICK} for delay in DELAYS),
-        *({"delay_s": 1.5e-4, "feedforward": 0.8, "encoder": encoder} for encoder in ESTIMATES),
-    ],
-)
+@pytest.mark.parametrize("changes", [*LATE, *ESTIMATED])
 def test_delays_rates_and_speed_estimates(changes: dict[str, Any], rates: tuple[int, int]) -> None:
     ticks = 20_000 if changes == {"delay_s": 1.5 * TICK} else 4000
     agree(amber(*rates, **changes), ticks, 1e-10, torque=-2.25e-3, start=START)
@@ -144,8 +140,7 @@ def test_any_design_from_any_start(design: model.Design) -> None:
 def test_the_gate_has_teeth() -> None:
     """A notch moved by 0.1 %, or 1 % of a tick of delay more, is far outside the tolerance."""
     design = everything()
-    velocity = design.controller.velocity
-    assert velocity.filters == FILTERS
+    assert design.controller.velocity.filters == FILTERS
     moved = replace(FILTERS[1], frequency_rad_s=900.9)
     other = controlled(design, velocity={"filters": (FILTERS[0], moved, *FILTERS[2:])})
     late = controlled(amber(), computing_delay_s=1.01e-4)
@@ -168,10 +163,6 @@ def test_lifted_system_in_forced_response(rates: tuple[int, int]) -> None:
         assert worst(stacked[:, :, r].reshape(-1), direct[name]) < 1e-11
 
 
-def _fundamental(values: np.ndarray, z: complex) -> complex:
-    return complex(np.sum(values * z ** -np.arange(len(values))))
-
-
 @pytest.mark.parametrize(("point", "every"), [("u", 1), ("i_ref", 2), ("w_ref", 10)])
 def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(point: str, every: int) -> None:
     """Inject a sinusoid into the running cascade; fundamentals before and after give L = -before/after."""
@@ -184,7 +175,8 @@ def test_a_response_analyser_on_the_multirate_drive_sees_the_break_point_loop(po
         d = np.cos(omega * TICK * np.arange(4 * window))
         record = run(design, np.zeros(4 * window), inject={point: d})[point]
         z = np.exp(1j * omega * every * TICK)
-        before, at_point = (_fundamental(each[-window // every :], z) for each in (record, d[::every]))
+        turns = z ** -np.arange(window // every)
+        before, at_point = (np.sum(each[-window // every :] * turns) for each in (record, d[::every]))
         after = before + at_point
         assert loop.open_loop(z) == pytest.approx(-before / after, rel=1e-6)
         assert loop.sensitivity(z) == pytest.approx(after / at_point, rel=1e-6)

@@ -9,7 +9,8 @@ import pytest
 from loop_designs import controlled, sprung
 from mpmath import lu_solve, matrix, mp
 
-from actuator_lti import closed_loop_bandwidth, read_design_text, stability_margins, step_figures
+from actuator_lti import closed_loop_bandwidth, stability_margins, step_figures
+from actuator_lti.design import model
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops, exact_margins
@@ -21,6 +22,7 @@ from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
 SLOPES = (-6000.0, -100.0, -0.1, 50.0)
+CURRENT = {"current": model.CurrentLoop(gain_V_A=0.5, integral_time_s=1e-3)}
 
 
 def at_rest(design: Any) -> float:
@@ -34,8 +36,7 @@ def at_rest(design: Any) -> float:
 @pytest.mark.parametrize("form", ["sampled", "ideal", "continuous"])
 def test_the_velocity_loop_has_the_gain_at_zero_that_the_spring_gives(form: Any, slope: float) -> None:
     design = sprung("ilr33-amber", slope)
-    loop = assemble_loops(design, form=form).velocity
-    L0 = at_rest(design)
+    loop, L0 = assemble_loops(design, form=form).velocity, at_rest(design)
     m = stability_margins(loop.open_loop)
     assert m.evidence in ("checked", "certified")
     assert m.stable is True
@@ -133,8 +134,7 @@ def test_a_users_own_loop_of_that_kind_has_its_bandwidth(slope: float) -> None:
     assert width.minus3db_rad_s == pytest.approx(expected.minus3db_rad_s, rel=1e-9)
     assert width.resonance_peak_db == pytest.approx(expected.resonance_peak_db, rel=1e-9)
     grid = np.geomspace(1.0, 1e4, 4000)
-    gain = np.abs(T(np.exp(1j * grid * 1e-4)))
-    L0 = at_rest(design)
+    gain, L0 = np.abs(T(np.exp(1j * grid * 1e-4))), at_rest(design)
     assert width.resonance_peak_db == pytest.approx(20 * np.log10(gain.max() * (1 + L0) / L0), abs=1e-4)
 
 
@@ -184,44 +184,27 @@ def test_the_mode_at_rest_is_no_border_of_stability(slope: float) -> None:
     assert exact.gain_lower == pytest.approx(max(below, default=0.0), rel=1e-9)
 
 
-SERVO = """
-[design]
-name = "rc"
-[motor]
-resistance = "2.1 ohm"
-inductance = "0.25 mH"
-torque_constant = "6 mN*m/A"
-back_emf_constant = "6 mV*s/rad"
-rotor_inertia = "1.2 g*cm^2"
-[friction]
-dry_torque = "0.3 mN*m"
-[[gear]]
-name = "spur"
-ratio = 200
-[limits]
-voltage = "7.4 V"
-[control]
-period = "500 us"
-computing_delay = "100 us"
-"""
-WITHOUT = """
-[control.velocity]
-gain = "0.02 V*s/rad"
-[control.position]
-gain = "30 1/s"
-[validation]
-full_deflection = "30 deg"
-"""
-WITH_CURRENT_LOOP = '[control.current]\ngain = "0.5 V/A"\nintegral_time = "1 ms"' + WITHOUT.replace(
-    "V*s", "A*s"
-)
+def servo(gain: float = 0.02, **stages: Any) -> model.Design:
+    """Of radio control, without viscous friction; P loops of speed and position."""
+    constants = {"torque_constant_Nm_A": 6e-3, "back_emf_constant_Vs_rad": 6e-3}
+    stages |= {"velocity": model.VelocityLoop(gain=gain, integral_time_s=None)}
+    stages |= {"position": model.PositionLoop(gain=30.0)}
+    return model.Design(
+        name="rc",
+        motor=model.Motor(rotor_inertia_kgm2=1.2e-7, resistance_ohm=2.1, inductance_H=2.5e-4, **constants),
+        friction=model.Friction(dry_torque_Nm=3e-4),
+        gears=(model.Gear(name="spur", ratio=200.0),),
+        limits=model.Limits(voltage_V=7.4),
+        controller=model.Controller(period_s=5e-4, computing_delay_s=1e-4, **stages),
+        validation=model.Validation(full_deflection_rad=0.5),
+    )
 
 
 @pytest.mark.parametrize("form", ["sampled", "continuous", "ideal"])
-@pytest.mark.parametrize("control", [WITH_CURRENT_LOOP, WITHOUT])
-def test_a_servo_without_viscous_friction_is_stable_in_every_form(form: Any, control: str) -> None:
+@pytest.mark.parametrize("stages", [CURRENT, {}])
+def test_a_servo_without_viscous_friction_is_stable_in_every_form(form: Any, stages: dict[str, Any]) -> None:
     """The pole of the PI at zero lies on the zero of the plant; neither overflows on the way."""
-    loops = assemble_loops(read_design_text(SERVO + control, "rc"), form=form)
+    loops = assemble_loops(servo(**stages), form=form)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for loop in (loops.current, loops.velocity, loops.position):
@@ -236,8 +219,7 @@ def test_a_gain_of_one_at_rest_has_its_distances(certify: bool) -> None:
 
     Whether |L| crosses one beside zero frequency is a question for exact arithmetic, asked or not.
     """
-    text = SERVO + WITHOUT.replace("0.02 V*s/rad", "6 mV*s/rad")
-    loop = assemble_loops(read_design_text(text, "rc"), form="continuous").velocity
+    loop = assemble_loops(servo(6e-3), form="continuous").velocity
     result = stability_margins(loop.open_loop, certify=certify)
     assert result.stable is True
     assert result.evidence == "certified"
@@ -258,8 +240,7 @@ def test_a_weak_spring_is_told_from_none(slope: float) -> None:
 
 def test_the_gain_at_rest_of_a_current_loop_on_a_free_rotor() -> None:
     """L(0) = Kp/Tn J/(kM kE): at constant current the ramp of the PI is one of the back-EMF."""
-    design = read_design_text(SERVO + WITH_CURRENT_LOOP, "rc")
-    loop = assemble_loops(design, form="continuous").current
+    loop = assemble_loops(servo(**CURRENT), form="continuous").current
     at_rest = 0.5 / 1e-3 * 1.2e-7 / 6e-3**2
     dc_gain = closed_loop_bandwidth(loop.closed_loop).dc_gain
     assert dc_gain == pytest.approx(at_rest / (1.0 + at_rest), rel=1e-9)

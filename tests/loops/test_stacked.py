@@ -30,6 +30,7 @@ MAP = tuple(
     FrictionPoint(speed_rad_s=speed, torque_Nm=torque)
     for speed, torque in ((0.0, 3e-3), (20.0, 2e-3), (90.0, 2.6e-3), (400.0, 4e-3))
 )
+STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def everything() -> Design:
@@ -135,9 +136,7 @@ def same(blocks: list[Any], k: int) -> None:
         (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
     ],
 )
-def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(
-    design: Design, k: int, loop: str, told: bool
-) -> None:
+def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(design, k, loop, told):
     values = scattered(design, k + 1)
     figures = linear_figures(Population(design, values, k + 1), time_figures=False)
     alone = stacked(design, {path: float(array[k]) for path, array in values.items()})
@@ -163,9 +162,6 @@ def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope:
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
     closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
     assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
-
-
-STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def rich() -> Design:

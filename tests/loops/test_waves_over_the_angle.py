@@ -5,7 +5,7 @@ from math import acos, asin, cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from loop_designs import controlled
+from loop_designs import controlled, source_drive
 
 from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
@@ -19,6 +19,8 @@ from nonlinear.bench.operating_motion import operating_motion
 from tests.changed import changed
 
 J, N, Ts, A, PHASE = 2e-5, 8.0, 1e-4, 4e-3, 2.5
+HELD = r" = .*: held over a tick,? .*; allowed: at most"
+D = 3.0  # N m s/rad
 
 
 @dataclass(frozen=True)
@@ -37,34 +39,20 @@ class Case:
         return (pi - PHASE) / self.order
 
     def put(self, design: model.Design) -> model.Design:
-        """Add it to a drive."""
-        if self.name == "cogging":
-            motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
-            return replace(design, motor=motor)
-        load = replace(
-            design.load, gear_error_Nm=A * N, gear_error_periods=self.order * N, gear_error_phase_rad=PHASE
-        )
-        return replace(design, load=load)
+        part, key, N_ = ("motor", "cogging", 1.0) if self.name == "cogging" else ("load", "gear_error", N)
+        waves = {f"{key}_Nm": A * N_, f"{key}_periods": self.order * N_, f"{key}_phase_rad": PHASE}
+        return changed(design, **{part: waves})
 
 
 CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
 each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-def rotor(
-    viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
-) -> model.Design:
+def rotor(viscous=0.0, load_coefficient=0.0, path="back-drivable", damping=0.0) -> model.Design:
     """A torque source without a controller, so that the rotor coasts."""
-    return model.Design(
-        name="rotor",
-        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
-        gears=(model.Gear(name="one", ratio=N),),
-        controller=model.Controller(period_s=Ts, computing_delay_s=0.0),
-        limits=model.Limits(voltage_V=10.0),
-        validation=model.Validation(full_deflection_rad=1.0),
-        load=model.Load(path=path, moment_damping_Nms_rad=damping),
-        friction=model.Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
-    )
+    load, gears = {"path": path, "moment_damping_Nms_rad": damping}, (model.Gear(name="one", ratio=N),)
+    friction = {"viscous_Nms_rad": viscous, "load_coefficient": load_coefficient}
+    return source_drive(J, 1.0, Ts, 10.0, gears=gears, load=load, friction=friction)
 
 
 @each
@@ -173,9 +161,6 @@ def test_every_wave_has_its_place_in_the_row() -> None:
     assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
 
 
-HELD = r" = .*: held over a tick,? .*; allowed: at most"
-
-
 @pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
 def test_keys_of_a_wave(name: str) -> None:
     fin, part, peak = load_design("fin"), name.partition(".")[0], 0.1 if name.startswith("load") else 5e-3
@@ -209,8 +194,7 @@ def test_cogging_of_a_screw_is_over_the_angle_of_its_motor() -> None:
 
 def test_a_self_locking_drive_feels_its_cogging() -> None:
     """It holds the rotor against a torque below its peak, whatever the load path."""
-    amber = load_design("ilr33-amber")
-    plain = replace(amber, friction=model.Friction(viscous_Nms_rad=2e-4))
+    plain = replace(load_design("ilr33-amber"), friction=model.Friction(viscous_Nms_rad=2e-4))
     design = CASES[1].put(plain)
     assert design.load.path == "self-locking"
     assert follows_angle(design)
@@ -259,9 +243,6 @@ def test_a_drive_that_stands_stays_and_takes_the_slope_of_where_it_stands(case: 
     assert np.max(np.abs(seen - expected)) < 1e-6 * np.max(np.abs(expected))
 
 
-D = 3.0  # N m s/rad
-
-
 def ratio(viscous: float, slope: float) -> float:
     """w_(k+1)/w_k under the torque -slope w_k, held over a tick, and viscous friction."""
     if viscous == 0.0:
@@ -272,8 +253,7 @@ def ratio(viscous: float, slope: float) -> float:
 
 @pytest.mark.parametrize("viscous", [0.0, 1e-3])
 def test_a_rotor_coasts_to_the_held_recursion(viscous: float) -> None:
-    design = rotor(viscous, damping=D)
-    expected = ratio(viscous, D / N**2)
+    design, expected = rotor(viscous, damping=D), ratio(viscous, D / N**2)
     run = simulate(design, commands.hold(), 50 * Ts, initial=State(motor_speed_rad_s=-80.0))
     w = run.motor_speed_rad_s
     assert w == pytest.approx(-80.0 * expected ** np.arange(w.size), rel=1e-12)

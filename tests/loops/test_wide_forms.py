@@ -1,7 +1,6 @@
 """The wider drive in all three forms: limits of the sampled one, hand-made transfer functions, budgets."""
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, delay_budget
-from actuator_lti.design.model import Design, Encoder, Filter, Limits, PositionLoop
+from actuator_lti.design.model import Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
 from analyses import survey_loops
@@ -22,9 +21,7 @@ from reports.sections.delays import section
     ("drive", "final", "order"), [(amber(2, 10), 5e-3, (1.9, 2.1)), (everything(), 0.02, (1.8, np.inf))]
 )
 @pytest.mark.parametrize("form", ["sampled", "continuous"])
-def test_every_form_of_a_drive_tends_to_the_ideal_one(
-    form: Any, drive: Design, final: float, order: tuple[float, float]
-) -> None:
+def test_every_form_of_a_drive_tends_to_the_ideal_one(form, drive, final, order):
     """First order in Ts for every loop, break point, the command and the moment."""
     omega, ideal, worst = np.array([20.0, 100.0, 300.0]), assemble_loops(drive, "ideal"), []
     for factor in (64, 128):
@@ -84,8 +81,7 @@ def test_faces_of_the_blocks_agree_at_low_frequency() -> None:
     gained = (1 - 1 / z) / (1j * omega)
     np.testing.assert_allclose(block.at_z(omega) * gained, block.at_s(omega), rtol=5e-3)
     for item in FILTERS:  # Tustin, prewarped: exact at its own frequency
-        centre = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5
-        block = biquad(item, T)
+        centre, block = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5, biquad(item, T)
         at = np.array([centre])
         np.testing.assert_allclose(block.at_z(at), block.at_s(at), rtol=1e-10)
     with pytest.raises(InputError, match="below pi/T"):
@@ -109,8 +105,7 @@ def test_the_budget_has_a_share_for_each_filter() -> None:
     for name in ("velocity", "position"):
         assert len(delay_budget(design, name, omega).filters_deg) == 5
     unfed = controlled(design, current={"back_emf_feedforward": 0.0})
-    shares = delay_budget(unfed, "velocity", omega).filters_deg
-    s = 1j * omega
+    shares, s = delay_budget(unfed, "velocity", omega).filters_deg, 1j * omega
     own = np.angle(2000.0**2 / (s**2 + np.sqrt(2) * 2000.0 * s + 2000.0**2), deg=True)
     assert shares["torque lowpass 1 2000 rad/s"] == pytest.approx(own, abs=1e-6)
     assert shares["speed filter 5000 rad/s"] == pytest.approx(-np.degrees(np.arctan(omega * 2e-4)), abs=1e-6)
@@ -162,17 +157,10 @@ def test_any_loop_goes_through_python_control() -> None:
 
 def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() -> None:
     """A bare D is proper in front of this plant, as the angle's derivative is a state."""
-    base = drive_e()
-    bare = PositionLoop(gain=20.0, derivative_time_s=2e-3)
+    base, bare = drive_e(), PositionLoop(gain=20.0, derivative_time_s=2e-3)
     loop = assemble_loops(controlled(base, position=bare), "ideal").position
-    plain = assemble_loops(base, "ideal").position
-    s = 1j * np.geomspace(1, 1000, 10)
+    plain, s = assemble_loops(base, "ideal").position, 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
-
-
-def test_encoder_tracking_needs_its_bandwidth() -> None:
-    with pytest.raises(InputError, match="bandwidth"):
-        assemble_loops(replace(drive_d(), encoder=Encoder(speed="tracking")))
 
 
 def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:

@@ -16,8 +16,6 @@ def validated() -> list[dict[str, Any]]:
 
 
 class Built(NamedTuple):
-    """A report on disk and the document it was made of."""
-
     document: dict[str, Any]
     page: Path
     data: Path

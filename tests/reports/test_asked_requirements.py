@@ -8,7 +8,7 @@ import pytest
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES
 from actuator_lti.batch import variable_paths
 from actuator_lti.design import design_hash, load_design, read_design_text, with_overrides, write_design
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Requirement
 from analyses.corners import corners
 from analyses.duty import Asked as DutyAsked
 from analyses.duty import duty
@@ -24,9 +24,7 @@ TABLES = {
 }  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def fin() -> Design:
-    return with_overrides(load_design("fin"), TABLES)
+FIN = with_overrides(load_design("fin"), TABLES)
 
 
 def requirement(quantity: str, **limits: float) -> Requirement:
@@ -34,38 +32,38 @@ def requirement(quantity: str, **limits: float) -> Requirement:
     return Requirement(id=quantity, quantity=quantity, unit=unit, **limits)
 
 
-def test_the_tables_are_read_and_written(fin: Design) -> None:
-    again = read_design_text(write_design(fin), "again")
-    assert (again.failure, again.duty) == (fin.failure, fin.duty)
-    asked, wanted = Asked.of(fin), DutyAsked.of(fin)
+def test_the_tables_are_read_and_written() -> None:
+    again = read_design_text(write_design(FIN), "again")
+    assert (again.failure, again.duty) == (FIN.failure, FIN.duty)
+    asked, wanted = Asked.of(FIN), DutyAsked.of(FIN)
     assert asked.detection_s == pytest.approx(0.02)
     assert asked.load_Nm == 2.0
     assert (wanted.frequency_hz, wanted.share, wanted.cycle_s) == (pytest.approx(2.0), 0.5, 20.0)
-    assert Asked.of(fin, load_Nm=1.0).load_Nm == 1.0
-    assert not any(path.startswith(("failure.", "duty.")) for path in variable_paths(fin))
+    assert Asked.of(FIN, load_Nm=1.0).load_Nm == 1.0
+    assert not any(path.startswith(("failure.", "duty.")) for path in variable_paths(FIN))
 
 
-def test_what_is_asked_is_in_the_hash_only_where_it_is_asked(fin: Design) -> None:
-    assert design_hash(replace(fin, failure=None)) != design_hash(fin)
+def test_what_is_asked_is_in_the_hash_only_where_it_is_asked() -> None:
+    assert design_hash(replace(FIN, failure=None)) != design_hash(FIN)
     bare = load_design("fin")
     assert design_hash(read_design_text(write_design(bare), "again")) == design_hash(bare)
 
 
-def test_every_requirement_reads_its_analysis(fin: Design) -> None:
+def test_every_requirement_reads_its_analysis() -> None:
     """Each value is that of the analysis asked by itself; limits on either side of it pass and fail."""
     wanted = {
-        "hard_over_time": failures(fin).case("hard-over").to_stop_s,
-        "failure_deflection": degrees(max(one.at_detection_rad for one in failures(fin).cases)),
-        "failure_moment": max(one.peak_moment_Nm for one in failures(fin).cases),
-        "duty_current": duty(fin).rms_A,
-        "winding_temperature": duty(fin).heating.final_degC,
-        "limit_cycle": 0.0 if limit_cycles(fin).hunting is None else None,
+        "hard_over_time": failures(FIN).case("hard-over").to_stop_s,
+        "failure_deflection": degrees(max(one.at_detection_rad for one in failures(FIN).cases)),
+        "failure_moment": max(one.peak_moment_Nm for one in failures(FIN).cases),
+        "duty_current": duty(FIN).rms_A,
+        "winding_temperature": duty(FIN).heating.final_degC,
+        "limit_cycle": 0.0 if limit_cycles(FIN).hunting is None else None,
     }
     for shift in (1e-3, -1e-3):
         lower = {name: ANALYSIS_QUANTITIES[name].better > 0 for name in wanted}
         limits = {name: {"minimum" if lower[name] else "maximum": wanted[name] + shift} for name in wanted}
         asked = tuple(requirement(name, **limit) for name, limit in limits.items())
-        for one in evaluate_requirements(replace(fin, requirements=asked)):
+        for one in evaluate_requirements(replace(FIN, requirements=asked)):
             assert one.value == pytest.approx(wanted[one.id], rel=1e-9), one.id
             assert (one.verdict == "met") is (lower[one.id] is (shift < 0.0)), one.id
 

@@ -109,7 +109,6 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
         "all => all.filter(r => r.textContent === 'speed limit').map(r => +r.getAttribute('width'))",
     )
     ends = page.locator('[data-chart="run"] .panel').nth(1).get_attribute("data-x")
-    assert ends is not None
     left, right = map(float, ends.split(" ")[3:])
     assert 0.1 < acting < 0.99
     assert sum(boxes) / (right - left) == pytest.approx(acting, abs=0.01)
@@ -117,12 +116,8 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
 
 
 def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
-    svg = page.locator('[data-chart="border"] .plot')
-    svg.scroll_into_view_if_needed()
-    box = svg.bounding_box()
-    assert box is not None
     ask(page, "step", Duration=0.0)
-    at = (box["x"] + 0.35 * box["width"], box["y"] + 0.4 * box["height"])
+    at = page.spot('[data-chart="border"] .plot', 0.35, 0.4)
     page.settled(lambda: page.mouse.click(*at))
     assert page.input_value(".run-kind") == "sine"
     trial = page.evaluate(

@@ -24,6 +24,7 @@ SCREENS = {
     "desktop, dark": {**DESK, "color_scheme": "dark"},
     "phone": {"viewport": {"width": 390, "height": 844}, "color_scheme": "light"},
 }
+FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
 
 
 @pytest.mark.parametrize("screen", SCREENS)
@@ -50,15 +51,11 @@ def test_dark_and_light_differ(opens, built: Built) -> None:
     assert len(colours) == 4
 
 
-FIRST = (".overall", ".weakest", ".said", ".bars", "#answer figure.half", ".findings")
-
-
 def test_the_first_screen_is_one_screen_and_the_open_page_few(opens, built: Built) -> None:
     page = opens(built.page, **DESK)
     for selector in FIRST:
         for part in page.locator(selector).all():
             box = part.bounding_box()
-            assert box is not None
             assert 0 <= box["y"] <= 900 - box["height"], (selector, box)
     assert page.locator(".findings li").count() <= 3
     assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900

@@ -29,8 +29,7 @@ finite = st.floats(-1e9, 1e9, allow_nan=False)
 def value_of(words: str) -> float:
     """Read a tick label as a number."""
     plain = words.translate(str.maketrans("−⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "--0123456789"))
-    scale = {"k": 1e3, "M": 1e6}.get(plain[-1], 1.0)
-    plain = plain.rstrip("kM")
+    scale, plain = {"k": 1e3, "M": 1e6}.get(plain[-1], 1.0), plain.rstrip("kM")
     if plain.startswith("10-") or (plain.startswith("10") and "⁰" in words):
         return 10.0 ** float(plain[2:]) * scale
     mantissa, _, power = plain.partition("×10")
@@ -62,9 +61,7 @@ def test_log_ticks_lie_inside_and_say_their_value(power: float, decades: float) 
 
 
 @given(st.floats(0.01, 1e4), st.floats(1.5, 1e6), st.floats(0.0, 1.0), st.booleans(), st.booleans())
-def test_an_axis_places_its_ends_and_what_lies_between(
-    low: float, ratio: float, part: float, log: bool, reversed_: bool
-) -> None:
+def test_an_axis_places_its_ends_and_what_lies_between(low, ratio, part, log, reversed_):
     axis = Axis(log=log, reversed=reversed_)
     axis.limits(low, low * ratio)
     value = low * ratio**part if log else low + part * (low * ratio - low)
@@ -108,8 +105,7 @@ def test_gaps_break_a_line() -> None:
 def test_the_points_of_a_curve_are_where_its_values_are() -> None:
     """Read pixels back by the axes in the picture: the values again, to a thousandth of the frame."""
     chart = Chart(width=400, height=300)
-    panel = chart.panel()
-    f = np.geomspace(0.1, 1000.0, 50)
+    panel, f = chart.panel(), np.geomspace(0.1, 1000.0, 50)
     panel.x.log = True
     panel.curve(f, -20.0 * np.log10(f))
     svg = page_svg(chart, "f", "")
@@ -139,8 +135,7 @@ def test_equal_axes_have_equal_units() -> None:
 
 @given(st.integers(0, 10_000))
 def test_words_keep_off_curves_and_each_other_where_there_is_room(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    room = Room((0.0, 0.0, 400.0, 300.0))
+    rng, room = np.random.default_rng(seed), Room((0.0, 0.0, 400.0, 300.0))
     x = np.linspace(0.0, 400.0, 40)
     y = 150.0 + 60.0 * np.sin(x / rng.uniform(30.0, 90.0) + rng.uniform(0.0, 6.0))
     room.add_line(x, y)

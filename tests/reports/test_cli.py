@@ -173,9 +173,7 @@ def test_progress_stays_off_where_nobody_looks(capsys) -> None:
 
 
 @pytest.mark.parametrize("command", ["report", "validate", "compare", "tune", "montecarlo"])
-def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(
-    command: str, tmp_path, cli, monkeypatch
-) -> None:
+def test_a_folder_that_cannot_be_is_refused_before_anything_is_computed(command, tmp_path, cli, monkeypatch):
     def unwanted(*_: object) -> None:
         raise AssertionError("the design was read before the folder was looked at")
 

@@ -46,8 +46,7 @@ def test_a_declared_analysis_stands_in_its_group_and_in_the_report() -> None:
 def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     design = load_design("emps")
     result = stiffness(design)
-    told = as_json(result)
-    derived = {"verdict", "passed", "lost_motion_difference"}
+    told, derived = as_json(result), {"verdict", "passed", "lost_motion_difference"}
     assert set(told) == {field.name for field in fields(Stiffness)} | derived
     assert told["design"] == {"name": "emps", "hash": design_hash(design)}
     own, seen = told["checks"][0], result.checks[0]
@@ -60,8 +59,7 @@ def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
 
 def test_the_page_of_a_command_is_its_section(tmp_path, cli) -> None:
     shown = cli.text("stiffness", "emps", "--out", tmp_path, "--quiet")
-    made = load(tmp_path / "stiffness.json")
-    first = made["sections"][0]
+    first = load(tmp_path / "stiffness.json")["sections"][0]
     assert shown.splitlines()[0] == f"PASS  emps: {first['result']}"
     assert "<svg" in (tmp_path / "stiffness.html").read_text(encoding="utf-8")
     for block in first["blocks"]:

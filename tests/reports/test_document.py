@@ -15,13 +15,15 @@ from reports.charts.chart import Chart
 from reports.numbers import fixed, show, significant
 from reports.verdict_summary import verdict_lines, verdict_of, verdict_words
 
+ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
+CURVE = ("columns", 0, "panels", 0, "items", 0)
+
 
 def judged(id: str, passed: bool | None, value: float | None = None) -> doc.VerdictItem:
     return doc.verdict(id, id.upper(), value=value, limit=2.0, unit="dB", comparison=">=", passed=passed)
 
 
 def made(**changes: Any) -> dict[str, Any]:
-    """Give a small document."""
     met = doc.details("More", [doc.verdicts([judged("c", True, 3.0)])])
     blocks = [doc.verdicts([judged("a", False, 1.0), judged("b", None)]), met]
     parts = [doc.section("one", "One", blocks, status="fail")]
@@ -30,7 +32,6 @@ def made(**changes: Any) -> dict[str, Any]:
 
 
 def holding(blocks: list[Any], **section: Any) -> str:
-    """The JSON of a document with one section."""
     return json.dumps(made(sections=[doc.section("x", "X", blocks, **section)]))
 
 
@@ -44,9 +45,7 @@ def holding(blocks: list[Any], **section: Any) -> str:
         ((), "", "met", [("the design states no requirements", "info")]),
     ],
 )
-def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
-    passed: tuple[bool | None, ...], waiver: str, word: str, lines: list[tuple[str, str]]
-) -> None:
+def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(passed, waiver, word, lines):
     items = [judged(f"v{k}", one) | {"waiver": waiver * (one is None)} for k, one in enumerate(passed)]
     result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
     assert (result["verdict"], result["passed"]) == (word, word == "met")
@@ -56,6 +55,7 @@ def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(
 BARE = doc.section("missing", "Missing parts", [], status="fail")
 OPEN = doc.section("margins", "Margins", [], status="warn", verdict=Verdict.NOT_PROVEN)
 CHECKED = doc.section("two", "Two", [doc.verdicts([judged("d", True)], what="checks")])
+REFUTED = doc.section("two", "Two", [doc.verdicts([judged("d", False)], what="checks")])
 GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
 
 
@@ -65,15 +65,15 @@ GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
         ([*made()["sections"], CHECKED], "report", "not met",  # wherever they stand
          ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]),
         ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
+        ([REFUTED], "report", "not met",  # what decides it first
+         ["0 of 1 checks by simulation met, 1 not met", "the design states no requirements"]),
         ([OPEN], "compare", "met", []),
         ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
         ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide
         (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),
     ],
 )  # fmt: skip
-def test_a_document_is_as_good_as_its_worst_part(
-    parts: list[Any], kind: str, word: str, said: list[str]
-) -> None:
+def test_a_document_is_as_good_as_its_worst_part(parts: list[Any], kind: str, word: str, said: list[str]):
     """A section that has failed or is open by itself counts; one whose verdict fails is not said twice."""
     whole = doc.document(title="T", subtitle="", design={}, provenance={}, sections=parts, kind=kind)
     assert (whole["verdict"]["verdict"], whole["verdict"]["passed"]) == (word, word == "met")
@@ -113,9 +113,6 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
     assert "\n" not in str(caught.value)
 
 
-ALL_MET = {"met": 2, "not_met": 0, "not_proven": 1, "waived": 0}
-
-
 @pytest.mark.parametrize(
     "change",
     [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}],
@@ -127,9 +124,6 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
     path.write_text(doc.dumps({**made(), "verdict": made()["verdict"] | change}), encoding="utf-8")
     with pytest.raises(InputError, match=r"report\.json: verdict"):
         doc.load(path)
-
-
-CURVE = ("columns", 0, "panels", 0, "items", 0)
 
 
 @pytest.mark.parametrize(
@@ -145,14 +139,11 @@ CURVE = ("columns", 0, "panels", 0, "items", 0)
         ((*CURVE, "look"), {"colour": 'red"/><b>'}, r"columns\..*\.look\.colour: .*allowed: ink"),
     ],
 )
-def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(
-    place: tuple[str | int, ...], value: Any, words: str, tmp_path
-) -> None:
+def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(place, value, words, tmp_path):
     chart = Chart()
     chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")
     first, second = (doc.figure(name, chart, caption="c", alt="a") for name in ("bode", "distribution"))
-    path = tmp_path / "report.json"
-    parts = [doc.section("one", "One", [first, second])]
+    path, parts = tmp_path / "report.json", [doc.section("one", "One", [first, second])]
     written = json.dumps(made(sections=parts, verdict=verdict_of(parts, "report")))
     path.write_text(written)
     assert len(doc.figures(doc.load(path))) == 2

@@ -14,9 +14,15 @@ from reports.build import design_report
 from reports.sections.in_time import remark
 from reports.verdict_summary import gathered
 
+AS_IT_IS = (
+    "The position loop, without dry friction, sustains an oscillation as designed, started from 2 %% of full "
+    "range; the linear %s margin on the validation's operating motion is %s."
+)
+SMALL = {"size": "small", "part": 0.02, "friction_on": False, "limiter": ""}
+LARGE = {"size": "large", "part": 0.5, "friction_on": True, "limiter": "current", "output": 4.7e-5}
+
 
 def glance(document: dict[str, Any]) -> dict[str, Any]:
-    """Give the block of the first screen."""
     return next(block for block in document["sections"][0]["blocks"] if block["kind"] == "glance")
 
 
@@ -84,14 +90,6 @@ def test_sections_take_turns_on_the_first_screen() -> None:
         doc.section("quiet", "Quiet", [], findings=[finding("e", "quiet"), finding("f", "quiet", "fail")]),
     ]
     assert "".join(item["text"] for item in gathered(sections)) == "faebcd"
-
-
-AS_IT_IS = (
-    "The position loop, without dry friction, sustains an oscillation as designed, started from 2 %% of full "
-    "range; the linear %s margin on the validation's operating motion is %s."
-)
-SMALL = {"size": "small", "part": 0.02, "friction_on": False, "limiter": ""}
-LARGE = {"size": "large", "part": 0.5, "friction_on": True, "limiter": "current", "output": 4.7e-5}
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """A load that pushes away: an inner loop alone is unstable, the drive is not, and is judged so everywhere."""
 
+import re
 from dataclasses import replace
 from math import exp
 from typing import Any
@@ -13,6 +14,7 @@ from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Requirement
 from actuator_lti.drive.operating import level
 from analyses.linear.loop_figures import all_loop_figures, held_loop
+from analyses.linear.loop_survey import survey_loops
 from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
 from analyses.tuning.problem import problem_of
@@ -39,11 +41,6 @@ def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=dry * x) for w, x in ((0, 1), (20, 0.7), (300, 2)))
     friction = {"dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0, "points": points}
     return pushed(slope_Nm_rad, friction=friction, requirements=())
-
-
-def torque_drive() -> Design:
-    """Nothing around the current loop stops the load that pushes away."""
-    return pushed(requirements=(), controller={"position": None, "velocity": None})
 
 
 def held_phase_margin_deg(design: Design) -> float:
@@ -76,6 +73,8 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert found["current"].value == pytest.approx(expected, abs=1e-6)
     assert "with the rotor locked" in found["current"].reason
     assert "held" not in found["velocity"].reason
+    budget = survey_loops(replace(design, requirements=())).budgets["current"]
+    assert (budget.rotor, 180.0 + budget.total_deg) == ("locked", pytest.approx(expected, abs=1e-6))
 
 
 def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
@@ -110,7 +109,8 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
     [
         (falling_friction(), ["current"], "met"),
         (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
-        (torque_drive(), [], "not met"),
+        # nothing around the current loop stops the load that pushes away
+        (pushed(requirements=(), controller={"position": None, "velocity": None}), [], "not met"),
     ],
 )
 def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[str], verdict: str) -> None:
@@ -158,3 +158,26 @@ def test_the_command_line_says_which_case_it_is(cli) -> None:
     assert (made["passed"], current["stable"]) == (True, False)
     assert (current["judged"]["how"], current["judged"]["stable"]) == ("rotor locked", True)
     assert "FAIL" in cli.text("margins", "ilr33-amber", *SET, "load.moment_slope=1e9 N*m/rad", status=1)
+
+
+@pytest.mark.parametrize("held", [[], PUSHED], ids=["as it is", "held"])
+def test_a_range_stands_under_the_loop_whose_margins_it_begins_or_ends_with(held, cli, monkeypatch) -> None:
+    """Sliding is one of the operating points, so one end of each range is the margin of its column."""
+    monkeypatch.setenv("COLUMNS", "250")
+
+    def cells(line: str) -> dict[int, str]:
+        return {one.end(): one[0] for one in re.finditer(r"\S+(?: \S+)*", line)}
+
+    lines = cli.text("margins", "ilr33-amber", *held).splitlines()
+
+    def row(*words: str) -> dict[int, str]:
+        return cells(next(line for line in lines if all(word in line for word in words)))
+
+    for name, unit in (("Gain margin", "dB"), ("Phase margin", "deg")):
+        own, over = row(f"{name}, {unit}"), row(f"{name}, operating points, {unit}")
+        ranges = {end: text for end, text in over.items() if end in own and end > min(own)}
+        assert len(ranges) == 3
+        for end, text in ranges.items():
+            words = text.split()
+            assert f"{float(own[end]):.3g}" in (words[0], words[-1])
+        assert row("Velocity", "Position")[min(ranges)].endswith("locked" if held else "free")

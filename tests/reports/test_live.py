@@ -25,13 +25,11 @@ CROSSOVER_HZ = GAIN / (2.0 * math.pi)  # of 100 exp(-0.002 s)/s, exactly
 
 
 def document() -> dict[str, Any]:
-    """Make a document with a Bode figure, a Nyquist figure and curves over time."""
     f = np.geomspace(0.1, 1000.0, 240)
     w = 2.0 * np.pi * f
     phase = -90.0 - np.degrees(w * DELAY_S)
     response = GAIN / (1j * w) * np.exp(-1j * w * DELAY_S)
-    near = np.abs(response) < 3.0
-    bode = Chart(width=430.0, height=410.0, loop="current")
+    near, bode = np.abs(response) < 3.0, Chart(width=430.0, height=410.0, loop="current")
     top, bottom = bode.column(1.15, 1.0)
     both([("open loop", Curve(w, response, phase))], None, top, bottom, span=100.0)
     nyquist = Chart(width=430.0, height=430.0, loop="current")
@@ -41,8 +39,7 @@ def document() -> dict[str, Any]:
     panel.x.limits(-2.6, 1.25)
     panel.y.limits(-1.6, 1.6)
     panel.x.label, panel.y.label = "real part of L", "imaginary part of L"
-    t = np.linspace(0.0, 2.0, 41)
-    curves = Chart(width=900.0, height=320.0)
+    t, curves = np.linspace(0.0, 2.0, 41), Chart(width=900.0, height=320.0)
     panel = curves.panel()
     panel.curve(t, t**2, "parabola", **style.series(0))
     panel.curve(t, 3.0 - t, HOSTILE, **style.series(1))
@@ -91,7 +88,6 @@ def spot(figure: Locator, across: float, up: float, panel: int = 0) -> tuple[flo
 
 
 def read(figure: Locator) -> dict[str, float]:
-    """Read the read-out as numbers by name."""
     result = {}
     for row in figure.locator(".readout tr").all():
         _, name, value = (cell.inner_text() for cell in row.locator("td").all())
@@ -105,8 +101,7 @@ def read(figure: Locator) -> dict[str, float]:
 def test_the_read_out_is_the_curve(page: Page, across: float) -> None:
     figure = chart(page, 0)
     page.mouse.move(*spot(figure, across, 0.5))
-    result = read(figure)
-    hz = 0.1 * 10.0 ** (4.0 * across)
+    result, hz = read(figure), 0.1 * 10.0 ** (4.0 * across)
     assert result["frequency"] == pytest.approx(hz, rel=5e-3)
     w = 2.0 * math.pi * result["frequency"]
     assert result["magnitude"] == pytest.approx(20.0 * math.log10(GAIN / w), abs=0.02)
@@ -127,8 +122,7 @@ def test_zoom_keeps_the_point_under_the_pointer_and_the_read_out_true(page: Page
     figure = chart(page, 2)
     at = spot(figure, 0.5, 0.5)
     page.mouse.move(*at)
-    before = read(figure)
-    ticks = figure.locator(".xt text").all_inner_texts()
+    before, ticks = read(figure), figure.locator(".xt text").all_inner_texts()
     figure.locator(".plots").focus()
     for _ in range(8):
         page.mouse.wheel(0.0, -120.0)
@@ -224,14 +218,13 @@ def test_a_tap_reads_and_two_fingers_zoom(page: Page) -> None:
     figure.locator(".readout tr").first.wait_for()
     assert read(figure)["frequency"] == pytest.approx(10.0, rel=0.05)
     x, y = spot(figure, 0.5, 0.5)
-    session = page.context.new_cdp_session(page)
+    session = page.context.new_cdp_session(page.page)
     for kind, gap in (("touchStart", 20.0), ("touchMove", 35.0), ("touchMove", 50.0), ("touchEnd", 0.0)):
         fingers = [{"x": x - gap, "y": y, "id": 0}, {"x": x + gap, "y": y, "id": 1}]
         points = fingers * (kind != "touchEnd")
         session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": points})
     figure.locator(".zoomed").first.wait_for()
     scale = figure.locator(".world").first.get_attribute("transform")
-    assert scale is not None
     assert float(re.findall(r"[\d.]+", scale)[0]) > 1.5
 
 

@@ -103,8 +103,7 @@ def test_where_rounding_decides_no_figure_is_shown(opens, tmp_path) -> None:
 
 def test_whole_numbers_stay_whole_and_multiples(opens, tmp_path) -> None:
     page = opens(load_design("ilr33-amber-multirate"))
-    row = '.row[data-path="control.velocity.every"]'
-    before = page.read()
+    row, before = '.row[data-path="control.velocity.every"]', page.read()
     page.type_value("control.velocity.every", 3)  # 10 is no multiple of 3
     assert "allowed: a multiple of control.velocity.every = 3" in page.inner_text(".state")
     page.type_value("control.position.every", 9)

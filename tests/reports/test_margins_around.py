@@ -51,9 +51,7 @@ def growth(table: dict, factor: float, folder: Path, seconds: float) -> float:
 
 @needs_compiler
 @pytest.mark.parametrize(("table", "seconds"), [(AIRFRAME, 0.6), (WEATHERCOCK, 1.5)])
-def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
-    table: dict, seconds: float, tmp_path
-) -> None:
+def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(table, seconds, tmp_path):
     loop = loop_around(assemble_loops("ilr33-amber"), outer_loop(table, "test"))
     result = stability_margins(loop.open_loop)
     assert result.stable
@@ -65,8 +63,7 @@ def test_the_running_drive_decays_below_the_gain_margin_and_grows_above(
 
 def test_closed_forms_of_an_integrator_around_the_ideal_drive() -> None:
     """L = -s K T/p: at low frequency T = 1, so the crossover is at K and the phase margin 90 deg less T's."""
-    K = 0.5
-    loops = assemble_loops("ilr33-amber", form="ideal")
+    K, loops = 0.5, assemble_loops("ilr33-amber", form="ideal")
     table = {"num": [K], "den": [1.0, 0.0], "dt": 0}
     loop = loop_around(loops, outer_loop(table, "test"))
     drive = complex(loops.reference_to_output(1j * K))

@@ -22,6 +22,8 @@ PAIRS = [
     ("pass", "pass-bg"), ("fail", "fail-bg"), ("warn", "warn-bg"), ("info", "info-bg"),
     ("ink", "fail-bg"), ("muted", "fail-bg"), ("ink", "info-bg"), ("paper", "c1"),
 ]  # fmt: skip
+ROOM = files("reports").joinpath("templates", "page")
+AMBER = load_design("ilr33-amber")
 
 
 def schemes() -> dict[str, dict[str, str]]:
@@ -65,9 +67,6 @@ def test_nothing_moves_for_a_reader_who_wants_no_motion() -> None:
     assert "smooth" not in script(live=True)
 
 
-ROOM = files("reports").joinpath("templates", "page")
-
-
 def test_every_module_is_on_the_page_once_behind_its_imports() -> None:
     text = script(live=True)
     names = sorted(one.name.removesuffix(".js") for one in ROOM.iterdir() if one.name.endswith(".js"))
@@ -98,9 +97,6 @@ def test_a_bundle_runs_as_its_modules_would(monkeypatch, tmp_path) -> None:
     (tmp_path / "a.js").write_text(scripts.bundled.__wrapped__("a"), encoding="utf-8")
     done = subprocess.run(["node", str(tmp_path / "a.js")], capture_output=True, text=True, check=True)
     assert done.stdout == "6\n"
-
-
-AMBER = load_design("ilr33-amber")
 
 
 @pytest.mark.parametrize("value", [-1e-3, 1e-3])

@@ -19,22 +19,19 @@ def press(page: Page, does: str, letter: str = "") -> None:
 
 
 def column(page: Page, heading: str) -> list[str]:
-    """Give the cells of a variant, as they are read."""
     heads = page.locator("table.variants thead th").all_inner_texts()
     rows = page.locator("table.variants tbody tr").all()
     return [row.locator("th, td").all_inner_texts()[heads.index(heading)] for row in rows]
 
 
 def curves(page: Page, label: str) -> list[str]:
-    """Give the figures whose legend names a curve."""
     found = 'all => all.filter(li => !li.hidden).map(li => li.closest("[data-chart]").dataset.chart)'
     legends = page.locator("[data-chart] .keys li").filter(has_text=re.compile(f"^([ST] )?{label}$"))
     return sorted(set(legends.evaluate_all(found)))
 
 
 def test_variants_stand_side_by_side_and_undo_holds(opens, tmp_path) -> None:
-    page = opens(AMBER)
-    wanted = {}
+    page, wanted = opens(AMBER), {}
     for letter, gain in (("A", 80.0), ("B", 140.0)):
         page.type_value("control.position.gain", gain)
         press(page, "pin")
@@ -80,6 +77,5 @@ def test_one_cursor_goes_through_the_figures_of_a_loop(opens) -> None:
     page.mouse.move(*page.evaluate(CURSOR, "bode"))
     seen = page.locator('[data-chart="bode"] .readout').inner_text()
     match = re.search(r"frequency\s+([\d.]+) Hz", seen)
-    assert match is not None
     assert float(match[1]) == pytest.approx(hertz, rel=0.02)
     assert page.locator('[data-chart="step"] .over .cursor').count() == 1

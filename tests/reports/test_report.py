@@ -35,7 +35,6 @@ def curves(panel: Panel) -> list[Curve]:
 
 
 def rows_of(document: dict[str, Any], section: str, caption: str) -> list[dict[str, Any]]:
-    """Give the rows of a table by its place."""
     part = next(part for part in document["sections"] if part["id"] == section)
     blocks = [block for block in doc.walk(part) if block["kind"] == "table"]
     return next(block["rows"] for block in blocks if block["caption"].startswith(caption))

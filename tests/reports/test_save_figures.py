@@ -29,7 +29,6 @@ def page(browser: Browser, built: Built) -> Page:
 
 
 def save(page: Page, place: str, kind: str, folder: Path) -> Path:
-    """Save a figure by its menu, as a user does."""
     chart = page.locator(f"{place} .chart").first
     chart.scroll_into_view_if_needed()
     chart.hover()
@@ -97,7 +96,6 @@ def test_a_double_click_selects_no_text(page: Page) -> None:
     chart = page.locator("#answer .chart").first
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
-    assert box is not None
     page.mouse.dblclick(box["x"] + box["width"] / 2, box["y"] + 30)
     assert page.evaluate("getSelection().toString()") == ""
     assert "moved" in (chart.get_attribute("class") or "")

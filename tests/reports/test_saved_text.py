@@ -38,7 +38,6 @@ voltage = "24 V"
 
 
 def as_page(key: Tree, factor: float) -> str:
-    """A changed value as the page writes it."""
     value = key["value"] / key["factor"] * factor
     if key["unit"]:
         return f'"{value!r} {key["unit"]}"'

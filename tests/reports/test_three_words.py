@@ -26,6 +26,9 @@ from tests.command_line import Command, Ran
 
 HOT = Requirement(id="hot", quantity="winding_temperature", unit="degC", maximum=100.0)
 WAIVED = Waiver(requirement="hot", reason="the motor is outside", date="2026-11-22")
+CASES = pytest.mark.parametrize(
+    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
+)
 
 
 def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> Design:
@@ -35,8 +38,6 @@ def asking(*waivers: Waiver, requirements: tuple[Requirement, ...] = (HOT,)) -> 
 
 @pytest.fixture
 def written(tmp_path) -> Callable[[Design], Path]:
-    """Write a design; the path of its file."""
-
     def call(design: Design) -> Path:
         (tmp_path / "d.toml").write_text(write_design(design), encoding="utf-8")
         return tmp_path / "d.toml"
@@ -44,15 +45,8 @@ def written(tmp_path) -> Callable[[Design], Path]:
     return call
 
 
-CASES = pytest.mark.parametrize(
-    ("waivers", "status", "head"), [((), 1, "NOT PROVEN"), ((WAIVED,), 0, "PASS")], ids=["bare", "waived"]
-)
-
-
 @CASES
-def test_margins_and_report_say_the_same(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_margins_and_report_say_the_same(waivers, status, head, written, tmp_path, cli):
     path = written(asking(*waivers))
     said = cli.text("margins", path, status=status)
     assert said.startswith(f"{head}  ")
@@ -73,9 +67,7 @@ def test_margins_and_report_say_the_same(
 
 
 @CASES
-def test_what_corners_and_samples_leave_out_is_not_proven(
-    waivers: tuple[Waiver, ...], status: int, head: str, written, tmp_path, cli
-) -> None:
+def test_what_corners_and_samples_leave_out_is_not_proven(waivers, status, head, written, tmp_path, cli):
     design = asking(*waivers)
     drawn = ("--samples", "4", "--no-worst", "--quiet", "--out", tmp_path)
     for name, *more in (("corners", "--quiet"), ("montecarlo", *drawn)):

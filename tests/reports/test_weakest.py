@@ -11,24 +11,24 @@ from hypothesis import strategies as st
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.quantities import CUSTOMARY, distance_from_minus_one, reserve
 from actuator_lti.design import with_overrides, with_values
-from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.model import Requirement
 from analyses.corners import corners
 from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loops
-from analyses.linear.responses import curve
+from analyses.linear.responses import curve, frequency_grid
+from analyses.margins import margins
 from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
 from reports.build import report
 from reports.sections.answer import weakest as words_of
+from reports.sections.loop_charts import open_bode
+from reports.sections.margins import section as margins_section
+
+FIN = replace(load_design("fin"), requirements=())
 
 
 @pytest.fixture(scope="module")
-def fin() -> Design:
-    return replace(load_design("fin"), requirements=())
-
-
-@pytest.fixture(scope="module")
-def survey(fin: Design) -> LoopSurvey:
-    return survey_loops(fin)
+def survey() -> LoopSurvey:
+    return survey_loops(FIN)
 
 
 @given(db=st.floats(0.01, 60.0), deg=st.floats(0.01, 180.0))
@@ -49,8 +49,8 @@ def test_margins_are_not_ranked_by_shares_of_decibels() -> None:
     assert gain < phase
 
 
-def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
-    seen = {(view.place, view.loop, view.cut) for view in views(survey, corners(fin))}
+def test_every_view_is_looked_at(survey: LoopSurvey) -> None:
+    seen = {(view.place, view.loop, view.cut) for view in views(survey, corners(FIN))}
     for place in ("", "load driven by the motor", "motor driven by the load", "in the gap of the play"):
         assert (place, "position", "") in seen
     assert any(place.startswith("at rest, load ") for place, _, _ in seen)
@@ -59,13 +59,13 @@ def test_every_view_is_looked_at(fin: Design, survey: LoopSurvey) -> None:
     assert not any("speed amplitude" in place for place, _, _ in seen)
 
 
-def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, survey: LoopSurvey) -> None:
+def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(survey: LoopSurvey) -> None:
     """Its position loop is unstable at the worst tolerances; without them the driven point is nearest."""
-    point = weakest(survey, corners(fin))
+    point = weakest(survey, corners(FIN))
     assert (point.reserve, point.view.stable) == (-inf, False)
     assert words_of(point)["status"] == "warn"
     nominal = weakest(survey)
-    loop = assemble_loops(fin, operating_point="driven").position
+    loop = assemble_loops(FIN, operating_point="driven").position
     margins = stability_margins(loop.open_loop)
     wanted = {
         "gain_margin": (1 - 10 ** (-abs(margins.gain_margin_db) / 20)) / (1 - 10 ** (-6 / 20)),
@@ -81,13 +81,12 @@ def test_the_weakest_point_of_the_fin_is_where_it_is_not_stable(fin: Design, sur
     assert said["words"] == "modulus margin 0.481, customary 0.5: 0.0186 below"
 
 
-def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_drawn(fin: Design) -> None:
+def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_drawn() -> None:
     """In the play the position loop is open: its response is zero, and no factors make it up."""
-    driven_away = with_overrides(fin, {"load.moment_slope": "5 N*m/rad"})
+    driven_away = with_overrides(FIN, {"load.moment_slope": "5 N*m/rad"})
     gap = assemble_loops(driven_away, operating_point="gap").position
     assert np.abs(curve(gap.plain_open, np.array([1.0, 10.0])).values).max() < 1e-12
-    made = report(driven_away, validation=False)
-    first, *others = made["sections"]
+    first, *others = report(driven_away, validation=False)["sections"]
     assert first["id"] == "answer"
     assert not [part["id"] for part in others if part["id"].startswith("missing")]
     glance, bode, _ = first["blocks"]
@@ -96,20 +95,19 @@ def test_a_load_that_is_driven_away_in_the_gap_is_said_and_the_loop_itself_is_dr
     assert "phase margin none" not in bode["alt"]
 
 
-def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey, fin: Design) -> None:
+def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey) -> None:
     asked = Requirement(id="m", quantity="modulus_margin", unit="1", loop="every", minimum=0.7)
-    point = weakest(replace(survey, design=replace(fin, requirements=(asked,))))
+    point = weakest(replace(survey, design=replace(FIN, requirements=(asked,))))
     assert (point.view.place, point.view.loop, point.limit, point.required) == ("", "position", 0.7, True)
     assert words_of(point)["status"] == "fail"
 
 
-def test_the_spread_is_that_of_the_operating_points(fin: Design) -> None:
-    found = spread(operating_points(fin, [], described=False, certify=False))["position"]["gain_margin"]
-    loads = fin.validation.loads_Nm
-    every = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}
-    margins = []
+def test_the_spread_is_that_of_the_operating_points() -> None:
+    found = spread(operating_points(FIN, [], described=False, certify=False))["position"]["gain_margin"]
+    loads = FIN.validation.loads_Nm
+    every, margins = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}, []
     for point, load in [*every.items(), *(("rest", load) for load in loads)]:
-        loop = assemble_loops(fin, operating_point=point, load_Nm=load).position
+        loop = assemble_loops(FIN, operating_point=point, load_Nm=load).position
         margins.append(abs(stability_margins(loop.open_loop).gain_margin_db))
     assert (found.least, found.most) == (pytest.approx(min(margins)), pytest.approx(max(margins)))
     assert found.where == "motor driven by the load"
@@ -128,14 +126,11 @@ def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -
     design = load_design("ilr33-amber")
     seen = survey_loops(design)
     point = weakest(seen)
-    assert point is not None
     assert (point.view.kind, point.view.load_Nm, point.quantity) == ("rest", 8.0, "phase_margin")
     move = mending(point, seen)
-    assert move is not None
     for part, inside in ((1.0, True), (0.8, False)):
         value = move.was + part * (move.value - move.was)
         loops = assemble_loops(with_values(design, {move.path: value}), operating_point="rest", load_Nm=8.0)
-        assert loops.position is not None
         margins = stability_margins(loops.position.open_loop)
         found = {
             "phase_margin": abs(margins.phase_margin_deg), "gain_margin": abs(margins.gain_margin_db),
@@ -143,17 +138,36 @@ def test_the_move_that_mends_brings_the_weakest_margin_just_within_its_limit() -
         }  # fmt: skip
         assert all(found[name] >= limit for name, limit in CUSTOMARY.items()) is inside
     mended = weakest(survey_loops(with_values(design, {move.path: move.value})))
-    assert mended is not None
     assert mended.reserve >= 0.0
 
 
-def test_no_move_that_costs_a_requirement(fin: Design, survey: LoopSurvey) -> None:
+def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:
     """Less position gain mends the fin at its worst tolerances; with the bandwidth required, nothing does."""
-    bounds = corners(fin)
+    bounds = corners(FIN)
     point = weakest(survey, bounds)
-    assert point is not None
-    free = mending(point, survey, bounds)
-    assert free is not None
-    assert free.path == "control.position.gain"
-    whole = load_design("fin")
-    assert mending(point, replace(survey, design=whole), bounds) is None
+    assert mending(point, survey, bounds).path == "control.position.gain"
+    assert mending(point, replace(survey, design=load_design("fin")), bounds) is None
+
+
+@pytest.mark.parametrize("name", ["fin", "ilr33-amber"])
+def test_a_bode_plot_names_the_margins_nearest_to_minus_one_and_shows_them_and_0_db(name: str) -> None:
+    """The fin's velocity loop has its nearest phase margin last, ilr33-amber cut at u its gain margin."""
+    found = survey_loops(load_design(name))
+    cut = [point.figures for point in found.break_points.values() if point.figures]
+    for one in (*found.figures.values(), *cut):
+        top, bottom = open_bode("x", one, frequency_grid(one), small=True)["chart"]["columns"][0]["panels"]
+        said = [item["words"] for panel in (top, bottom) for item in panel["items"] if item["kind"] == "note"]
+        gain = min((m.db for m in one.margins.gain_margins), key=abs)
+        phase = min((m.deg for m in one.margins.phase_margins), key=abs)
+        words = [f"GM {'down to ' * (gain < 0)}{gain:.1f} dB", f"PM {phase:.1f}°"]
+        assert [text.partition("\n")[0].replace("−", "-") for text in said] == words
+        assert all(top["y"]["low"] < level < top["y"]["high"] for level in (0.0, -gain))
+        assert top["y"]["high"] < 70.0 + max(0.0, -gain)
+
+
+def test_an_operating_point_at_which_a_loop_is_not_stable_is_told_in_a_sentence() -> None:
+    found = margins(FIN)
+    away = next(one for one in found.operating_points if one.place == "motor driven by the load")
+    figures = {n: replace(f, margins=replace(f.margins, stable=False)) for n, f in away.figures.items()}
+    made = margins_section(replace(found, operating_points=(replace(away, figures=figures),)))[0]["result"]
+    assert "; with the motor driven by the load these loops are not stable: velocity, position." in made

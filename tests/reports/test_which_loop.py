@@ -27,6 +27,8 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 from nonlinear import commands, simulate
 from reports.sections.requirements import label
 
+SCREW = load_design("ballscrew")
+
 
 def asking(design: Design, **keys: object) -> Design:
     kept = {"id": "r", "quantity": "bandwidth", "unit": "Hz", "loop": "position", "minimum": 1.0}
@@ -38,31 +40,24 @@ def judged(design: Design, **keys: object) -> RequirementVerdict:
     return verdict
 
 
-@pytest.fixture(scope="module")
-def screw() -> Design:
-    return load_design("ballscrew")
-
-
-def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115(screw: Design) -> None:
+def test_the_ball_screw_follows_its_command_to_5_6_hz_its_reference_to_115() -> None:
     """Simulated small sines: -2.37 dB at 5 Hz, -12.7 dB at 20 Hz; the profile alone is -3 dB at 5.5 Hz."""
-    smooth = replace(screw, friction=replace(screw.friction, load_coefficient=0.0))
+    smooth = replace(SCREW, friction=replace(SCREW.friction, load_coefficient=0.0))
     figures = all_loop_figures(assemble_loops(smooth), step=False)["position"]
     db = answer_curve(figures, 2.0 * np.pi * np.array([5.0, 20.0])).magnitude_db
     assert db[0] == pytest.approx(-2.37, abs=0.01)
     assert db[1] == pytest.approx(-12.7, abs=0.05)
-    to_command = judged(screw, to="command")
-    to_reference = judged(screw, to="reference")
-    default = judged(screw)
-    assert to_command.value == default.value == pytest.approx(5.62, abs=0.01)
+    to_command, to_reference = judged(SCREW, to="command"), judged(SCREW, to="reference")
+    assert to_command.value == judged(SCREW).value == pytest.approx(5.62, abs=0.01)
     assert to_reference.value == pytest.approx(114.8, abs=0.05)
     assert label(to_command) == "Position loop: bandwidth (−3 dB), to the command"
     assert "rate and acceleration of the command are not in it: they act above" in to_command.reason
     assert "rate and acceleration" not in to_reference.reason
 
 
-def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal(screw: Design) -> None:
+def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal() -> None:
     """|L/(1 + L)| = 1/sqrt(2) at 16.18 Hz, from L alone; the feed-forward takes the reference to 114.8 Hz."""
-    loops = assemble_loops(screw)
+    loops = assemble_loops(SCREW)
     hz = closed_loop_bandwidth(loops.position.closed_loop).minus3db_hz
     assert hz == pytest.approx(16.18, abs=0.005)
     z = np.exp(2j * np.pi * hz * loops.position.period_s)
@@ -71,14 +66,13 @@ def test_the_feedback_loop_of_the_ball_screw_is_a_third_signal(screw: Design) ->
     assert closed_loop_bandwidth(loops.reference_to_output).minus3db_hz == pytest.approx(114.8, abs=0.05)
 
 
-def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
+def test_what_rate_and_acceleration_leave_is_simulated() -> None:
     """The sentence beside the requirement, against a run of the simulator read by hand."""
-    verdict = judged(screw, to="command")
-    full = screw.validation.full_deflection_rad
+    verdict, full = judged(SCREW, to="command"), SCREW.validation.full_deflection_rad
     hz = verdict.value
     onset = 1e3 * min(0.4 / (2.0 * np.pi * hz), 4.0 / (2.0 * np.pi * hz) ** 2)
     assert f"above {onset:.3g} mm" in verdict.reason
-    run = simulate(screw, commands.sine(full, hz), 60.0 / hz)
+    run = simulate(SCREW, commands.sine(full, hz), 60.0 / hz)
     late = run.time_s >= 20.0 / hz
     turn, y = np.exp(-2j * np.pi * hz * run.time_s[late]), run.output_angle_rad[late]
     gain_db = 20.0 * np.log10(2.0 * abs(np.mean((y - y.mean()) * turn)) / full)
@@ -86,31 +80,30 @@ def test_what_rate_and_acceleration_leave_is_simulated(screw: Design) -> None:
     assert said == pytest.approx(gain_db, abs=0.1)
 
 
-def test_a_sine_from_rest_is_compared_with_the_response_to_the_command(screw: Design) -> None:
+def test_a_sine_from_rest_is_compared_with_the_response_to_the_command() -> None:
     """Below the profile's limits a drive without dry friction is linear, the mean included."""
-    friction = replace(screw.friction, dry_torque_Nm=0.0, load_coefficient=0.0)
-    still = replace(screw, friction=friction, load=replace(screw.load, friction=None))
-    hz = np.array([2.0, 5.0, 9.0, 20.0])
-    loops = assemble_loops(still)
+    friction = replace(SCREW.friction, dry_torque_Nm=0.0, load_coefficient=0.0)
+    still = replace(SCREW, friction=friction, load=replace(SCREW.load, friction=None))
+    hz, loops = np.array([2.0, 5.0, 9.0, 20.0]), assemble_loops(still)
     sweep = sweep_from_rest(still, hz, free_amplitude(still, loops, hz, 1.0), 40_000)
     assert np.abs(sweep.measured / sweep.sliding - 1.0).max() < 1e-3
     large = amplitude_map(still, loops, friction_on=False, counts=(3, 6))
     omega = 2.0 * np.pi * large.frequency_hz[:5]  # the last one is near Nyquist: the images of a held signal
-    mean = command_mean(screw)
+    mean = command_mean(SCREW)
     behind = np.abs(large.linear[:5]) / np.abs(response_at(loops.plain_response, omega))
     np.testing.assert_allclose(behind, np.abs(mean.response(omega)), rtol=1e-4)
 
 
 @pytest.mark.parametrize("hz", [0.5, 1.0, 6.0, 60.0])
-def test_the_profile_acts_from_its_closed_form_on(screw: Design, hz: float) -> None:
+def test_the_profile_acts_from_its_closed_form_on(hz: float) -> None:
     """Rate and acceleration limit of the command are limiters like the others."""
-    loops = assemble_loops(screw)
+    loops = assemble_loops(SCREW)
     found = onset(loops, np.array([2.0 * np.pi * hz])).each_rad["profile"][0]
     assert found == pytest.approx(min(0.4 / (2 * np.pi * hz), 4.0 / (2 * np.pi * hz) ** 2), rel=3e-3)
     time = np.arange(0.0, 3.0 / hz, 5e-4)
     for share, acts in ((0.99, False), (1.01, True)):  # from the crest on: no kink, nothing to catch up
         wave = share * found * (1.0 - np.cos(2.0 * np.pi * hz * time))
-        run = simulate(screw, commands.sampled(time, wave), time[-1])
+        run = simulate(SCREW, commands.sampled(time, wave), time[-1])
         assert bool(((run.limit_flags & 128) != 0).any()) is acts
 
 
@@ -153,8 +146,8 @@ def test_the_bandwidth_behind_a_mean_is_that_of_a_dense_grid(samples: int) -> No
     assert band.resonance_peak_db == pytest.approx(max(20.0 * np.log10(np.abs(total)).max(), 0.0), abs=1e-5)
 
 
-def test_the_step_behind_a_mean_is_the_simulated_one(screw: Design) -> None:
-    response, mean = assemble_loops(screw).plain_response, command_mean(screw)
+def test_the_step_behind_a_mean_is_the_simulated_one() -> None:
+    response, mean = assemble_loops(SCREW).plain_response, command_mean(SCREW)
     figures = commanded_step(response, step_figures(response), mean)
     y = [0.0] * mean.samples
     loop_y, x = [], np.zeros(len(response.A))
@@ -170,8 +163,7 @@ def test_the_step_behind_a_mean_is_the_simulated_one(screw: Design) -> None:
 
 def test_a_filter_of_the_command_is_in_one_response_only() -> None:
     design = with_overrides(load_design("ilr33-amber"), {"command.filter_time": "50 ms"})
-    to_command = judged(design)
-    to_reference = judged(design, to="reference")
+    to_command, to_reference = judged(design), judged(design, to="reference")
     bare = closed_loop_bandwidth(assemble_loops(load_design("ilr33-amber")).plain_response)
     assert to_reference.value == pytest.approx(bare.minus3db_hz)
     assert to_command.value < 3.2 < to_reference.value  # 1/(2 pi 50 ms) = 3.18 Hz

@@ -21,7 +21,6 @@ def plant(design: Design) -> Rate:
     assert friction.law == "tanh" or friction.dry_torque_Nm == 0.0
     assert friction.dry_torque_reverse_Nm is None
     assert not friction.points
-    assert motor.resistance_ohm is not None
     assert design.coupling is load.gravity is None
     assert load.path == "self-locking"
     assert load.moment_slope_Nm_rad == 0.0

@@ -20,29 +20,21 @@ from analyses.large_signal.map import amplitude_map
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 from nonlinear import Rows, commands, simulate
+from tests.loops.loop_designs import source_drive
 
 T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 
 
 def drive(law: str, feedforward: float = 3.0) -> model.Design:
-    """The drive of the docstring."""
     velocity = model.VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
     place = model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward)
-    return model.Design(
-        name="clamped",
-        title="Clamped integral",
-        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
-        load=model.Load(path="back-drivable"),
-        controller=model.Controller(period_s=T, computing_delay_s=0.0, position=place, velocity=velocity),
-        limits=model.Limits(voltage_V=LIMIT),
-        validation=model.Validation(full_deflection_rad=1.0),
-    )
+    stages = {"position": place, "velocity": velocity}
+    return source_drive(J, k, T, LIMIT, load={"path": "back-drivable"}, controller=stages)
 
 
 def sizes(hertz: Any, feedforward: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
     """|U/R| and |I'/R| on the unit circle."""
-    z = np.exp(2j * np.pi * np.asarray(hertz) * T)
-    b = T * k / J
+    z, b = np.exp(2j * np.pi * np.asarray(hertz) * T), T * k / J
     per_u = Kv * T * b * (z + 1.0) / (2.0 * (z - 1.0) ** 2) + b / (z - 1.0)
     integral = Kp * T / Tn * z / (z - 1.0)
     F = feedforward * J / k * (1.0 - 1.0 / z) ** 2 / T**2
@@ -82,8 +74,7 @@ def test_the_clamp_is_judged(law: str) -> None:
 
 def test_the_map_draws_the_border_that_is_judged() -> None:
     design = drive("clamped")
-    loops = assemble_loops(design)
-    shown = amplitude_map(design, loops, counts=(12, 6))
+    shown = amplitude_map(design, assemble_loops(design), counts=(12, 6))
     output, integral = sizes(shown.frequency_hz)
     lowest = LIMIT / np.maximum(output, integral)
     np.testing.assert_allclose(shown.onset_rad["voltage"], lowest, rtol=1e-7)
@@ -99,8 +90,7 @@ def test_a_run_says_that_the_integral_is_clamped(law: str) -> None:
     hertz = 2.0
     output, integral = (float(x) for x in sizes(hertz))
     assert integral > 1.2 * output
-    amplitude = 0.5 * (LIMIT / output + LIMIT / integral)
-    design = drive(law)
+    amplitude, design = 0.5 * (LIMIT / output + LIMIT / integral), drive(law)
     run = simulate(design, commands.sine(amplitude, hertz), 3.0, limits_on=True)
     late = run.limit_active("voltage")[run.time_s > 2.0]
     assert bool(late.any()) == (law == "clamped")

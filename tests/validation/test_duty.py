@@ -55,7 +55,6 @@ def test_the_overload_state_is_that_of_the_running_drive() -> None:
     design = with_overrides(JOINT, {"limits.peak_time": "50 ms"})
     asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=2.0, load_Nm=30.0)
     result = duty(design, asked)
-    assert result.overload is not None
     assert result.overload.acts_after_s is None
     drive, states = Drive(design, load_Nm=30.0), []
     Ts, ticks = design.controller.period_s, len(result.time_s)
@@ -70,7 +69,6 @@ def test_the_protection_acts_when_the_running_drive_says() -> None:
     design = with_overrides(JOINT, {"limits.peak_time": "1 s"})
     asked = Asked.of(design, amplitude_rad=0.4, frequency_hz=2.0, load_Nm=60.0)
     result = duty(design, asked)
-    assert result.overload is not None
     assert result.verdict == "not met"
     drive, k, ticks = Drive(design, load_Nm=60.0), 0, len(result.time_s)
     while drive.value("overloaded") == 0.0 and k < 100 * ticks:
@@ -82,10 +80,7 @@ def test_the_protection_acts_when_the_running_drive_says() -> None:
 @pytest.mark.parametrize("rms", [1.0, 6.0, 11.0, 13.0])
 def test_temperature_against_its_equation(rms: float) -> None:
     """tau dT/dt = Ta - T + Rth R I^2 (1 + alpha (T - Tref)), by an integrator; at 13 A it runs away."""
-    design = with_overrides(FIN, HOT)
-    result = heating(design, rms)
-    assert result is not None
-    P = 2.0 * 1.0 * rms**2
+    result, P = heating(with_overrides(FIN, HOT), rms), 2.0 * 1.0 * rms**2
     course = solve_ivp(
         lambda _, T: (25.0 - T + P * (1 + 0.00393 * (T - 25.0))) / 60.0, (0.0, result.time_s[-1]), [25.0],
         t_eval=result.time_s, rtol=1e-10, atol=1e-9,
@@ -103,9 +98,7 @@ def test_temperature_against_its_equation(rms: float) -> None:
 
 def test_without_heat_of_its_own_the_rise_is_an_exponential() -> None:
     design = with_overrides(FIN, {**HOT, "temperature.resistance_coefficient": "0 1/K"})
-    result = heating(design, 5.0)
-    assert result is not None
-    k = 100
+    result, k = heating(design, 5.0), 100
     assert result.temperature_degC[k] == pytest.approx(25.0 + 50.0 * (1.0 - exp(-result.time_s[k] / 60.0)))
 
 
@@ -130,3 +123,10 @@ def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
     made = section(duty(AMBER, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
     assert "it is not followed as asked, limited by" in made["result"]
     assert made["status"] == "warn"
+
+
+def test_the_current_of_an_ac_motor_is_told_in_the_model_s_amperes(cli) -> None:
+    first, *rest = cli.text("duty", "ballscrew").splitlines()
+    assert " A dc, rms over time, limit " in first
+    assert any("current, rms over time" in line and " A dc " in line for line in rest)
+    assert " A dc" not in cli.text("duty", "joint")

@@ -73,8 +73,7 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     design = with_overrides(load_design("joint"), slow)
     result = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
     assert abs(result.deflection_rad).max() < 1e-6
-    k = np.searchsorted(result.time_s, 0.15)
-    assert result.current_A[k] == pytest.approx(15.0, rel=1e-3)
+    assert result.current_A[np.searchsorted(result.time_s, 0.15)] == pytest.approx(15.0, rel=1e-3)
     assert 0.1 < result.protected_s < 0.2  # a little was used on the way
     assert result.current_A[-1] == pytest.approx(6.0, rel=1e-3)
 
@@ -87,8 +86,7 @@ def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     half = 0.5 * design.validation.full_deflection_rad
     run = simulate(design, commands.step(2.0 * half), 0.5)
     at = int(np.argmax(run.output_angle_rad >= half))
-    speed = run.motor_speed_rad_s[at] / N
-    before = abs(run.coupling_torque_Nm[at])
+    speed, before = run.motor_speed_rad_s[at] / N, abs(run.coupling_torque_Nm[at])
     impact = speed * sqrt(k * J) * N
     limit = design.limits.peak_current_A * design.effective_motor.torque_constant_Nm_A * N
     assert impact - 2 * limit - before < case.peak_moment_Nm < impact + 2 * limit + before

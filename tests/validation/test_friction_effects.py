@@ -2,7 +2,6 @@
 
 import json
 import math
-from collections.abc import Callable
 
 import pytest
 
@@ -24,6 +23,9 @@ from tests.nonlinear.elastic_drive import stribeck
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))
 STIFFNESS = 5.9e-3 * 0.12 * 120.0 * 2376.0  # motor torque per error of the output of the first
 FIN = 1.0 / 60.0 + 1.7e-3  # motor torque per torque on the fin: what passes, and 10 % of it lost
+KICKS = {
+    "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
+}  # fmt: skip
 
 
 def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
@@ -54,9 +56,7 @@ def _joint_rate(loop: Hysteresis) -> float:
         ("fin", 0.0, lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
     ],
 )
-def test_what_a_reversal_loses_is_predicted(
-    name: str, load_Nm: float, expected: Callable[[Hysteresis], float], within: float
-) -> None:
+def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
     design = quiet(load_design(name))
     static = threshold(design, load_Nm).static
@@ -122,8 +122,7 @@ def test_hunting_needs_breakaway_above_sliding_friction(breakaway: float, hunts:
     """
     values = {"friction.breakaway_ratio": breakaway, "control.velocity.integral_time": 3e-3}
     design = with_values(AMBER, {**values, "control.position.gain": 250.0})
-    threshold = static_threshold(design).forward_rad
-    cycles = limit_cycles(design, 0.0)
+    threshold, cycles = static_threshold(design).forward_rad, limit_cycles(design, 0.0)
     assert cycles.confirmations == ()
     assert (cycles.hunting is not None) == hunts
     assert cycles.described == (not hunts)
@@ -219,8 +218,7 @@ def extruder(position_s: float | None = None, velocity_s: float | None = None) -
 
 def test_a_friction_map_is_dry_friction() -> None:
     """The torque at rest over the stiffness: 30 mN m / (kM/R Kp Kv N)."""
-    stiffness = 0.05 / 2.0 * 0.25 * 25.0 * 20.0
-    result = friction_effects(extruder())
+    stiffness, result = 0.05 / 2.0 * 0.25 * 25.0 * 20.0, friction_effects(extruder())
     assert result.integrator == ""
     (point,) = result.points
     assert point.dry_torque_Nm == pytest.approx(0.03)
@@ -256,11 +254,6 @@ def test_two_integrals_one_behind_the_other() -> None:
             t += dt
         assert wait.predicted_s == pytest.approx(t, rel=1e-3, abs=1e-4)
         assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)
-
-
-KICKS = {
-    "feedforward": 1.0, "acceleration_feedforward": 1.0, "derivative_time": 1e-3, "friction_feedforward": 2.0,
-}  # fmt: skip
 
 
 @pytest.mark.parametrize("kick", KICKS)

@@ -8,17 +8,10 @@ import pytest
 from actuator_lti import assemble_loops, closed_loop_bandwidth
 from actuator_lti.design import load_design, with_values
 from actuator_lti.drive.operating import rubs
-from analyses import large_signals, sawtooth
+from analyses import amplitude_map, large_signals, sawtooth
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
 from analyses.large_signal.from_rest import TOO_MANY, margins_by_amplitude
-from analyses.large_signal.map import (
-    MINUS_3DB,
-    AmplitudeBode,
-    _crossing,
-    amplitude_bode,
-    amplitude_map,
-    crossing_range,
-)
+from analyses.large_signal.map import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
 from reports.sections.large_signal import _result
@@ -29,6 +22,7 @@ from tests.validation.random_drives import full_drive
 
 AMBER = load_design("ilr33-amber")
 TRIANGLE_CREST, TRIANGLE_DISTORTION = math.sqrt(3.0), 0.1212  # model.md section 5
+HZ = np.array([1.0, 2.0, 4.0, 8.0])
 
 
 def test_h1_rate_limit() -> None:
@@ -112,9 +106,7 @@ def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, wor
         ("ballscrew", 1.0, True, (2, 14), 1e-4),
     ],
 )
-def test_the_linear_bandwidth_is_that_of_the_margins(
-    name: str, share: float, friction_on: bool, counts: tuple[int, int], within: float
-) -> None:
+def test_the_linear_bandwidth_is_that_of_the_margins(name, share, friction_on, counts, within):
     design, loops = load_design(name), assemble_loops(name)
     small = changed(design, validation={"full_deflection_rad": share * design.validation.full_deflection_rad})
     shown = amplitude_map(small, loops, friction_on=friction_on, counts=counts)
@@ -158,16 +150,12 @@ def test_a_coarse_map_shows_no_amplitude_as_another() -> None:
     assert coarse.gain_db.shape == (4, 4)
 
 
-HZ = np.array([1.0, 2.0, 4.0, 8.0])
-
-
 def _words(gain_db: list[float]) -> str:
     """What is said of one amplitude, 10 deg at full deflection, of a loop with a bandwidth of 5 Hz."""
     gain, nothing = np.array([gain_db]), np.full((1, 4), np.nan)
     low_high = np.array([crossing_range(HZ, row, MINUS_3DB) for row in gain])
     found = np.array([_crossing(HZ, row, MINUS_3DB) for row in gain])
-    size = np.array([np.radians(10.0)])
-    below = gain[:, 0] < MINUS_3DB
+    size, below = np.array([np.radians(10.0)]), gain[:, 0] < MINUS_3DB
     result = AmplitudeBode(
         0.0, HZ, (1.0,), size, gain, nothing, gain[0], nothing[0], size, found, nothing[:, 0], low_high,
         below, 5.0, None,

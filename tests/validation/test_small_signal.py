@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -20,6 +19,8 @@ from nonlinear import tangent
 from tests.changed import changed
 from tests.validation.random_drives import full_drive
 
+INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
+
 
 def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
     places = Bench(design, design if model is None else model).onsets()
@@ -30,8 +31,7 @@ def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
 def test_every_limit_of_a_shipped_drive(name: str) -> None:
     """Each limiter that the limit of linear validity lists has its row, and it is met."""
     design = load_design(name)
-    bench = Bench(design, design)
-    border = onset(bench.loops("command"), [10.0])
+    border = onset(Bench(design, design).loops("command"), [10.0])
     wanted = {f"{each}_onset".replace("-", "_") for each, at in border.each_rad.items() if np.isfinite(at[0])}
     found = rows(design)
     assert set(found) == wanted
@@ -46,17 +46,12 @@ def test_speed_drives_and_clamped_integrals(seed: int) -> None:
     assert seed != 730_037 or "voltage_onset_integral" in found
 
 
-def one_per_cent_more(place: Place, z: np.ndarray) -> np.ndarray:
-    return 1.01 * place.predicted(z)
-
-
 @pytest.mark.parametrize("name", ["ilr33-amber-multirate", "joint"])
 def test_one_per_cent_of_the_linear_side_is_not_met(name: str) -> None:
     """Of every limiter: its response scaled, and a gain that all of them feel."""
     design = load_design(name)
-    bench = Bench(design, design)
-    for place in bench.onsets():
-        (row,) = small_signal(replace(place, predicted=partial(one_per_cent_more, place)))
+    for place in Bench(design, design).onsets():
+        (row,) = small_signal(replace(place, predicted=lambda z, place=place: 1.01 * place.predicted(z)))
         assert row.verdict is Verdict.NOT_MET, row
         assert row.error == pytest.approx(0.01, rel=0.02)
     gain = 1.01 * design.controller.position.gain
@@ -91,9 +86,7 @@ def verdicts(design: Design, model: Design, place: str) -> set[Verdict]:
     [("ilr33-amber", cogging), ("fin", cogging), ("fin", gear_error)],
     ids=lambda value: getattr(value, "__name__", value),
 )
-def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(
-    name: str, effect: Callable[..., Design]
-) -> None:
+def test_green_with_it_red_where_one_side_is_one_per_cent_wrong(name: str, effect: Callable[..., Design]):
     plain = load_design(name)
     design, wrong = effect(plain), effect(plain, 1.01)
     for place in ("velocity", "u"):
@@ -123,10 +116,6 @@ def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
             assert Verdict.NOT_MET in {row.verdict for row in design_value_rows(one, other)}, key
 
 
-INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
-FALLING = (1e-3, 1.0, 50.0)  # N m/rad at the output
-
-
 def pendulum(falls_Nm_rad: float) -> Design:
     """A shipped drive without its position loop, on a load that falls over."""
     control = {"position": None, "velocity": {"integral_time_s": INTEGRAL_TIME_S}}
@@ -141,22 +130,16 @@ def least_gain(design: Design) -> float:
     return slope / design.total_ratio**2 / held
 
 
-@pytest.mark.parametrize("falls_Nm_rad", FALLING)
+@pytest.mark.parametrize("falls_Nm_rad", [1e-3, 1.0, 50.0])  # at the output
 def test_the_least_gain_is_that_of_the_integral(falls_Nm_rad: float) -> None:
     """The mode at rest of integral and angle stood beside the pole at some gains: 0.0140 for 0.0250 once."""
     design = pendulum(falls_Nm_rad)
-    rows = small_signal(Bench(design, design).place("velocity"))
-    (row,) = (row for row in rows if row.name == "gain_margin" and row.because.startswith("0 Hz"))
+    place = Bench(design, design).place("velocity")
+    (row,) = (row for row in small_signal(place) if row.name == "gain_margin" and row.because[:4] == "0 Hz")
     assert row.verdict is Verdict.MET
     assert [row.predicted, row.found] == pytest.approx(2 * [least_gain(design)], rel=1e-6)
     assert "by +" in row.because  # outside the circle below that gain
-
-
-@pytest.mark.parametrize("falls_Nm_rad", FALLING)
-def test_the_mode_at_rest_is_none_of_the_poles_at_any_gain(falls_Nm_rad: float) -> None:
-    design = pendulum(falls_Nm_rad)
-    found = Bench(design, design).place("velocity").tangent
-    beside = 1.0 + 1e-3 * np.random.default_rng(1).normal(size=200)
+    beside, found = 1.0 + 1e-3 * np.random.default_rng(1).normal(size=200), place.tangent
     assert {len(found.poles_at(gain)[0]) for gain in least_gain(design) * beside} == {len(found.A) - 1}
 
 

@@ -126,8 +126,7 @@ def test_command_section_and_figure(cli) -> None:
     assert [curve["state"] for curve in told["curves"]] == ["powered", "shorted", "open"]
     assert told["lost_motion"]["play_rad"] == 1.5e-3
     assert "infinite" in cli.text("stiffness")
-    part = section(stiffness(FIN))
-    figure = next(block for block in part["blocks"] if block["kind"] == "figure")
+    figure = next(block for block in section(stiffness(FIN))["blocks"] if block["kind"] == "figure")
     assert "<svg" in draw_svg(figure, page=False)
     locked = section(stiffness(load_design("ilr33-amber"), simulated=False))
     assert locked["result"].startswith("A load torque")

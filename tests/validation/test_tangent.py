@@ -29,6 +29,10 @@ from tests.validation.random_drives import full_drive, is_stable
 Z = np.exp(1j * GRID)
 JOINT = load_design("joint")
 RANDOM = range(300_000, 300_030)
+FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
+               741_646, 90_006, 770_155, 910_883, 1_010_043,
+               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068,
+               5_300_352]  # fmt: skip
 
 
 def stood(design: Design) -> tuple[Design, Loops]:
@@ -104,12 +108,6 @@ def test_python_control_draws_it() -> None:
     assert (found.system.nstates, found.system.dt) == (len(found.states), found.period_s)
     response = found.system(np.exp(1j * w * found.period_s))
     assert response == pytest.approx(found.closed(np.exp(1j * w * found.hold_s)))
-
-
-FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
-               741_646, 90_006, 770_155, 910_883, 1_010_043,
-               1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068,
-               5_300_352]  # fmt: skip
 
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)

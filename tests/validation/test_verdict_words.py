@@ -30,6 +30,7 @@ from reports.verdict_summary import verdict_of
 from tests.changed import changed
 
 EMPS = load_design("emps")
+WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
 def _with_gain(gain: float) -> Design:
@@ -72,9 +73,6 @@ def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
         periods=8, limited=(), after_s=1.0, work=1,
     )  # fmt: skip
     return Settling(step_rad, 0.0, rest)
-
-
-WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
 @pytest.mark.parametrize("name", ["emps", "fin"])
@@ -169,25 +167,17 @@ def test_nothing_judged_is_not_proven() -> None:
 def test_points_without_motion_are_left_out_without_a_warning() -> None:
     """Half the size and a quarter turn late where both move: 6 dB and 90 deg; NaN and 0 elsewhere."""
     expected = np.array([1.0, np.nan, 1.0, complex(np.nan, np.nan)])
-    measured = np.array([-0.5j, 1.0, 0.0, 0.0])
-    nothing = np.zeros(4)
+    measured, nothing = np.array([-0.5j, 1.0, 0.0, 0.0]), np.zeros(4)
     sweep = RestSweep(*([nothing] * len(fields(RestSweep))))
     words = described(replace(sweep, measured=measured, described=expected))
     assert "up to 6 dB and 90 deg" in words
     assert "not compared" in described(replace(sweep, measured=nothing, described=expected))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"control.velocity.gain": 1.01 * 0.12},
-        {"motor.rotor_inertia": 1.01 * 9.2e-7},
-        {"control.computing_delay": 1.01e-4},
-    ],
-)
-def test_a_wrong_model_is_seen(change: dict[str, float]) -> None:
+@pytest.mark.parametrize("key", ["control.velocity.gain", "motor.rotor_inertia", "control.computing_delay"])
+def test_a_wrong_model_is_seen(key: str) -> None:
     """One per cent of a gain, of the inertia, of the delay: rows are not met, and say which."""
     design = load_design("ilr33-amber")
-    bench = Bench(design, design.with_values(change))
+    bench = Bench(design, design.with_values({key: 1.01 * design.parameters[key].value}))
     verdicts = {row.name: row.verdict for row in small_signal(bench.place("position"))}
     assert verdicts["response"] == verdicts["gain_margin"] == "not met"
