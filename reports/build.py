@@ -22,6 +22,7 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 from analyses.specification.weakest import WeakPoint, spread, weakest
 from analyses.validation import validate
 from reports import document as doc
+from reports.amperes import in_amperes
 from reports.analyses import BY_NAME, FURTHER
 from reports.document_schema import Document
 from reports.html import write_report
@@ -143,6 +144,7 @@ def design_report(
             loops = loop_sections(survey, verdicts)
             bounds = attempt("corners", lambda: corners(design), None)
             point = attempt("weakest point", lambda: weakest(survey, bounds), None)
+    loops, validation = in_amperes(loops, design), in_amperes(validation, design)
     first = [part for part in validation if part["id"] == "validation"]
     sections = [
         *loops[:1],

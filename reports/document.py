@@ -4,23 +4,23 @@ A document holds sections, a section holds blocks; the builders below make block
 Whoever draws a page reads only this, never the results themselves.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial, reduce
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.files.tree import Tree
 from reports.certain import certain
+from reports.charts.chart import Chart
 from reports.charts.data import chart_data
 from reports.document_schema import (
     SCHEMA,
@@ -45,10 +45,6 @@ from reports.document_schema import (
 from reports.numbers import prose
 from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from reports.charts.chart import Chart
 
 T = TypeVar("T")
 _compact = partial(json.dumps, ensure_ascii=False, allow_nan=False, separators=(",", ":"))

@@ -80,11 +80,11 @@ def seconds(value: float) -> str:
 
     Examples
     --------
-    >>> seconds(0.01234), seconds(3.2e-4)
-    ('12.3 ms', '320 µs')
+    >>> seconds(0.01234), seconds(3.2e-4), seconds(0.4705), show(470.5, "ms:3")
+    ('12.3 ms', '320 µs', '470 ms', '470')
     """
     scale, unit = time_unit(value)
-    return f"{value * scale:.3g} {unit}"
+    return f"{float(f'{value * scale:.12g}'):.3g} {unit}"  # a tie is one in any unit
 
 
 def time_unit(span_s: float) -> tuple[float, str]:

@@ -7,13 +7,15 @@ import pytest
 from actuator_lti.errors import InputError
 
 
-def refused(call: Callable[..., object], *arguments: object, words: tuple[str, ...] = ()) -> str:
+def refused(
+    call: Callable[..., object], *arguments: object, words: str | tuple[str, ...] = (), **named
+) -> str:
     """What is said of it, these words among it."""
     with pytest.raises(InputError) as caught:
-        call(*arguments)
+        call(*arguments, **named)
     line = str(caught.value)
     assert line.isprintable()
     assert len(line) < 400
-    for word in words:
+    for word in (words,) if isinstance(words, str) else words:
         assert word in line
     return line

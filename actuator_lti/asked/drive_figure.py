@@ -1,16 +1,12 @@
 """One figure of the whole drive by the name that a requirement gives it, for one design or stacked ones."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES
+from actuator_lti.design.model import Design
 from actuator_lti.drive.facts import capability
 from actuator_lti.errors import InputError
 from actuator_lti.loops.stiffness import StiffnessFigures
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 _SOURCES = {"capability": capability, "stiffness": StiffnessFigures}
 

@@ -14,16 +14,16 @@ from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
 from actuator_lti.design.fields import field_of, fields_in
-from actuator_lti.design.loader import as_design, design_from_tree
+from actuator_lti.design.loader import as_design, design_from_tree, design_text, read_design_text
 from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.tolerances import tolerances
-from actuator_lti.design.units import si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown
+from actuator_lti.files.reading import parse_toml, shown
 from actuator_lti.files.tree import Tree
 
 _WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
@@ -37,6 +37,36 @@ def write_design(design: Design) -> str:
     import tomli_w
 
     return tomli_w.dumps(design_tree(as_design(design)))
+
+
+def write_changed(before: Design, after: Design) -> str:
+    """A changed design as TOML: its file's own keys, as a data sheet states them, with what differs.
+
+    Where that does not read as the same design, or the file is gone: as `write_design` has it.
+    """
+    import tomli_w
+
+    with suppress(InputError):
+        raw = parse_toml(design_text(before.origin), before.origin)
+        text = tomli_w.dumps(_changed(raw, design_tree(as_design(before.origin)), design_tree(after)))
+        if design_hash(read_design_text(text)) == design_hash(after):
+            return text
+    return f"# What its file derives from a data sheet stands here as computed.\n{write_design(after)}"
+
+
+def _changed(raw: Tree, old: Tree, new: Tree) -> Tree:
+    """What a file says, with the difference between two designs."""
+    made = {key: value for key, value in raw.items() if key in new or key not in old}
+    for key, value in new.items():
+        was, said = old.get(key), raw.get(key)
+        if value == was:
+            continue
+        made[key] = value
+        if isinstance(value, dict) and isinstance(was, dict) and isinstance(said, dict):
+            made[key] = value if "value" in value else _changed(said, was, value)
+        elif isinstance(value, dict) and isinstance(said, str) and "source" in value:
+            made[key] = {**value, "source": f"changed from {said}"}
+    return made
 
 
 def design_tree(design: Design) -> Tree:
@@ -73,7 +103,9 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
         if known is not None and known.value == value:
             table[field.key] = _entry(known, unit_in_file(design, path, field))
         elif value is not None and value != inf and value != field.default:
-            unit = part.unit if field.kind == "limit" else unit_in_file(design, path, field)
+            unit = unit_in_file(design, path, field)
+            if field.kind == "limit":
+                unit = ampere_unit("limits.", part.unit, design.motor.constants)
             table[field.key] = _bare(value, unit)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
     if unsaid and len(table) == 1 and part.full_deflection_rad == default_deflection(design.axis):

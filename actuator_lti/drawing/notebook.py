@@ -1,16 +1,13 @@
 """Designs, loops, margins and runs as small HTML tables: what a notebook shows for them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from html import escape
 from math import isinf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.loops.result import Loops
-    from actuator_lti.margins.results import StabilityMargins
+from actuator_lti.design.model import Design
+from actuator_lti.loops.result import Loops
+from actuator_lti.margins.results import StabilityMargins
 
 
 def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:

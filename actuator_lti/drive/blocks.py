@@ -5,18 +5,14 @@ Coefficients are floats, or arrays of shape (K,) stacked over designs. What the 
 by block stands in model.md sections 2 and 7; here is what it is as a linear system.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from actuator_lti.design.model import Encoder, Filter
 from actuator_lti.errors import InputError
 from actuator_lti.systems.resolvent import states_at
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Encoder, Filter
 
 Polynomial = tuple[Any, ...]
 

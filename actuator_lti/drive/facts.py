@@ -5,20 +5,16 @@ arrays of shape (K,)) and gives floats or arrays. Sources: paper, equations (1),
 1, 6.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from actuator_lti.design.model import Design
 from actuator_lti.drive.choice import finite, larger, smaller, where
 from actuator_lti.drive.operating import dry_torque, friction_slopes
 from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 NOTHING, SPEED_LIMIT, FORCE, VOLTAGE, DROOP = range(5)
 RATE_LIMITS = ("nothing", "speed limit", "force", "voltage", "speed limit less droop of the P velocity loop")

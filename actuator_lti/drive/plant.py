@@ -5,20 +5,15 @@ Equations (1), (2), (14), and model.md section 6.
 Coefficients may be arrays of shape (K,) stacked over designs: then the matrices have K in front.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design, Motor
 from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at, torque_slope
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Motor
-
 
 Entries = dict[str, Any]
 """Numbers by the name of a state: floats, arrays of shape (K,) of stacked designs, or traced values."""

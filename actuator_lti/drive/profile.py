@@ -4,16 +4,12 @@ Rate and acceleration limits leave a command alone that keeps them; the jerk lim
 samples of the position loop, n = 2 a/(j T) rounded up, and acts on every command (model.md section 7).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import ceil, inf, pi, sin, sqrt
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design
 
 RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
 

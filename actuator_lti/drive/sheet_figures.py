@@ -1,13 +1,10 @@
 """What data sheets state beside a design's own keys, from those keys: to hold against the sheet."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,9 @@
 """The signals and the limiters of a drive, each declared once: name, unit, words, bit of the limit flags."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Axis, Limits
+from actuator_lti.design.model import Axis, Limits
 
 Kind = Literal["value", "rate", "rms", "command"]
 

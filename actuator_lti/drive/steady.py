@@ -4,14 +4,11 @@ Everything outside `actuator_lti.drive` that needs ``u = R i + kE w`` or ``M = k
 controllers make of a command at rest: gain, and droop at speed.
 """
 
-from __future__ import annotations
-
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from actuator_lti.design.law import Law
-    from actuator_lti.design.model import Design, Motor
+from actuator_lti.design.law import Law
+from actuator_lti.design.model import Design, Motor
 
 
 def winding(motor: Motor) -> tuple[Any, Any, Any]:

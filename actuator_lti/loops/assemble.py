@@ -1,21 +1,16 @@
 """From a design to all of its loops, in the form and at the operating point asked for."""
 
-from __future__ import annotations
-
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from actuator_lti.design.loader import as_design
-from actuator_lti.drive.operating import Operating
+from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating, OperatingPoint, RotorState
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.result import Form, InnerLoops, Loops
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.drive.operating import OperatingPoint, RotorState
 
 
 def assemble_loops(

@@ -18,9 +18,10 @@ from actuator_lti.margins.delays.form import delay_form, in_series
 from actuator_lti.margins.distances import INVERSE
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import given_of
-from actuator_lti.margins.loop import Real, loop_of, rational_loop
+from actuator_lti.margins.loop import loop_of, rational_loop
 from actuator_lti.step import StepFigures
 from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.types import Real
 
 _OVER = 1e-9  # of the final value: less is no overshoot
 

@@ -10,26 +10,20 @@ phase of the exact sampled loop:
     + sampling effects (digital PI against PI(s), aliasing, exact hold) -> sampled form
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.blocks import centre_rad_s
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, OperatingPoint, RotorState
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops.continuous import open_loop
 from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.sampled import loop
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design, Filter
-    from actuator_lti.drive.operating import OperatingPoint, RotorState
 
 _GRID = 1000
 _LOW = 1e-4  # of the frequency asked for: where unwrapping starts

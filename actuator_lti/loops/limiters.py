@@ -5,22 +5,18 @@ shaft: an angle or, of a speed drive, a speed there; of a torque or voltage driv
 sinusoidal command of amplitude A reaches the limiter at A_k(w) = limit_k/|T_k(jw)|.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean, profile_onset_rad
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
+from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.drive.wiring import Drive
-    from actuator_lti.loops.result import Loops
+from actuator_lti.loops.result import Loops
 
 Response = Callable[[np.ndarray], np.ndarray]
 

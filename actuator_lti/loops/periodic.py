@@ -9,24 +9,20 @@ the verdict on stability from them is the truth.  A margin read from L is that o
 `exact_margins` gives the gains and the delay that bring the true loop to its border.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
+from actuator_lti.loops.result import Loops
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, used
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_common_rest_mode
-
-if TYPE_CHECKING:
-    from actuator_lti.loops.result import Loops
 
 _GAINS = np.geomspace(1.0, 1e4, 401)
 _AT_ONCE = 50

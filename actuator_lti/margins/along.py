@@ -14,10 +14,11 @@ from actuator_lti.margins.axis_parts import axis_parts
 from actuator_lti.margins.axis_search import Factored, Place
 from actuator_lti.margins.distances import DISK, MODULUS, Distance
 from actuator_lti.margins.factored import SAME, polished
-from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Complex, Real
 
 _ROUNDED = 1e-12
 _METHOD = "factors of the loop, bounded over whole intervals of frequency; crossings polished by Newton"
@@ -44,9 +45,11 @@ class Along:
         parts = zip(*(part.in_w for part in self._parts), strict=True)
         gain_w, self.real_w, self._rising = map(np.concatenate, parts)
         self.gain_w, self.gain_L = polished(self.loop, gain_w, gain=True)
+        for k in np.flatnonzero(np.abs(self.factors.log_value(self.real_w)[0]) > FAR_LOG):
+            self.real_w[k] = self.factors.onto_axis(float(self.real_w[k]))
         log_gain = self.factors.log_value(self.real_w)[0]
         self.real_L = -np.exp(log_gain).astype(complex)
-        near = np.abs(log_gain) <= FAR_LOG
+        near = np.abs(log_gain) <= FAR_LOG + SAME
         self.real_w[near], self.real_L[near] = polished(self.loop, self.real_w[near], gain=False)
         self.half_turns = self._turned()
         return self

@@ -7,8 +7,8 @@ import numpy as np
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.axis_search import Factored, Found
-from actuator_lti.margins.loop import Mask, Real
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Mask, Real
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
 _NEAR_ONE = 1e-6

@@ -17,12 +17,13 @@ from functools import cached_property
 import numpy as np
 
 from actuator_lti.axis import _nearest, _search
-from actuator_lti.axis._factors import BOUNDS, slot
+from actuator_lti.axis._factors import BOUNDS, STEP, slot
 from actuator_lti.axis.library import LIBRARY
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Complex, Mask, Real
 
+_NEAR = 2.0 * STEP
 _NEXT_TO_AXIS = 1e-14  # relative: a root on the axis itself is held this far from it
 _ROOM, _MORE, _MOST = 1 << 11, 8, 1 << 17  # intervals: asked for first, each time more, and no more than that
 Place = tuple[float, float]
@@ -112,6 +113,17 @@ class Factored:
         LIBRARY.functions.evaluated(*self._row, w, parts, 0)
         gain, phase = parts[-5:-3].tolist()
         return gain, phase
+
+    def onto_axis(self, w: float) -> float:
+        """The crossing of the negative real axis that the search left near w, to rounding."""
+        level = np.pi + 2.0 * np.pi * round((self.log_at(w)[1] - np.pi) / (2.0 * np.pi))
+        low, high = w * (1.0 - _NEAR), w * (1.0 + _NEAR)
+        first, last = (self.log_at(end)[1] > level for end in (low, high))
+        if first == last:
+            raise Doubtful("a crossing beyond 200 dB is not told from another")
+        while low < (middle := 0.5 * (low + high)) < high:
+            low, high = (middle, high) if (self.log_at(middle)[1] > level) == first else (low, middle)
+        return middle
 
     def search(self, low: float, high: float, listed_to: float = math.inf) -> Found:
         """Find all crossings with low < w < high; of the real axis only those up to ``listed_to``.

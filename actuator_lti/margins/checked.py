@@ -9,11 +9,12 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.along import Along
 from actuator_lti.margins.axis_search import Factored
 from actuator_lti.margins.factored import factored
-from actuator_lti.margins.loop import RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.poles import SortedPoles, all_sorted, sorted_poles
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import MOST_ERROR, Doubtful, error_bound, hardly_placed, in_double_precision
+from actuator_lti.types import Real
 
 _WIDEST = 1e6  # ratio of poles and zeros up to which double precision is asked
 _NEAR_ONE = 1e-6

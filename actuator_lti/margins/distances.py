@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.margins.loop import Complex, Real
+from actuator_lti.types import Complex, Real
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_lti.margins.axis_search import Factored, half_turn
-from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.poles import SortedPoles, eigenvalues, polynomial_roots, sorted_poles
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.types import Complex, Real
 
 _LEAST_SLACK = 1e-8
 SAME = 1e-4  # relative: the loop and the product of its factors

@@ -8,11 +8,10 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
+from actuator_lti.types import Real
 
-Real = NDArray[np.floating[Any]]
 _MOST_SAMPLES = 100
 ULP = 8  # by how much the entries may be wrong: what this changes the data do not determine
 
@@ -92,7 +91,7 @@ def given_of(system: Any) -> Given:
         raise InputError(
             f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
         )
-    period_s = period_of(system)
+    period_s = float(system.dt) if system.dt else None  # dt=True: 1 s
     if hasattr(system, "num"):
         num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         if not den.size:
@@ -116,11 +115,6 @@ def _trimmed(coefficients: Any) -> Real:
     p = np.asarray(coefficients, dtype=float)
     used = p.nonzero()[0]
     return p[used[0] :] if used.size else p[:0]
-
-
-def period_of(system: Any) -> float | None:
-    """Sampling period, s; 1 where it is not stated (``True``), ``None`` where continuous."""
-    return float(system.dt) if system.dt else None
 
 
 def unwarped(w: float, period_s: float | None) -> float:

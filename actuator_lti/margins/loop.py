@@ -8,13 +8,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgebal
 
-from actuator_lti.margins.given import Given, Real, given_of, unwarped
+from actuator_lti.margins.given import Given, given_of, unwarped
+from actuator_lti.types import Complex, Real
 
-Complex = NDArray[np.complexfloating[Any, Any]]
-Mask = NDArray[np.bool_]
 _AT_MINUS_ONE = 1e-13
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.linalg.lapack import dgeev
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.loop import Complex, Mask, Real
+from actuator_lti.types import Complex, Mask, Real
 
 _EPS = float(np.finfo(float).eps)
 _SHARP = 1e-3  # a border pole's error, over its modulus

@@ -7,7 +7,8 @@ import numpy as np
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import Complex, RationalLoop, Real, horner
+from actuator_lti.margins.loop import RationalLoop, horner
+from actuator_lti.types import Complex, Real
 
 EPS = float(np.finfo(float).eps)
 TOUCH = 1e-9  # how near to one (gain) or to the axis (rad) a touching curve counts as touching

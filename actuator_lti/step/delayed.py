@@ -10,12 +10,13 @@ from scipy.interpolate import BarycentricInterpolator
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
-from actuator_lti.margins.loop import Complex, Real, balanced
+from actuator_lti.margins.loop import balanced
 from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import MOST_PIECES, DelayStepper
 from actuator_lti.systems.plain_system import response
+from actuator_lti.types import Complex, Real
 
 _FIRST = 10.0  # longest delays to walk at first
 _MEET = 1e-7

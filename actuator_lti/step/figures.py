@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from actuator_lti.margins.loop import Mask, Real, rational_loop
+from actuator_lti.margins.loop import rational_loop
 from actuator_lti.step.delayed import Stepped, delayed_response
 from actuator_lti.step.motion import OVER, Motion, notes, rational_motion
 from actuator_lti.systems.measured_response import refuse_measured
+from actuator_lti.types import Mask, Real
 
 _SHOWN = 2000
 _BAND = 0.02

@@ -21,7 +21,7 @@ import numpy as np
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.given import ULP
-from actuator_lti.margins.loop import Complex, Mask, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.systems.exact_fraction import (
     Fraction,
     balls,
@@ -34,6 +34,7 @@ from actuator_lti.systems.exact_fraction import (
     roots,
     shown,
 )
+from actuator_lti.types import Complex, Mask, Real
 
 OVER = 1e-9  # an excess below this part of the final value is no overshoot
 _TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside

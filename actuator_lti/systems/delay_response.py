@@ -14,7 +14,7 @@ from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, smalle
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, exact_inside_delays
 from actuator_lti.margins.delays.form import DelayForm
 from actuator_lti.margins.distances import Distance
-from actuator_lti.margins.loop import Real
+from actuator_lti.types import Real
 
 _BITS = 128
 _SAME = fmpq(1, 100)  # relative: what 8 ulp of the entries change by more is not told from zero

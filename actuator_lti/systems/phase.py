@@ -12,12 +12,13 @@ from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.exact.loop import exact_loop
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of
-from actuator_lti.margins.loop import Real, loop_of
+from actuator_lti.margins.loop import loop_of
 from actuator_lti.margins.measured.bounds import bounds
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.measured_response import is_measured, measured_response
+from actuator_lti.types import Real
 
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
 

@@ -8,13 +8,14 @@ from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.correlation.driving import command_of
-from analyses.estimation.parameters import parameter
+from analyses.estimation.fit import Fit
 from analyses.identification import verdict
 from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.design_values import (
     DesignValue,
+    at_constant,
     design_values,
-    given_constant,
+    with_found_constant,
     with_given_constant,
 )
 from analyses.identification.diagnosis import Diagnosed, diagnosed
@@ -30,9 +31,10 @@ from analyses.identification.to_design import (
     INERTIAS,
     design_with_fit,
     joint_values,
+    with_correlations,
     with_structure,
 )
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
@@ -86,25 +88,30 @@ def identify_bench(
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
     names = ", ".join(record.name for record in records)
     start, electrical = with_values(design, fixed_values(design, settings.fix)), None
+    both: Fit | None = None
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     usual = cutoff is None and decimation is None
     recipe = None if usual else recipe_for(used[0], cutoff, decimation)
+    findings = {record.name: check_record(start, record) for record in (*used, *unseen)}
     if settings.electrical:
-        electrical = fit_electrical(start, used, recipe)
-        start = design_with_fit(start, electrical_values(start, electrical), f"voltage equation of {names}")
-    judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
-    findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
+        with because(findings):
+            electrical = fit_electrical(start, used, recipe)
+            told = electrical_values(start, electrical)
+            start = design_with_fit(start, told, f"voltage equation of {names}")
+        judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
+        findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     limit = settings.residual_limit / 100.0
     held = _held(design, start, settings)
-    right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
+    with because(findings):
+        right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     used, model = right.records, right.model
+    compared = design_values(design, model, used, start)  # at the constant that made the torques
     if electrical is None:
-        model = with_given_constant(start, model, used)
+        model = with_given_constant(start, model, used, compared)
+    else:
+        model, both = with_found_constant(start, model, used, electrical_values(start, electrical))
     findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
-    source, given = f"identified from {names}", given_constant(model)
-    if given is not None:
-        source += f" at {parameter(given).key} = {model[given]:g} {parameter(given).unit}"
-    compared = design_values(design, model, used, start)
+    source = f"identified from {names}{at_constant(model)}"
     loaded = any(is_loaded(record) for record in used)
     size = verdict.size_item(design, compared, kept_constants=electrical is None, loaded=loaded)
     items = list(_items(design, findings, size, right, model, held, limit))
@@ -115,6 +122,8 @@ def identify_bench(
                 told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
                 raise InputError(f"settings.{key}: {told}", where=record.name)
         made = design_with_fit(with_structure(start, model), values, source)
+        if both is not None:
+            made = with_correlations(made, joint_values(start, both, inertia_to=settings.inertia_to))
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
@@ -199,10 +208,7 @@ def _items(
     yield verdict.Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
     yield verdict.residual_item(model.relative_residual, limit)
     yield from verdict.offset_items(design, model)
-    for name, kept in model.fixed.items():  # what these records neither confirm nor deny
-        if kept.value and name not in held:
-            label = parameter(name, design.axis).label
-            yield verdict.Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
+    yield from verdict.kept_items(model, held, design.axis)
     for record in right.records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():

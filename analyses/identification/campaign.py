@@ -1,19 +1,20 @@
 """From a campaign to coefficients: import, steady parts, surface, the question of a richer law."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from analyses.identification.design_values import design_value
+from actuator_lti.types import Floats
+from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
-from analyses.identification.verdict import Item, residual_item, simulated_item, size_item
+from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
 
@@ -29,8 +30,7 @@ LOAD_TOLERANCE = 0.10
 class CampaignResult:
     """Everything that a campaign told: the fit, the runs behind it, and those set aside with their reasons.
 
-    ``runs_listed == len(fit.points) + len(set_aside) + outliers set aside``. ``contradicting`` are those of
-    the runs set aside whose record does not agree with what is said of it.
+    ``runs_listed == len(fit.points) + len(set_aside) + outliers set aside``.
     """
 
     imported: ImportedCampaign = field(repr=False)
@@ -39,7 +39,6 @@ class CampaignResult:
     set_aside: tuple[SetAside, ...]
     criterion: SteadyCriterion
     torque_constant_Nm_A: float
-    contradicting: tuple[SetAside, ...] = ()
     findings: Mapping[str, tuple[Finding, ...]] = field(default_factory=dict)
 
     @property
@@ -92,37 +91,55 @@ def identify_campaign(
         told = "motor.torque_constant: the design has none, so currents cannot become torques"
         raise InputError(told, design.name)
     campaign = imported.campaign
-    points, restless, contradicting, findings = [], [], [], {}
+    points, aside, findings = [], list(imported.set_aside), {}
     for run in imported.runs:
         try:
             point = steady_point(run, constant)
         except InputError as error:
-            restless.append(SetAside(id=run.id, reason=str(error)))
+            aside.append(SetAside(id=run.id, reason=str(error)))
             continue
         findings[run.id] = tuple(check_run(design, imported, run, point))
-        wrong = [f"{one.subject}: {one.text}" for one in findings[run.id] if one.passed is False]
-        if wrong:
-            contradicting.append(SetAside(id=run.id, reason="; ".join(wrong)))
+        if wrong := wrong_of(findings[run.id]):
+            aside.append(SetAside(id=run.id, reason=wrong, contradicts=True))
         else:
             points.append(point)
-    aside = (*imported.set_aside, *restless, *contradicting)
-    tools, outliers, kept = campaign.instruments, campaign.outliers, _values_of(design)
+    tools, outliers, own = campaign.instruments, campaign.outliers, _values_of(design)
     try:
-        fit = fit_surface(points, tools, constant, outliers=outliers, fixed=fixed, kept=kept)
+        fit = fit_surface(points, tools, constant, outliers=outliers, fixed=fixed, kept=own)
     except InputError as error:
         told = "; ".join(f"{run.id}: {run.reason}" for run in aside[:3])
         message = f"{error.message} ({told})" if told else error.message
         raise InputError(message, campaign.origin) from None
+    gone = {run.id for run in aside}
+    if lost := sum(run.id in gone and bool(run.load_Nm) for run in campaign.runs):
+        none = "no run is loaded"
+        words = f"{none} but those set aside ({lost})"
+        kept = {name: replace(f, reason=f.reason.replace(none, words)) for name, f in fit.fixed.items()}
+        fit = replace(fit, fixed=kept)
+    if not tools.torque_constant:  # else the intervals hold its error
+        given = kept_constant(design, "torque_constant", fit, _constant_shares(fit))
+        fit = replace(fit, fixed={**fit.fixed, **given})
     return CampaignResult(
         imported=imported,
         fit=fit,
         laws=compare_laws(fit) if richer and not fixed and len(fit.points) >= 5 else None,
-        set_aside=aside,
+        set_aside=tuple(aside),
         criterion=CRITERION,
         torque_constant_Nm_A=constant,
-        contradicting=tuple(contradicting),
         findings=findings,
     )
+
+
+def _constant_shares(fit: SurfaceFit) -> Floats:
+    """Relative change of each coefficient over that of the torque constant, beside those that are held."""
+    rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
+    torque = np.array([p.torque_Nm for p in fit.points]) / fit.residual_stds_Nm
+    told, held = list(fit.told), [k for k in range(len(NAMES)) if k not in fit.told]
+    both = np.column_stack([torque, torque - rows[:, held] @ fit.values[held]])
+    change, value = np.linalg.lstsq(rows[:, told], both, rcond=None)[0].T
+    shares = np.zeros(len(NAMES))
+    shares[told] = change / value
+    return shares
 
 
 def check_run(
@@ -160,24 +177,43 @@ def _values_of(design: Design) -> dict[str, float]:
 
 
 def campaign_items(
-    design: Design, result: CampaignResult, simulated: float | None, limit: float
+    design: Design,
+    result: CampaignResult,
+    simulated: float | None,
+    limit: float,
+    held: Collection[str] = (),
 ) -> tuple[Item, ...]:
     """The verdict on a campaign: runs, residual, size, and the written design simulated again."""
-    fit, wrong = result.fit, result.contradicting
-    why = "; ".join(f"run {run.id}: {run.reason}" for run in wrong[:3])
-    why += f" and {len(wrong) - 3} more" if len(wrong) > 3 else ""
+    fit, aside = result.fit, sorted(result.set_aside, key=lambda run: not run.contradicts)
+    why = "".join(f"run {run.id}: {run.reason}" for run in aside[:1])
+    why += f"; set aside are runs {', '.join(run.id for run in aside)}" if len(aside) > 1 else ""
+    passed = None if aside else True
     names, before = ("dry", "viscous", "load_coefficient"), _values_of(design)
     found = fit.renamed(dict(zip(NAMES, names, strict=True)))
     compared = [design_value(design, found, names[k], before[NAMES[k]]) for k in fit.told]
     label = "Runs agree with their set speed and load, themselves and the design"
     items = [
-        Item(id="runs", label=label, passed=not wrong, reason=why),
+        *_law_item(design, fit),
+        Item(id="runs", label=label, passed=False if aside and aside[0].contradicts else passed, reason=why),
         size_item(design, [one for one in compared if one], kept_constants=False, loaded=True),
         residual_item(fit.relative_residual, limit),
+        *kept_items(fit, held),
     ]
     if simulated is not None:
         items.append(simulated_item("the runs", simulated, limit, "steady current, simulated"))
     return tuple(items)
+
+
+def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
+    """What the law lacks of a drive that carries its load: M_ext over the reduction."""
+    if design.load.path == "self-locking" or not any(point.load_Nm for point in fit.points):
+        return
+    reason = (
+        f'load.path = "{design.load.path}": the motor carries M/N as well, which the law C0 + Cv w + CM |M| '
+        f"lacks, so CM holds 1/N = {1e3 / design.total_ratio:.4g} mN m/(N m) beside the friction; allowed: "
+        'load.path = "self-locking", or records of a motion, whose model has M/N'
+    )
+    yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
 def steady_current_error(

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from math import exp, inf, log
+from math import exp, log
 from typing import Any
 
 import numpy as np
 from scipy.stats import chi2
 
+from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -17,7 +18,7 @@ from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, default_value
 from analyses.identification.rows import drive_of, rows_under
-from analyses.records.consistency import SURE, electrical_parts
+from analyses.records.consistency import SURE
 from analyses.records.record import Record
 
 NO_CHANCE = 1e-3
@@ -153,57 +154,109 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
 
 
 STEP = 0.1
+LEAST_SHARE = 5e-3
 CONSTANTS = {"torque_constant": "torque_constant_Nm_A", "source_gain": "source_gain_Nm_V"}
 """What makes torques of a current or a voltage: fields of a motor, by the names of the parameters."""
 
 
-def given_constant(model: JointModel) -> str | None:
-    """The constant of the design that the values of a model hang on, by name."""
-    return next((name for name in CONSTANTS if name in model.fixed), None)
+def given_constant(fit: Fit) -> str | None:
+    """The constant of the design that the values of a fit hang on, by name."""
+    return next((name for name in CONSTANTS if name in fit.fixed), None)
 
 
-def with_given_constant(start: Design, model: JointModel, records: Sequence[Record]) -> JointModel:
+def at_constant(fit: Fit) -> str:
+    """That constant for the source of a written value: `` at key = value unit``; empty without one."""
+    name = given_constant(fit)
+    return "" if name is None else f" at {parameter(name).key} = {fit[name]:g} {parameter(name).unit}"
+
+
+def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str = "") -> dict[str, Fixed]:
+    """A constant (or load friction) kept at the design's, by its name; none where no value hangs on it.
+
+    ``shares``: relative change of each value of the fit over that of the constant; ``told``: what a record
+    says of it.
+    """
+    each: dict[str, list[str]] = {}
+    for one, share in zip(fit.names, shares.tolist(), strict=True):
+        if abs(share) > LEAST_SHARE:
+            each.setdefault(f"{100.0 * STEP * share:+.2g} %", []).append(one)
+    if not each:
+        return {}
+    words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())
+    if len(each) == 1 and sum(map(len, each.values())) == len(fit.names):
+        words = f"{next(iter(each))} of every value"
+    scale = ", nor the scale of the current (rms read as DC: 0.82 times)" * (name == "torque_constant")
+    value = parameter_value(design, parameter(name).key)
+    reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
+    moves = {n: -part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
+    return {name: Fixed(value=value, reason=f"{reason}; {100.0 * STEP:+.2g} % of it is {words}", moves=moves)}
+
+
+def with_given_constant(
+    start: Design, model: JointModel, records: Sequence[Record], compared: Sequence[DesignValue]
+) -> JointModel:
     """The model and, among what is kept, the design's constant that all its values hang on; none if told.
 
     A motion and a current tell ratios to kM alone: with another kM, or a current of another scale, the same
     record has other values. Values and intervals are then those at the design's constant, and ``moves`` says
     by how much an error of it moves each of them, with known loads and held values where there are such.
+    Where a voltage tells kE (among the values ``compared``) closely, the intervals hold by how much the
+    design's is off from it, and the error of that.
     """
-    names = {_constant(start, record) for record in records}
+    names = {constant_of(start, record) for record in records}
     name = names.pop() if len(names) == 1 else None
     if name is None:
         return model
-    value = float(getattr(start.motor, CONSTANTS[name]))
-    changed: dict[str, Any] = {CONSTANTS[name]: (1.0 + STEP) * value}
-    more = replace(start, motor=replace(start.motor, **changed))
-    share = _shares(start, more, model, records)
-    each = [f"{100.0 * STEP * part:+.2g} %" for part in share]
-    words = f"{each[0]} of every value"
-    if len(set(each)) > 1:
-        words = " and ".join(f"{part} of {one}" for part, one in zip(each, model.names, strict=True))
-    scale = "" if name == "source_gain" else ", nor the scale of the current (rms read as DC: 0.82 times)"
-    kept = Fixed(
-        value=value,
-        reason=f"these records do not tell it{scale}: values and intervals are those at the design's; "
-        f"{100.0 * STEP:+.2g} % of it is {words}",
-        moves={n: -part * model[n] / value for n, part in zip(model.names, share.tolist(), strict=True)},
+    shares = _shares(start, name, model, records)
+    words = ""
+    for one in compared:
+        if one.name == "back_emf" and name == "torque_constant" and one.error <= one.allowed:
+            off = one.ratio - 1.0
+            moved = shares * float(np.hypot(off, one.error)) * model.values
+            model = replace(model, covariance=model.covariance + np.outer(moved, moved))
+            if abs(off) <= SURE * one.error:
+                return model
+            words = (
+                f"by the voltage kE, and so kM, is {one.ratio:.4g} times the design's (standard error "
+                f"{one.error:.1g}): values are those at the design's, the intervals hold the difference; "
+                "--electrical takes kM from the record"
+            )
+    return replace(model, fixed={**model.fixed, **kept_constant(start, name, model, shares, words)})
+
+
+def with_found_constant(
+    start: Design, model: JointModel, records: Sequence[Record], found: Fit
+) -> tuple[JointModel, Fit]:
+    """The model with the error of kM in its intervals, and its values beside those of the voltage equation.
+
+    ``found`` has kM and what comes with it, by the keys of a design.
+    """
+    key, moves = parameter("torque_constant").key, np.zeros(len(model.names))
+    if {constant_of(start, record) for record in records} == {"torque_constant"}:
+        moves = _shares(start, "torque_constant", model, records) * model.values / found[key]
+    beside = np.outer(moves, found.covariance[found.names.index(key)])
+    model = replace(model, covariance=model.covariance + found.std(key) ** 2 * np.outer(moves, moves))
+    both = Fit(
+        names=(*model.names, *found.names),
+        values=np.concatenate([model.values, found.values]),
+        covariance=np.block([[model.covariance, beside], [beside.T, found.covariance]]),
     )
-    return replace(model, fixed={**model.fixed, name: kept})
+    return model, both
 
 
-def _constant(design: Design, record: Record) -> str | None:
-    """What makes a torque of this record's drive signal, where nothing else in the record tells it."""
+def constant_of(design: Design, record: Record) -> str | None:
+    """What makes a torque of this record's drive signal, by the name of the constant."""
     if {"force", "force_reference", "torque_reference"} & record.signals.keys():
         return None
     if drive_of(design, record)[1].startswith("voltage"):
         return None if design.effective_motor.source_gain_Nm_V is None else "source_gain"
-    low, high = electrical_parts(record.drive(design), record).get("kE w", (-inf, inf))
-    closely = 0.5 * (high - low) <= SURE * own_share(design, "motor.back_emf_constant")
-    return None if closely else "torque_constant"
+    return "torque_constant"
 
 
-def _shares(start: Design, more: Design, model: JointModel, records: Sequence[Record]) -> Floats:
+def _shares(start: Design, name: str, model: JointModel, records: Sequence[Record]) -> Floats:
     """Relative change of each fitted value over that of the constant; exact, as the fit is linear in it."""
+    changed: dict[str, Any] = {CONSTANTS[name]: (1.0 + STEP) * float(getattr(start.motor, CONSTANTS[name]))}
+    more = replace(start, motor=replace(start.motor, **changed))
     tables, targets = [], []
     for weight, record in zip(model.weights, records, strict=True):
         one, other = (rows_under(design, record, model) for design in (start, more))

@@ -14,12 +14,20 @@ from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
 from analyses.identification import two_mass
 from analyses.identification.asked import held_by_name
+from analyses.identification.design_values import STEP, at_constant, constant_of, kept_constant
 from analyses.identification.play import Play, play_of
 from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import design_with_fit
 from analyses.identification.two_mass import Lines, TwoMass
-from analyses.identification.verdict import RESIDUAL_LIMIT, Identified, Item, inputs_item, simulated_item
+from analyses.identification.verdict import (
+    RESIDUAL_LIMIT,
+    Identified,
+    Item,
+    inputs_item,
+    kept_items,
+    simulated_item,
+)
 from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
@@ -96,6 +104,7 @@ def identify_frequency(
     for name, (others, slope) in _besides(design).items():
         held |= {name: held[name] / slope + others} if name in held else {}
     fit = _fitted(lines, design.ratio_to_coupling, held, reaction)
+    fit = replace(fit, fixed={**fit.fixed, **_given(design, record, lines, held, fit)})
     play = None if play_record is None else play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
@@ -104,6 +113,7 @@ def identify_frequency(
     told = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
     label = f"The two-mass model explains the lines ({told})"
     items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
+    items += kept_items(fit, held)
     items.append(_written_item(read_design_text(write_design(made)), lines, record.name, fit.reaction))
     return FrequencyResult(
         record=record,
@@ -117,6 +127,23 @@ def identify_frequency(
         findings=findings,
         items=tuple(items),
     )
+
+
+def _given(
+    design: Design, record: Record, lines: Lines, held: Mapping[str, float], fit: TwoMass
+) -> dict[str, Fixed]:
+    """What makes torques, and the load friction: what an error of each moves, found by another fit."""
+    name, scale, made = constant_of(design, record), np.ones(len(lines.names)), dict[str, Fixed]()
+    scale[0] += STEP
+    noise = lines.noise * np.outer(scale, scale)
+    larger = replace(lines, means=lines.means * scale[:, None], noise=noise)
+    more = fit.reaction + STEP * (fit.reaction - 1.0 / fit.reduction)
+    for one, tried, reaction in ((name, larger, fit.reaction), ("load_coefficient", lines, more)):
+        if one is not None:
+            again = _fitted(tried, fit.reduction, held, reaction)
+            shares = np.array([again[n] / fit[n] - 1.0 for n in fit.names]) / STEP
+            made |= kept_constant(design, one, fit, shares)
+    return made
 
 
 def _between_ticks(design: Design, record: Record, lines: Lines) -> Lines:
@@ -213,4 +240,4 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Desig
     made = fit.mapped(slopes, values)
     if play is not None and play.told:
         made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)
-    return design_with_fit(base, made, f"frequency response of {record}")
+    return design_with_fit(base, made, f"frequency response of {record}{at_constant(fit)}")

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.special import stdtrit
 from scipy.stats import chi2
 
 from actuator_lti.design import parameter_value, paths_of, read_design_text, with_values, write_design
@@ -16,12 +17,14 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
-from analyses.estimation.fit import Fit, Fixed
+from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import told_apart
+from analyses.estimation.parameters import parameter
 from analyses.identification.asked import Of
-from analyses.identification.output_error import fit_output
+from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
+from analyses.identification.output_error import STEP, fit_output
 from analyses.identification.to_design import design_with_fit
-from analyses.identification.verdict import Identified, Item, simulated_item
+from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 
 KEYS = (
     "motor.rotor_inertia",
@@ -31,6 +34,7 @@ KEYS = (
     "friction.viscous",
     "control.computing_delay",
 )
+CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
 RESOLVED = 1e-5
@@ -42,11 +46,13 @@ class ResponseFit(Fit):
     """Values by key with which a loop's response is the measured one.
 
     ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
-    Errors are widened by a misfit above 1; without deviations they are those of the residual.
+    Errors are widened by a misfit above 1; without deviations they are those of the residual, so large that
+    1.96 of them hold Student's 95 % interval at its degrees of freedom.
     """
 
     misfit: float | None
     at_bound: tuple[str, ...]
+    slopes: Floats = field(repr=False)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +74,7 @@ def identify_response(
     of: Of = "L",
     fixed: Mapping[str, float] | None = None,
     limit: float = 0.2,
+    averages: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> ResponseResult:
     """Fit a design to a measured frequency response of one of its loops.
@@ -88,12 +95,16 @@ def identify_response(
     limit : float
         Largest relative error of the design's response, root mean square over the frequencies.
 
+    averages : int, optional
+        Those behind the coherence, which then gives the deviations.
+
     Raises
     ------
     InputError
-        If the response cannot be read, the design has no such loop, or nothing is determined.
+        If the response cannot be read, the design has no such loop, nothing is determined, or there are no
+        more numbers than unknowns.
     """
-    measured = read_response(source)
+    measured = read_response(source, averages)
     start = with_values(design, dict(fixed or {}))
     model = _model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
@@ -106,11 +117,13 @@ def identify_response(
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
+    _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(
         start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
     )
-    fit = replace(fit, fixed={**held, **fit.fixed})
-    made = design_with_fit(start, fit, f"frequency response {measured.name}")
+    given = _given(start, fit, lambda tried: parts(model(tried))) if CONSTANT_KEYS.isdisjoint(held) else {}
+    fit = replace(fit, fixed={**held, **fit.fixed, **given})
+    made = design_with_fit(start, fit, f"frequency response {measured.name}{at_constant(fit)}")
     modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
@@ -121,6 +134,7 @@ def identify_response(
         items.insert(0, Item.of("misfit", label, "" if level > LEVEL else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
+    items += kept_items(fit, held)
     return ResponseResult(
         design=made,
         items=tuple(items),
@@ -130,6 +144,19 @@ def identify_response(
         of=of,
         fit=fit,
     )
+
+
+def _given(start: Design, fit: ResponseFit, parts: Callable[[Design], Floats]) -> dict[str, Fixed]:
+    """The constant that makes torques, which the response of a loop tells only with the values, to scale."""
+    name = next((name for name, of in CONSTANTS.items() if getattr(start.motor, of) is not None), None)
+    if name is None:
+        return {}
+    found = with_values(start, dict(zip(fit.names, fit.values.tolist(), strict=True)), check=False)
+    key = parameter(name).key
+    more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
+    size = np.linalg.norm(fit.slopes, axis=0)
+    moved = np.linalg.lstsq(fit.slopes / size, parts(more) - parts(found), rcond=None)[0] / size
+    return kept_constant(start, name, fit, moved / fit.values / STEP)
 
 
 def _model(
@@ -150,7 +177,8 @@ def _model(
 
     def response(tried: Design) -> Complexes:
         if tried.coupling is not None and not tried.load_side_inertia_kgm2 > 0.0:
-            told = f"wants no inertia behind the coupling; allowed: a response of {name}, --of {of}"
+            told = f"no drive with a load behind the coupling has it as a response of {name}, --of {of}"
+            told += f"; allowed: --loop {', '.join(there)}, and --of as it was measured"
             raise InputError(told, where=measured.name)
         system = seen(tried)
         value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()
@@ -161,6 +189,14 @@ def _model(
     if not last < top:
         raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
     return response
+
+
+def _refuse_too_few(numbers: int, unknowns: int, where: str) -> None:
+    """Without degrees of freedom there is no interval."""
+    if numbers <= unknowns:
+        told = f"{numbers // 2} frequencies are {numbers} numbers for {unknowns} unknowns"
+        allowed = f"{unknowns // 2 + 1} frequencies or more, or fewer unknowns (--fix KEY=VALUE)"
+        raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=where)
 
 
 def _determined(
@@ -182,8 +218,10 @@ def _determined(
             continue
         size = np.linalg.norm(found.slopes, axis=0)
         unit = found.slopes / size
-        variance = float(found.rest @ found.rest) / max(len(found.rest) - len(size), 1)
-        scale = max(variance, 1.0) if known else variance
+        freedom = len(found.rest) - len(size)
+        variance = float(found.rest @ found.rest) / freedom
+        student = float(stdtrit(freedom, 0.975)) / COVERAGE
+        scale = max(variance, 1.0) if known else variance * student**2
         covariance = np.asarray(scale * (np.linalg.inv(unit.T @ unit) / np.outer(size, size)))
         share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
         worst = int(np.argmax(share))
@@ -202,5 +240,6 @@ def _determined(
         fixed={key: Fixed(value=value, reason=told[key]) for key, value in kept_at.items()},
         misfit=float(np.sqrt(variance)) if known else None,
         at_bound=found.at_bound,
+        slopes=found.slopes,
     )
     return fit, found.rest

@@ -17,6 +17,7 @@ from analyses.identification.campaign import (
     steady_current_error,
 )
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
+from analyses.identification.design_values import at_constant
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
 from analyses.identification.measured_response import ResponseResult, identify_response
 from analyses.identification.plan import Plan, plan_motions
@@ -55,7 +56,14 @@ def identify(
     fixed = fixed_values(design, asked.fix)
     if asked.response:
         made = identify_response(
-            design, first, loop=asked.loop, of=asked.response_of, fixed=fixed, limit=limit, progress=progress
+            design,
+            first,
+            loop=asked.loop,
+            of=asked.response_of,
+            averages=asked.averages,
+            fixed=fixed,
+            limit=limit,
+            progress=progress,
         )
     elif asked.is_campaign:
         made = _of_campaign(design, asked, progress)
@@ -79,7 +87,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     held, imported = held_by_name(fixed, NAMES), import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)
     fit, count = result.fit, asked.suggest
-    source = f"identified from {len(fit.points)} runs, {listed.name}"
+    source = f"identified from {len(fit.points)} runs, {listed.name}{at_constant(fit)}"
     made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
     simulated = steady_current_error(written, fit.points, progress=progress)
@@ -87,11 +95,11 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
     suggestion = None
-    if count and not fit.fixed:
+    if count and len(fit.told) == len(NAMES):
         suggestion = suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
     return CampaignAnswer(
         design=made,
-        items=campaign_items(design, result, simulated, asked.residual_limit / 100.0),
+        items=campaign_items(design, result, simulated, asked.residual_limit / 100.0, held),
         result=result,
         shares=contributions(fit.values, fit.covariance, load_Nm=load, speed_rad_s=speed),
         load_Nm=load,

@@ -26,7 +26,7 @@ PLAIN_KEYS = ("friction.viscous", "friction.dry_torque", *REVERSE)
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
-def joint_values(design: Design, model: JointModel, *, inertia_to: str = INERTIAS[0]) -> Fit:
+def joint_values(design: Design, model: Fit, *, inertia_to: str = INERTIAS[0]) -> Fit:
     """The values of an inverse model for the keys of a design.
 
     The model's inertia is all of it, at the motor. ``inertia_to`` gets what the design's other inertias
@@ -122,12 +122,13 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     for path, std in zip(fit.names, fit.standard_errors, strict=True):
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))
         parameters[path] = replace(parameters[path], source=source, grade="D", tolerance=tolerance)
+    return with_correlations(replace(changed, parameters=FrozenMap(parameters)), fit)
+
+
+def with_correlations(design: Design, fit: Fit) -> Design:
+    """The design with the correlations of a fit in the place of those between the same keys."""
     kept = [c for c in design.correlations if not {c.first, c.second} <= set(fit.names)]
-    return replace(
-        changed,
-        parameters=FrozenMap(parameters),
-        correlations=(*kept, *_correlations(fit.names, fit.correlation)),
-    )
+    return replace(design, correlations=(*kept, *_correlations(fit.names, fit.correlation)))
 
 
 def _tolerance(path: str, value: float, std: float) -> Tolerance | None:

@@ -138,10 +138,10 @@ class TwoMass(Fit):
 
     @property
     def resonance_rad_s(self) -> tuple[float, float]:
-        """sqrt(k (1/J_l + 1/(J_m N_c^2))), and its standard error."""
-        n2 = self.reduction**2
+        """sqrt(k (1/J_l + r/(J_m N_c))), r the reaction (1/N_c without load friction); its standard error."""
+        share = self.reaction / self.reduction
         return self._derived(
-            lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + 1 / (p["motor_inertia"] * n2))))
+            lambda p: float(np.sqrt(p["stiffness"] * (1 / p["load_inertia"] + share / p["motor_inertia"])))
         )
 
     def _derived(self, of: Callable[[Mapping[str, float]], float]) -> tuple[float, float]:

@@ -24,6 +24,8 @@ USUAL_CYCLES = 5
 class Asked:
     """Move the drive in the nonlinear simulator: every limit, stick and slip, exact between the ticks.
 
+    Exit status 1 where the motion diverges.
+
     Try: actuator-lti simulate joint --amplitude "5 deg" --duration 0.5 --load "20 N*m" --csv step.csv, or
     actuator-lti simulate fin --command chirp --amplitude 0.5 --frequency 1 --to 50 --duration 4
     """

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -9,6 +10,7 @@ from actuator_lti.bounds import TONES
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
+from analyses.motion.settling import Conduct, conduct
 from nonlinear import Trajectory, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment
@@ -25,6 +27,16 @@ class Motion:
     design: Design
     asked: Asked
     run: Trajectory
+
+    @cached_property
+    def ended(self) -> Conduct:
+        """What it ends in."""
+        return conduct(self.run, self.design.validation.full_deflection_rad)
+
+    @property
+    def passed(self) -> bool | None:
+        """False where it diverges; else a motion is not judged."""
+        return False if self.ended.status == "diverging" else None
 
 
 def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None) -> Motion:

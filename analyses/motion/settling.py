@@ -19,6 +19,7 @@ from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
 from nonlinear.settling.rest import Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
+NEAR = 0.02  # of the largest value: a run that ends within it has settled
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 
@@ -224,13 +225,19 @@ class Conduct:
 
     # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
     # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-    # load go on changing; or why the run stopped
+    # load go on changing, with the limits that act; or why the run stopped
     status: str
     detail: str = ""  # with figures; empty where there is nothing to say
+    later: str = ""  # that it ends so only after the run, and how far from there the run's end is
+
+    @property
+    def said(self) -> str:
+        """What there is to say beside the status."""
+        return "; ".join(filter(None, (self.later, self.detail)))
 
     @property
     def wanted(self) -> bool:
-        """Whether the drive rests, turns steadily or follows, no limit in its way."""
+        """Whether the drive rests or turns steadily, no limit in its way, or follows."""
         return self.status in ("comes to rest", "becomes steady", "following")
 
 
@@ -249,7 +256,7 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         return Conduct(run.status, run.advice)
     rest = None if run.running is None else judge(run.running)
     if rest is None:
-        return Conduct("following")
+        return Conduct("following", _limited(run))
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
     if run.stage == "position":
         rest = counted(rest, full_deflection_rad)
@@ -259,8 +266,17 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
         return Conduct("sits on a limit", ", ".join(limits))
-    left = faint_words(rest, factor, unit) if rest.amplitude else ""
-    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", left)
+    faint = faint_words(rest, factor, unit) if rest.amplitude else ""
+    left = abs(float(run.reference_rad[-1] - run.followed[-1]) - rest.error)
+    far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()
+    later = f"after the run, which ends {factor * left:.3g} {unit} short of that" if far else ""
+    return Conduct("comes to rest" if run.stage == "position" else "becomes steady", faint, later)
+
+
+def _limited(run: Trajectory) -> str:
+    """Which limits acted in a run, and for how much of it."""
+    acted = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in run.limits.items() if use.fraction > 0.0]
+    return f"limited, of the time: {', '.join(acted)}" if acted else ""
 
 
 def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
@@ -279,7 +295,7 @@ def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
     out = {
         "design": run.design_name,
         "status": ended.status,
-        "status_detail": ended.detail,
+        "status_detail": ended.said,
         "rows": run.time_s.size,
         "period_s": run.period_s,
         f"largest_output_{angle}": np.abs(run.output_angle_rad).max(),

@@ -7,7 +7,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from analyses.records.campaign_file import Campaign, RunEntry
-from analyses.records.clocks import ClockJoin, join_records
+from analyses.records.clocks import ClockJoin, Mismatch, join_records
 from analyses.records.inputs import InputUse, account
 from analyses.records.readers import read_record
 from analyses.records.record import Record, RowCounts
@@ -43,10 +43,11 @@ class ImportedRun:
 
 @dataclass(frozen=True, kw_only=True)
 class SetAside:
-    """A run that could not be used, and why."""
+    """A run that could not be used, and why; ``contradicts``: its records do not agree, with what is said."""
 
     id: str
     reason: str
+    contradicts: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,7 +117,8 @@ def import_campaign(
                 sensor = read_record(entry.sensor, campaign.sensor)
             runs.append(assemble_run(campaign, entry, drive, sensor))
         except InputError as error:
-            aside.append(SetAside(id=entry.id, reason=str(error)))
+            wrong = isinstance(error, Mismatch)
+            aside.append(SetAside(id=entry.id, reason=str(error), contradicts=wrong))
         if progress is not None:
             progress(k, len(campaign.runs))
     if not runs:

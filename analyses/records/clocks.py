@@ -20,6 +20,10 @@ MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
 
 
+class Mismatch(InputError):
+    """Two records that do not show one happening."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ClockJoin:
     """How the second recorder's time was put on the first one's, by which of their signals.
@@ -91,7 +95,7 @@ def join_records(
         a = Series(first.time_s, np.abs(first[first_signal]))
         b = Series(second.time_s, np.abs(second[second_signal]))
         where = f"{first.name} with {second.name}"
-        _check_durations(a, b, where)
+        _check_durations(a, b, (first_signal, second_signal), where)
         join = (_by_event if method == "event" else _by_correlation)(a, b, where)
     join = replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
     time = join.offset_s + join.rate * second.time_s
@@ -142,8 +146,8 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
     return start, 0.0 if up[-1] == len(magnitude) - 1 else crossing(int(up[-1])) - start
 
 
-def _check_durations(a: Series, b: Series, where: str) -> None:
-    """Refuse two records in which one motion lasts differently long: no clock is off by so much."""
+def _check_durations(a: Series, b: Series, names: tuple[str, str], where: str) -> None:
+    """Refuse two records in which one happening lasts differently long: no clock is off by so much."""
     span_a, span_b = (0.0 if one is None else one[1] for one in (motion_events(*a), motion_events(*b)))
     if not (span_a > 0.0 and span_b > 0.0):
         return
@@ -152,9 +156,13 @@ def _check_durations(a: Series, b: Series, where: str) -> None:
     if abs(ratio - 1.0) <= RATE_SPREAD + 3.0 * step:
         return
     factor = named_factor(ratio)
-    told = f"factor {factor}" if factor else "a clock is off, or the records are of two runs"
-    lasts = f"the motion lasts {span_a:.4g} s in one record and {span_b:.4g} s in the other"
-    raise InputError(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)
+    told = (
+        f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
+        'are of two runs; allowed: join.method = "given" with run.offset'
+    )
+    lasts = f"the {names[0]} lasts {span_a:.4g} s, the {names[1]} in the other record {span_b:.4g} s"
+    told = f"factor {factor}" if factor else told
+    raise Mismatch(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)
 
 
 def _by_event(a: Series, b: Series, where: str) -> ClockJoin:
@@ -193,7 +201,7 @@ def _by_correlation(a: Series, b: Series, where: str) -> ClockJoin:
     rate, quality = pair.rate(p), pair.quality(p)
     if not quality >= MIN_QUALITY:
         told = f"the two records are not alike: correlation {quality:.2f}, {MIN_QUALITY} wanted"
-        raise InputError(told, where=where)
+        raise Mismatch(told, where=where)
     return ClockJoin(
         offset_s=float(pair.start + p[0] * step + pair.middle - rate * pair.middle),
         offset_std_s=float(np.sqrt(covariance[0, 0]) * step),

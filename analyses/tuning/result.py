@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
@@ -14,6 +15,7 @@ from analyses.comparison.found import LargeSignal
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
+from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
 from analyses.specification.requirements import RequirementVerdict, judged
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
@@ -97,6 +99,8 @@ class TuningResult:
     placed: tuple[str, ...] = ()  # elements that were added, because gains alone do not meet the requirements
     # The requirements on loops by certified margins: the tuned design, and each worst corner of one
     confirmed: tuple[RequirementVerdict, ...] = ()
+    spent: bool = False  # whether the search ended at its bound: then there may be something better
+    hunting: str = ""  # after which step the tuned drive does not come to rest; empty: it does
 
     @property
     def passed(self) -> bool:
@@ -132,6 +136,14 @@ def confirm(
             found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
             verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found] if corner else found
     return tuple(verdicts)
+
+
+def hunting(tuned: Design) -> str:
+    """After which step a drive does not come to rest, as `validate` asks; empty where it does."""
+    if tuned.controller.position is None:
+        return ""
+    swing = noticed(tuned, settlings_of(tuned))
+    return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
 def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:

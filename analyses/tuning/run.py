@@ -17,8 +17,23 @@ from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import MOST_DESIGNS, Problem, limit_of, loop_requirements, problem_of, size_of
-from analyses.tuning.result import BindingRequirement, GainSetting, TuningResult, confirm, nonlinear_checks
+from analyses.tuning.problem import (
+    MOST_DESIGNS,
+    Problem,
+    asked_for,
+    limit_of,
+    loop_requirements,
+    problem_of,
+    size_of,
+)
+from analyses.tuning.result import (
+    BindingRequirement,
+    GainSetting,
+    TuningResult,
+    confirm,
+    hunting,
+    nonlinear_checks,
+)
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
@@ -69,7 +84,9 @@ def tune(
         for item, value in zip(problem.variables, gains, strict=True)
         if item.home is None or value != item.home
     }
-    tuned = replace(with_values(problem.design, moved), name=f"{design.name}-tuned")
+    stated = asked_for(problem.design, settings.requirements)
+    tuned = with_values(problem.design, moved)
+    tuned = replace(tuned, name=f"{design.name}-tuned", requirements=stated)
     tell(len(choices) + 1, stages)
     requirements = _binding(problem, gains, result, settings.aim)
     confirmed = confirm(tuned, wanted, requirements)
@@ -77,8 +94,9 @@ def tune(
     checks = nonlinear_checks(tuned, problem, result) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(stages, stages)
+    feasible = bool(result.min() >= 0.0) and all(v.passes for v in confirmed)
     return TuningResult(
-        feasible=bool(result.min() >= 0.0) and all(v.passes for v in confirmed),
+        feasible=feasible,
         before=design,
         design=tuned,
         gains=tuple(_settings(problem, design, rules, solution.gains, gains)),
@@ -92,6 +110,8 @@ def tune(
         aim=settings.aim,
         placed=problem.elements,
         confirmed=confirmed,
+        spent=problem.spent,
+        hunting=hunting(tuned) if settings.check and feasible else "",
     )
 
 

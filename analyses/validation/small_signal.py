@@ -13,26 +13,21 @@ there the simulator has a closed-loop pole.  It is solved for K and the angle fr
 pole moves with K says on which side of the circle it lies at K (1 - 1e-6) and at K (1 + 1e-6).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from math import degrees, pi
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.loops import ExactMargins
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.types import Complexes, Floats
 from analyses.linear.loop_figures import LoopFigures
 from analyses.validation.row import Row, judged
 from nonlinear import Tangent
 from nonlinear.bench.lifted import GRID, eigenvalues, relative, sized
-
-if TYPE_CHECKING:
-    from actuator_lti.loops import ExactMargins
 
 WITHIN = 1e-6  # of a response, of a margin
 SURE = 10.0  # times the stated error

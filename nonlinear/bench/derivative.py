@@ -16,18 +16,17 @@ not.  It shares no code with the linear loops, so the two may be held against ea
 `nonlinear.bench.differences` takes it; what two sizes of its steps differ in is the stated error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.loader import as_design
+from actuator_lti.design.model import Design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.lifted import (
@@ -41,9 +40,6 @@ from nonlinear.bench.lifted import (
     without_rest,
 )
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,8 +121,10 @@ def answer(
     **chosen: Any,
 ) -> None:
     from actuator_lti.design import warnings_of
+    from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
     from reports import document as doc
+    from reports.amperes import in_amperes
     from reports.as_json import as_json as plain_data
     from reports.cli.errors import leave_with
     from reports.cli.output import print_json, print_line, print_note, print_warning
@@ -140,7 +142,10 @@ def answer(
     for each in asked:
         if isinstance(each, OnMachines) and each.engine.caution:
             print_note(f"actuator-lti: {each.engine.caution}")
-    for warning in warnings_of(drive) if one.warns else ():
+    kinds = {name: option.kind for name, (_, option) in options(one.request).items()}
+    loads = [values[name] for name, kind in kinds.items() if kind == "load" and values[name]]
+    beyond = [line for load in loads for line in beyond_largest(drive, "--load", load)]
+    for warning in (*(warnings_of(drive) if one.warns else ()), *beyond):
         print_warning(f"{drive.name}: {warning}")
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
@@ -149,7 +154,7 @@ def answer(
     if (text := one.shows("text", lambda _: None)(result)) is not None:
         print_line(text)
         return
-    parts = [*notices(missing, one.name), *one.sections(result)]
+    parts = [*notices(missing, one.name), *in_amperes(one.sections(result), drive)]
     if drive is not None:
         doc.waived(parts, drive)
     passed = getattr(result, "verdict", getattr(result, "passed", None))
@@ -159,7 +164,7 @@ def answer(
     if as_json:
         print_json(one.shows("data", plain_data)(result))
     else:
-        _print(one, getattr(drive, "name", ""), result, parts, passed)
+        _print(one, drive, result, parts, passed)
         for path in files:
             print_line(f"wrote {path}")
     leave_with(passed in (None, True, "met"))
@@ -177,13 +182,15 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 
 
 def _print(
-    one: Analysis, name: str, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
+    one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
+    from reports.amperes import in_amperes
     from reports.terminal import print_blocks, print_section, print_verdict
 
+    name = getattr(drive, "name", "")
     if (made := one.shows("brief", lambda _: None)(result)) is not None:
-        print_verdict(passed or False, f"{name}: {made.words}")
-        print_blocks(made.blocks, made.notes)
+        print_verdict(passed or False, f"{name}: {in_amperes(made.words, drive, 'result')}")
+        print_blocks(in_amperes(made.blocks, drive), made.notes)
         return
     for k, part in enumerate(parts):
         print_section(part, None if k else passed, name="" if k else name)

@@ -1,19 +1,16 @@
 """From the payload of a job to its report: what the worker processes run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from actuator_lti.design.loader import read_design_text
+from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from reports.document_schema import Document
 from reports.nightly.figures import digest
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
 
 
 def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
@@ -45,8 +42,6 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
 
 
 def _design(payload: Mapping[str, Any]) -> Design:
-    from actuator_lti.design.loader import read_design_text
-
     return read_design_text(str(payload["design"]), str(payload["name"]))
 
 

@@ -1,12 +1,12 @@
 """The first screen: is the drive fit for use, what is its weakest point, and what is to be watched."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import cast
 
 from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
+from actuator_lti.design.model import Design
+from analyses.corners.run import Corners
 from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
@@ -20,10 +20,6 @@ from reports.sections import loop_charts
 from reports.sections.margins import margin_row, range_words, shown, worst_status
 from reports.sections.names import LOOPS, POINTS, loop_words
 from reports.verdict_summary import gathered, tally
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from analyses.corners.run import Corners
 
 SHOWN = 3
 MOST_BARS = 12

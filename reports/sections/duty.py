@@ -56,14 +56,14 @@ def summary(result: Duty) -> str:
     part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
     if result.limited:
         part += f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
-    return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A rms{part}."
+    return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A, rms over time{part}."
 
 
 def _rows(result: Duty) -> list[doc.Row]:
     over, heat = result.overload, result.heating
     peak = result.design.limits.peak_current_A
     rows: list[doc.Row] = [
-        _row("current, rms", result.rms_A, result.continuous_A, "A"),
+        _row("current, rms over time", result.rms_A, result.continuous_A, "A"),
         _row("current in motion, rms", result.moving_rms_A, math.inf, "A"),
     ]
     rows += [_row("current at rest, rms", result.holding_A, math.inf, "A")] * (result.asked.share < 1.0)

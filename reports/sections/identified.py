@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
+from analyses.identification.design_values import given_constant
 from analyses.identification.verdict import Identified, Item
 from analyses.records.consistency import Finding
 from analyses.records.inputs import InputUse
@@ -41,6 +42,15 @@ def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
     one = parameter(name, axis)
     value, std = show(one.scale * fit[name], "sig:4"), show(one.scale * fit.std(name), "sig:2")
     return f"{value} {one.unit} (fixed)" if name in fit.fixed else f"{value} ± {std} {one.unit}"
+
+
+def constant_words(fit: Fit, axis: str = "rotary") -> str:
+    """The constant of the design at which all values are, after them; empty where there is none."""
+    if (given := given_constant(fit)) is None:
+        return ""
+    one = parameter(given, axis)
+    label = one.label[:1].lower() + one.label[1:]
+    return f", all at the design's {label}, {show(fit[given], 'sig:4')} {one.unit}"
 
 
 def parameter_table(

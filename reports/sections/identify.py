@@ -17,7 +17,14 @@ from analyses.identification.verdict import Identified
 from reports import document as doc
 from reports.charts import style
 from reports.sections import identify_campaign, identify_records
-from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
+from reports.sections.identified import (
+    constant_words,
+    finding_table,
+    input_table,
+    judged,
+    parameter_table,
+    value_words,
+)
 from reports.sections.measured import decibels_and_degrees
 
 
@@ -114,7 +121,8 @@ def _two_mass(result: FrequencyResult) -> doc.Section:
     )
     low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
     words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {value_words(fit, 'stiffness')}"
-    words += "." if result.play is None else f", play {2e3 * result.play.half_rad:.3g} mrad."
+    words += "" if result.play is None else f", play {2e3 * result.play.half_rad:.3g} mrad"
+    words += f"{constant_words(fit)}."
     return judged("frequency-identification", "Two-mass drive", result, blocks, result=words, intro=intro)
 
 
@@ -124,6 +132,8 @@ SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "close
 def _of_loop(result: ResponseResult) -> doc.Section:
     fit, measured = result.fit, result.measured
     noise = "no deviations were measured: errors are those of the residual"
+    if np.isfinite(measured.coherence).any():
+        noise = f"the coherence is not read without --averages N, {noise}"
     if fit.misfit is not None:
         noise = f"misfit {fit.misfit:.2f} (1: the measured deviations explain the residual)"
     intro = (
@@ -142,6 +152,7 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
     values = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
+    values += constant_words(fit)
     return judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )

@@ -12,7 +12,7 @@ from analyses.identification.run import CampaignAnswer
 from analyses.identification.surface import NAMES, SurfaceFit
 from reports import document as doc
 from reports.sections.campaign_figures import region_figure, residual_figure, surface_figure, window_figures
-from reports.sections.identified import input_table, judged, parameter_table, value_words
+from reports.sections.identified import constant_words, input_table, judged, parameter_table, value_words
 
 
 def section(answer: CampaignAnswer) -> doc.Section:
@@ -28,10 +28,9 @@ def section(answer: CampaignAnswer) -> doc.Section:
         f"{len(fit.points)} of {result.runs_listed} runs, {result.rows_in} rows in, {result.rows_out} out. "
         f"M = kM i with kM = {result.torque_constant_Nm_A:g} N m/A, averaged over the steady part of each "
         f"run ({result.criterion}), then M = C0 + Cv w + CM |M_ext| with errors in all variables."
-        + "".join(f" {name} is not fitted: {one.reason}." for name, one in fit.fixed.items())
     )
     found = ", ".join(f"{name} = {value_words(fit, name)}" for name in NAMES)
-    words = f"{found}, from {len(fit.points)} runs."
+    words = f"{found}{constant_words(fit)}, from {len(fit.points)} runs."
     return judged("identification", "Identified friction", answer, blocks, result=words, intro=intro)
 
 

@@ -6,14 +6,21 @@ import numpy as np
 
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import DesignValue, given_constant
+from analyses.identification.design_values import DesignValue
 from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import capital, show
-from reports.sections.identified import finding_table, input_table, judged, parameter_table, value_words
+from reports.numbers import capital
+from reports.sections.identified import (
+    constant_words,
+    finding_table,
+    input_table,
+    judged,
+    parameter_table,
+    value_words,
+)
 from reports.sections.names import speed_unit
 
 
@@ -60,13 +67,11 @@ def _result(result: BenchResult, axis: str) -> str:
     if result.refined is not None:  # these are the design's
         parts = [f"{key} {value_words(result.refined, key, axis)}" for key in result.refined.names[:3]]
         parts[0] = f"refined by simulation: {parts[0]}"
-    if (given := given_constant(model)) is not None and parts:
-        one = parameter(given, axis)
-        name = one.label[:1].lower() + one.label[1:]
-        parts[-1] += f", all at the design's {name}, {show(model[given], 'sig:4')} {one.unit}"
+    told = ", ".join(parts) or "the records tell neither inertia nor friction"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "its records" if len(result.resimulated) > 1 else worst.record
-    words = f"{', '.join(parts)}. The written design meets {met} within"
+    written = "The written design" if result.passed or result.accepted else "A design of what is found"
+    words = f"{told}{constant_words(model, axis)}. {written} meets {met} within"
     return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
 
 

@@ -133,7 +133,7 @@ def step(
     panel.x.limits(0.0, last * scale)
     lowest = min(style.known(y for _, _, response in responses for y in response), default=0.0)
     panel.y.limits(low=min(0.0, 1.05 * lowest))
-    if math.isfinite(figures.final_value):
+    if math.isfinite(figures.final_value) and not margins.returns(loop_figures):
         step_figures(panel, figures, responses[0], scale, held and len(responses[0][1]) < 80)
     caption = f"{title}, response to a unit step of its command; the band is 2 % about the final value."
     if end is not None and float(figures.settling_time_s) > end:

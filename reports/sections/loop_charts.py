@@ -13,7 +13,7 @@ from analyses.linear.responses import Curve, answer_curve, curve, nyquist_curve,
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin
-from reports.sections.margins import finite, margin_row
+from reports.sections.margins import finite, margin_row, returns
 
 Curves = Sequence[tuple[str, Curve]]
 LABELLED = 3  # margins with words
@@ -136,7 +136,7 @@ def both(
 def closed_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, locked: LoopFigures | None, *, name: str = ""
 ) -> doc.Block:
-    other, band = figures.reference, figures.bandwidth
+    other, band = figures.reference, None if returns(figures) else figures.bandwidth
     first = "rotor free" if locked else "to the command" if other else "closed loop"
     curves = [(first, answer_curve(figures, grid))]
     curves += [("to the reference", answer_curve(other, grid))] if other is not None else []

@@ -1,14 +1,13 @@
 """Margins and bandwidths of every loop: the tables that a reader looks for first."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
+from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins.run import Margins
@@ -18,9 +17,6 @@ from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
 from reports.terminal import Brief, SideBySide
-
-if TYPE_CHECKING:
-    from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE: dict[str, doc.State] = {
@@ -36,6 +32,7 @@ MEANING = {
     "withheld": "the numbers of the loop do not determine the answer",
 }
 
+RETURNED = 0.1  # of command and peak: a response that ends below it has nothing to be relative to
 DOWNWARDS = (
     " Down to: so far the gain may fall before the loop is unstable. Limits and compare take the size of it."
 )
@@ -388,8 +385,14 @@ def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]
 
 
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
-    """Say of each loop that is unstable only by itself which case it is, and how it is judged."""
+    """Say of each loop that is unstable only by itself how it is judged; of one that returns what is not."""
+    returned = [(label, one.step) for label, one in named.items() if one.step and returns(one)]
     return [
+        f"{label}: after a peak of {step.peak_value:.3g} the response returns to {step.final_value:.3g} of "
+        "its command. Bandwidth, resonance, rise, overshoot and settling, which are relative to that, are "
+        "left out."
+        for label, step in returned
+    ] + [
         f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as {AWAY}. With all loops "
         f"closed the drive is stable. The loop is judged with the {HELD[figures.loop.name]}: stable."
         for label, figures in named.items()
@@ -398,12 +401,25 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
 
 
 def response_row(figures: LoopFigures) -> Tree:
-    return {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
+    """Give the response of one loop by column; of one that returns what is not relative to its end."""
+    row = {one["key"]: doc.plain(read(figures)) for one, read in RESPONSES}
+    kept = ("t_peak_db", "dc") if returns(figures) else row
+    return {key: row[key] if key in kept else None for key in row}
+
+
+def returns(figures: LoopFigures) -> bool:
+    """Whether a step response comes back to next to nothing, of its command and of its peak.
+
+    As a P current loop's does with a free rotor, which turns until back-EMF has taken its voltage.
+    """
+    step = figures.step
+    return step is not None and abs(step.final_value) < RETURNED * min(1.0, abs(step.peak_value))
 
 
 def shown(quantity: Quantity, figures: LoopFigures) -> float | None:
     """Give a figure of the registry as reports write it: with its sign; an unstable loop has none."""
-    value = None if figures.margins.stable is False else finite(quantity.raw(figures))
+    lost = figures.margins.stable is False or (quantity.of_response and returns(figures))
+    value = None if lost else finite(quantity.raw(figures))
     return None if value is None else value * quantity.shown[1]
 
 

@@ -1,18 +1,14 @@
 """A measured response over the model: what is explained, margins as ranges, both drawn with the spread."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_lti.margins.results import StabilityMargins
+from analyses.margins.run import Measured
 from reports import document as doc
 from reports.charts import style
 from reports.sections.names import LOOPS, hertz
-
-if TYPE_CHECKING:
-    from actuator_lti.margins.results import StabilityMargins
-    from analyses.margins.run import Measured
 
 
 def words(one: Measured) -> str:

@@ -1,18 +1,12 @@
 """A night on the terminal: how many designs are well, and every one that needs a look."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from actuator_lti.files.tree import Tree
 from reports import document as doc
 from reports.nightly.machines import summary
 from reports.nightly.text import one_line
-from reports.nightly.view import STATES
-
-if TYPE_CHECKING:
-    from reports.nightly.view import Overview
+from reports.nightly.view import STATES, Overview
 
 
 def section(night: Overview) -> doc.Section:

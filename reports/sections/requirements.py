@@ -1,19 +1,15 @@
 """Verdicts on the requirements of the design file."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.model import Requirement
+from analyses.monte_carlo.result import Odds
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.sections.names import QUANTITIES, unit_words
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Requirement
-    from analyses.monte_carlo.result import Odds
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:

@@ -10,7 +10,7 @@ from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
 from analyses.motion.run import Motion
-from analyses.motion.settling import conduct, summary
+from analyses.motion.settling import summary
 from nonlinear import Trajectory
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
@@ -23,10 +23,10 @@ LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of t
 
 
 def section(result: Motion) -> doc.Section:
-    run, ended = result.run, conduct(result.run, result.design.validation.full_deflection_rad)
+    run, ended = result.run, result.ended
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
     blocks = [figure, _table(run), _limits(run), *([_energy(run)] if run.energy else [])]
-    words = f"{run.time_s.size} rows, status {ended.status}" + f" ({ended.detail})" * bool(ended.detail)
+    words = f"{run.time_s.size} rows, status {ended.status}" + f" ({ended.said})" * bool(ended.said)
     return doc.section("simulate", "Motion", blocks, result=words, status="info" if ended.wanted else "warn")
 
 
@@ -75,7 +75,7 @@ def _in_words(name: str, value: float) -> list[doc.Row]:
     ['rad/s', 'rpm']
     """
     ending, factor, unit = next((one for one in UNITS if name.endswith(one[0])), ("", 1.0, ""))
-    what = name.removesuffix(ending).replace("_", " ")
+    what = name.removesuffix(ending).replace("_", " ").replace("rms current", "current, rms over time")
     rpm: doc.Row = {"what": "", "value": value * 30.0 / np.pi, "unit": "rpm"}
     return [{"what": what, "value": value * factor, "unit": unit}, *[rpm] * (unit == "rad/s")]
 

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from actuator_lti.design import write_design
+from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.result import BindingRequirement, TuningResult
@@ -29,7 +29,7 @@ def section(result: TuningResult) -> doc.Section:
 def write(result: TuningResult, folder: Path | None) -> list[str]:
     if folder is None:
         return []
-    write_text(folder / "tuned.toml", write_design(result.design))
+    write_text(folder / "tuned.toml", write_changed(result.before, result.design))
     return [str(folder / "tuned.toml")]
 
 
@@ -43,16 +43,18 @@ def summary(result: TuningResult) -> str:
             return f"The search meets every requirement over {over}; certified margins do not confirm it."
         return f"No gains meet every requirement over {over}. The best compromise misses {missed}."
     words = f"Every requirement is met over {over}"
+    rest = f" But the drive does not come to rest {result.hunting}." if result.hunting else ""
     placed = f" Gains alone do not do; added: {', '.join(result.placed)}." if result.placed else ""
     names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in result.requirements if r.binds)
     if result.aim == "least-change":
         if not changed(result):
-            return f"{words}. Nothing needs to change."
-        binding = f" This is the least change that does; binding: {names}." if names else ""
-        return f"{words}.{placed}{binding}"
+            return f"{words}. Nothing needs to change.{rest}"
+        least = "the least change found" if result.spent else "the least change that does"
+        return f"{words}.{placed}{f' This is {least}; binding: {names}.' if names else ''}{rest}"
     if names:
-        return f"{words}.{placed} Nothing better is possible because of {names}."
-    return f"{words}, each with 30 % or more to spare; none binds.{placed}"
+        better = "was found; binding:" if result.spent else "is possible because of"
+        return f"{words}.{placed} Nothing better {better} {names}.{rest}"
+    return f"{words}, each with 30 % or more to spare; none binds.{placed}{rest}"
 
 
 def changed(result: TuningResult) -> bool:
@@ -62,7 +64,14 @@ def changed(result: TuningResult) -> bool:
 def _amount(r: BindingRequirement) -> str:
     if r.distance is None:
         return "an unstable loop" if r.relative < 0 else "plenty"
+    if _at_limit(r):
+        return "nothing"
     return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
+
+
+def _at_limit(r: BindingRequirement) -> bool:
+    """Whether it is met with less to spare than the digits of its limit show."""
+    return 0.0 <= r.relative < 1e-4
 
 
 def _verdict(r: BindingRequirement) -> doc.VerdictItem:
@@ -70,7 +79,7 @@ def _verdict(r: BindingRequirement) -> doc.VerdictItem:
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
-        distance=r.distance, passed=r.relative >= 0.0, reason="; ".join(reason),
+        distance=0.0 if _at_limit(r) else r.distance, passed=r.relative >= 0.0, reason="; ".join(reason),
     )  # fmt: skip
 
 
@@ -89,6 +98,8 @@ def gains(result: TuningResult) -> doc.Block:
         doc.of("steps", "steps", "Written", align="right"),
         doc.of("object_unit", "object_unit", "in"),
     ]
+    if not any(g.object for g in result.gains):  # another drive than that controller
+        columns, note = columns[:-3], ""
     return doc.listing("Gains", result.gains, columns, note)
 
 

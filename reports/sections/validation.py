@@ -56,13 +56,18 @@ def section(validation: Validation) -> list[doc.Section]:
 def brief(validation: Validation) -> Brief:
     """The verdict, why it is none where it is none, and every check by loop."""
     made = section(validation)
-    items = [item for part in made for item in doc.judged(part["blocks"]) if item["verdict"] != "met"]
+    every = [item for part in made for item in doc.judged(doc.walk(part))]
+    items = [item for item in every if item["verdict"] != "met"]
     items = [item for item in items if not item["reason"] or item["reason"] not in validation.words]
+    others = [item["label"] for item in every if "gathers" not in item]
+    others += ["those of --large"] * (validation.friction is None)
+    more = [f"a report counts more checks than these predictions: {'; '.join(others)}"] if others else []
     said = [f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items]
     large = [part["result"] for part in made if part["id"] == "conditional"]
     grouped = by_loop(validation.rows).items()
     tables = [_short_table(name, rows) for name, rows in grouped]
-    return Brief(validation.words, [*map(doc.text, said), *tables, *map(doc.text, large)], validation.notes)
+    blocks = [*map(doc.text, said), *tables, *map(doc.text, large)]
+    return Brief(validation.words, blocks, [*validation.notes, *more])
 
 
 def _short_table(name: str, rows: Sequence[Check]) -> doc.Block:

@@ -49,20 +49,11 @@ def random_drive(rng: Rng) -> model.Design:
     load |= {"gravity": draw.maybe(model.Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None)}
     load |= {"moment_damping_Nms_rad": own.maybe(own.near(0.05)), "gear_error_Nm": own.maybe(own.near(0.3))}
     load |= {"gear_error_periods": own.near(10.0), "gear_error_phase_rad": own.rng.uniform(0.0, 3.0)}
-    made = changed(
-        design,
-        motor=motor,
-        controller=controller,
-        friction=friction,
-        load=load,
-        encoder=_encoder(draw),
-        output_encoder={"counts_per_rev": draw.maybe(4096, None)},
-        command=_command(draw),
-        instruments=draw.maybe({}, _instruments(draw)),
-        supply=draw.maybe(None, _supply(draw)),
-        limits=_limits(draw),
-    )
-    return _with_law(own.rng.spawn(1)[0], made)
+    parts: Parts = {"motor": motor, "controller": controller, "friction": friction, "load": load}
+    parts |= {"encoder": _encoder(draw), "output_encoder": {"counts_per_rev": draw.maybe(4096, None)}}
+    parts |= {"command": _command(draw), "instruments": draw.maybe({}, _instruments(draw))}
+    parts |= {"supply": draw.maybe(None, _supply(draw)), "limits": _limits(draw)}
+    return _with_law(own.rng.spawn(1)[0], changed(design, **parts))
 
 
 def _with_law(rng: Rng, design: model.Design) -> model.Design:

@@ -91,8 +91,7 @@ def test_every_host_step_sees_the_same_motion(name: str, tmp_path) -> None:
     for part in (1, 5, 10, 15, 27) if name in ALL_STEPS else (1, 27):
         step = part / FINE * period
         points = np.floor((np.arange(TICKS) * period) / step + 1e-6)  # at or before each tick
-        command = np.asarray(wanted(points * step, design))
-        plain = run(design, TICKS, command)
+        plain = run(design, TICKS, np.asarray(wanted(points * step, design)))
         truth = propagated(design, plain.voltage_V)
         with hosted(path) as (host,):
             host.start(hinge_moment=MOMENT)

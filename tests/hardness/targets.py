@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -33,7 +34,9 @@ from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
 from analyses.records.readers import read_mat_record, read_record
+from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
+from analyses.studies import study
 from analyses.studies.sampling import read_table
 from nonlinear.runs.records import read_columns
 from reports.nightly.cache import Cache, CorruptEntry, sealed
@@ -54,33 +57,14 @@ class Target:
     fault: Fault = damaged
 
 
+def example(module: ModuleType) -> bytes:
+    """The file that a command prints with --example."""
+    return (module.__doc__ or "").split("::", 1)[1].replace("\n    ", "\n").encode()
+
+
 SETTINGS = b'[objects]\n"0x2342.01" = 20\n"0x2344.01" = { value = 120000, name = "x" }\n"0x3000.01" = -4\n'
-STUDY = b"""[study]
-name = "s"
-base = "ctms-motor-position"
-[[variant]]
-name = "v"
-override = { "control.position.gain" = "12 V/rad" }
-[[sweep]]
-parameter = "motor.resistance"
-from = "1 ohm"
-to = "2 ohm"
-points = 3
-[[grid]]
-axes = [{ parameter = "motor.inductance", values = ["0.5 H", "0.6 H"] }]
-[[requirement]]
-id = "b"
-quantity = "bandwidth"
-loop = "position"
-minimum = "1 Hz"
-[monte_carlo]
-samples = 10
-seed = 3
-[nightly]
-pdf = false
-tolerance = { "*margin*" = "0.5 deg" }
-"""
-CAMPAIGN = (campaign_file.__doc__ or "").split("::", 1)[1].replace("\n    ", "\n").encode()
+STUDY = example(study) + b'tolerance = { "*margin*" = "0.5 deg" }\n'
+CAMPAIGN = example(campaign_file)
 RECORD = b"""file = "log.csv"
 separator = ","
 time = { column = "t", unit = "ms" }
@@ -144,6 +128,11 @@ def controller_file(path: Path) -> None:
     if b"30A0" in path.read_bytes():  # no velocity loop inside a position loop
         del tree["control"]["position"]
     import_controller_file(path, design_from_tree(tree, "base"))
+
+
+def accounted(found: Record) -> None:
+    """Every row is used, or counted among those that are not."""
+    assert found.counts.rows_in == found.counts.rows_out + sum(found.counts.dropped.values())
 
 
 def record(path: Path) -> None:
@@ -305,29 +294,23 @@ def parquet_file() -> bytes:
 def history_files() -> dict[str, bytes]:
     import tempfile
 
-    from nightly_fakes import CODE, INLINE, job, study
+    from nightly_fakes import CODE, INLINE, job
+    from nightly_fakes import study as of
 
     from reports.nightly.night import run_night
 
     with tempfile.TemporaryDirectory() as folder:
         for margin in (10.0, 11.0):
-            run_night(study(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
+            run_night(of(job("a", margin), job("b")), Path(folder) / "s", INLINE, code=CODE)
         return {path.name: path.read_bytes() for path in (Path(folder) / "s.state").rglob("*.json")}
-
-
-@cache
-def entry_file() -> bytes:
-    return sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
-
-
-def xml_seed() -> bytes:
-    return write_settings_xml(read_settings_toml(SETTINGS.decode(), "f")).encode()
 
 
 @cache
 def targets() -> tuple[Target, ...]:
     designs = tuple(design_text(name).encode() for name in shipped_designs())
     to_pdf = command("pdf", "FILE", "--out", "FOLDER/x.pdf")
+    kept = sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
+    xml = write_settings_xml(read_settings_toml(SETTINGS.decode(), "f"))
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
     return (
         Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),
@@ -336,7 +319,7 @@ def targets() -> tuple[Target, ...]:
         Target("design", designs, design_round),
         Target("extreme design", designs, design_round, fault=extreme),
         Target("settings", (SETTINGS,), settings),
-        Target("settings xml", (xml_seed(),), settings, ".xml"),
+        Target("settings xml", (xml.encode(),), settings, ".xml"),
         Target("controller file", CONTROLLERS, controller_file, ".xml"),
         Target("response", (RESPONSE,), read_response, ".csv"),
         Target("response in mat", mat_files(), read_response, ".mat"),
@@ -344,9 +327,9 @@ def targets() -> tuple[Target, ...]:
         Target("study tree", (STUDY,), lambda p: read_study(str(p)), fault=toml_fault),
         Target("campaign", (CAMPAIGN,), load_campaign),
         Target("record file", (RECORD,), record),
-        Target("record", (ROWS,), lambda p: read_csv_record(p, SPEC), ".csv"),
+        Target("record", (ROWS,), lambda p: accounted(read_csv_record(p, SPEC)), ".csv"),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
-        Target("mat", mat_files(), lambda p: read_mat_record(p, SPEC), ".mat"),
+        Target("mat", mat_files(), lambda p: accounted(read_mat_record(p, SPEC)), ".mat"),
         Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault),
         Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet"),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),
@@ -355,7 +338,7 @@ def targets() -> tuple[Target, ...]:
         Target("report", (small_report(),), report, ".json", tree_fault),
         Target("site", (SUMMARY,), summary, ".json", tree_fault),
         Target("history", (history_files()[INDEX],), history, ".json", tree_fault),
-        Target("cache entry", (entry_file(),), entry, ".entry"),
+        Target("cache entry", (kept,), entry, ".entry"),
         Target("command line", seeds(), command_line, ".json", hostile),
         Target("command margins", designs, command("margins", "FILE", "--json"), fault=extreme),
         Target("command simulate", designs, command(*move), fault=extreme),

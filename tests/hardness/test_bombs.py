@@ -80,6 +80,10 @@ def test_runs_of_years_histories_beyond_the_memory_and_millions_of_tones() -> No
     refused(lambda: stepped([1.0], 10**400), "--cycles", "at most 50000000")
     refused(lambda: MonteCarloSettings(samples=10**12), "--samples", "at most 100000000")
     refused(lambda: MonteCarloSettings(seed=-1), "seed = -1")
+    row = design_row(AMBER)
+    row[at.TICKS] = 3e10
+    with pytest.raises(NumericalError, match="3e\\+10 ticks"):
+        run_rows(row[None, :])
 
 
 LONG = [range(10**12), range(10**20), [range(10**12)], itertools.count(), ["x"] * 10**6]
@@ -122,13 +126,16 @@ def test_a_count_beyond_every_run_is_as_good_as_all(digits: int) -> None:
     assert simulate_many([asked], threads=count).status.tolist() == [0]
 
 
-def test_a_multisine_of_many_lines_is_summed_in_parts() -> None:
+def test_a_multisine_of_many_lines_is_summed_in_parts_and_one_as_large_as_a_double_has_no_warning() -> None:
     """The tones at 100 001 ticks are never held at once; it begins at zero, rising."""
     times, values = summed([1.0, 500.0], 10.0).samples
     assert times.size == 100_001
     assert abs(values[0]) < 1e-9
     assert values[1] > 0.0
     assert abs(values).max() == pytest.approx(0.1)
+    # warnings are errors here: its spectrum is of its shape
+    largest = commands.multisine(1e308, [1.0, 100.0], 1.0, PERIOD_S)
+    assert largest.highest_content(5000.0) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -143,20 +150,7 @@ def test_a_number_beyond_all_bounds_is_one_line(given: str, cli) -> None:
     assert ("finite" if "9" not in given else "2^63") in line
 
 
-def test_a_command_as_large_as_a_double_has_no_warning() -> None:
-    """Warnings are errors here: its spectrum is of its shape."""
-    largest = commands.multisine(1e308, [1.0, 100.0], 1.0, PERIOD_S)
-    assert largest.highest_content(5000.0) < 1e-3
-
-
-def test_a_batch_that_would_take_days() -> None:
-    row = design_row(AMBER)
-    row[at.TICKS] = 3e10
-    with pytest.raises(NumericalError, match="3e\\+10 ticks"):
-        run_rows(row[None, :])
-
-
-def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
+def test_commands_and_samples_of_many_rows_are_counted_before_they_are_read(tmp_path, monkeypatch) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,x\n" + "0,1\n" * 200)
     small = bounds.Bound(what="rows", most=100, reason="", asked_by="--record")
@@ -167,9 +161,6 @@ def test_a_recorded_command_of_many_rows(tmp_path, monkeypatch) -> None:
     tracemalloc.stop()  # reading up to the bound is allowed
     refused(lambda: commands.recorded(path), "r.csv", "at most 256 MiB")
     tracemalloc.start()
-
-
-def test_samples_in_parquet_are_counted_before_they_are_unpacked(tmp_path, monkeypatch) -> None:
     path = tmp_path / "s.parquet"
     table = pa.table({"motor.resistance": np.zeros(bounds.TABLE_ROWS.most + 1)})
     pq.write_table(table, path, compression="zstd")
@@ -183,16 +174,12 @@ GRID = '[study]\nbase = "ilr33-amber"\n[[grid]]\naxes = [{}]\n'
 AXIS = '{ parameter = "motor.resistance", from = "50 mohm", to = "60 mohm", points = 1000 }'
 
 
-def test_a_grid_of_a_thousand_to_the_sixty(tmp_path) -> None:
+def test_a_grid_of_a_thousand_to_the_sixty_and_sweeps_of_a_variant_too_many(tmp_path, monkeypatch) -> None:
     path = tmp_path / "s.toml"
     path.write_text(GRID.format(", ".join([AXIS] * 60)))
     refused(lambda: load_study(path), "grid[1].axes", "60 axes", "at most 20")
     path.write_text(GRID.format(", ".join([AXIS] * 20)))
     refused(lambda: load_study(path), "grid[1]", "1e+60 variants", "at most 10000")
-
-
-def test_sweeps_stop_at_the_first_variant_too_many(tmp_path, monkeypatch) -> None:
-    path = tmp_path / "s.toml"
     sweep = AXIS.replace("1000", "20")[2:-2].replace(", ", "\n")
     path.write_text('[study]\nbase = "ilr33-amber"\n' + f"[[sweep]]\n{sweep}\n" * 500)
     small = bounds.Bound(what="variants", most=25, reason="", asked_by="[[sweep]]")

@@ -1,5 +1,7 @@
 """A comparison that is stopped goes on: each finished design is kept, damaged ones are computed again."""
 
+from pathlib import Path
+
 import pytest
 
 from analyses.comparison import variants
@@ -21,13 +23,6 @@ minimum = "6 dB"
 
 
 @pytest.fixture
-def study(tmp_path):
-    path = tmp_path / "study.toml"
-    path.write_text(STUDY)
-    return load_study(path)
-
-
-@pytest.fixture
 def counted(monkeypatch) -> list[str]:
     """Names of the designs that were computed; the fourth of them stops the run where asked."""
     done: list[str] = []
@@ -43,34 +38,30 @@ def counted(monkeypatch) -> list[str]:
     return done
 
 
-def test_what_was_finished_is_not_computed_again_and_is_the_same(study, counted, tmp_path) -> None:
-    folder = tmp_path / "designs"
+def test_what_was_finished_is_kept_and_what_is_damaged_or_foreign_computed_again(counted, tmp_path) -> None:
+    folder, path = tmp_path / "designs", tmp_path / "study.toml"
+    path.write_text(STUDY)
+    study = load_study(path)
     counted.append("stop")
     with pytest.raises(KeyboardInterrupt):
         compare(study, folder=folder)
     kept = len(list(folder.rglob("*.json")))
     assert kept >= 2
-    counted.clear()
-    resumed = compare(study, folder=folder)
-    assert len(counted) == 5 - kept
-    counted.clear()
-    again = compare(study, folder=folder)
-    assert counted == []
-    fresh = compare(study)
-    for one in (resumed, again):
-        assert (one.all, one.names) == (fresh.all, fresh.names)
+    fresh, wanted = compare(study), [5 - kept, 0, 4]
+    for k, count in enumerate(wanted):
+        if k == 2:
+            damage(sorted(folder.rglob("*.json")))
+        counted.clear()
+        again = compare(study, folder=folder)
+        assert len(counted) == count
+        assert (again.all, again.names) == (fresh.all, fresh.names)
+    assert len(list(folder.rglob("*.json"))) == 5
 
 
-def test_a_damaged_or_foreign_entry_is_computed_again(study, counted, tmp_path) -> None:
-    folder = tmp_path / "designs"
-    fresh = compare(study, folder=folder)
-    paths = sorted(folder.rglob("*.json"))
+def damage(paths: list[Path]) -> None:
+    """Four of five entries."""
     assert len(paths) == 5
     paths[0].write_bytes(paths[0].read_bytes()[:-3])
     paths[1].write_text("")
     paths[2].write_bytes(paths[3].read_bytes().replace(b'"figures"', b'"figure"', 1))
     paths[4].write_bytes(b"\xff" * 10)
-    counted.clear()
-    assert compare(study, folder=folder).variants == fresh.variants
-    assert len(counted) == 4
-    assert len(list(folder.rglob("*.json"))) == 5

@@ -12,7 +12,6 @@ import typer
 
 from actuator_lti.errors import InputError, NumericalError
 from reports.cli.errors import run
-from reports.cli.main import main
 
 REPORT = ("report", "ilr33-amber", "--quiet")
 
@@ -40,8 +39,7 @@ def broken(*_arguments: object, **_named: object) -> None:
     raise ZeroDivisionError("by\nzero\x1b[31m")
 
 
-def one_line(printed: pytest.CaptureFixture[str]) -> str:
-    line = printed.readouterr().err
+def one_line(line: str) -> str:
     assert line.count("\n") == 1
     assert line.strip().isprintable()
     return line
@@ -55,22 +53,17 @@ def traceback_of(line: str) -> str:
     return text
 
 
-@pytest.fixture
-def unpainted(monkeypatch) -> None:
-    """Reports without pictures, which take most of the time."""
-    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: '<svg viewBox="0 0 9 9"></svg>')
-
-
-@pytest.mark.usefixtures("unpainted")
 @pytest.mark.parametrize("place", BROKEN)
-def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, monkeypatch, capsys) -> None:
+def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, monkeypatch, cli) -> None:
     module, _, name = place.partition(":")
+    unpainted = '<svg viewBox="0 0 9 9"></svg>'  # pictures take most of the time
+    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: unpainted)
     monkeypatch.setattr(import_module(module), name, broken)
     part, option = ("validation", "--quiet") if name == "validate" else ("linear", "--no-validation")
-    assert main([*REPORT, option, "--out", str(tmp_path)]) == 3
-    line = one_line(capsys)
-    assert "ZeroDivisionError" in line
-    assert "ZeroDivisionError" in traceback_of(line)
+    ran = cli(*REPORT, option, "--out", tmp_path)
+    assert ran.status == 3
+    for said in (ran.err, traceback_of(one_line(ran.err))):
+        assert "ZeroDivisionError" in said
     made = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     sections = {section["id"]: section for section in made["sections"]}
     assert sections.keys() >= {*BROKEN[place], "parameters", f"missing-{part}"}
@@ -78,15 +71,15 @@ def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, m
     assert "Parts of this report that could not be computed" in (tmp_path / "report.html").read_text("utf-8")
 
 
-def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, capsys) -> None:
+def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, cli) -> None:
     def draw(block: dict, *arguments: object, **named: object) -> str:
         return broken() if block["figure"] == "nyquist" else '<svg viewBox="0 0 9 9"></svg>'
 
     monkeypatch.setattr("reports.drawing.draw_svg", draw)
-    assert main([*REPORT, "--no-validation", "--out", str(tmp_path)]) == 3
-    line = one_line(capsys)
-    assert "(nyquist)" in line
-    traceback_of(line)
+    ran = cli(*REPORT, "--no-validation", "--out", tmp_path)
+    assert ran.status == 3
+    assert "(nyquist)" in one_line(ran.err)
+    traceback_of(ran.err)
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "This figure could not be drawn" in page
     assert "loop-position" in page
@@ -113,7 +106,7 @@ def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, 
         raise error
 
     assert run(call) == status
-    line = one_line(capsys)
+    line = one_line(capsys.readouterr().err)
     assert words in line
     if "traceback: " in line:
         traceback_of(line)

@@ -9,7 +9,6 @@ from fuzz import attack, written
 from targets import Target, parquet_file, small_report, targets
 
 from actuator_lti.design.loader import design_text
-from actuator_lti.errors import InputError
 from analyses.estimation.least_squares import solve
 from analyses.records.differentiation import filtered_motion
 from tests import refusals
@@ -57,28 +56,30 @@ def first(kind: str, made: dict) -> dict:
     return next(block for block in made["sections"][0]["blocks"] if block["kind"] == kind)
 
 
-@pytest.mark.parametrize(
-    ("design", "known"), [("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")]
-)
-def test_a_coupling_after_a_gear_that_is_none(design: str, known: str) -> None:
-    text = design_text(design)
-    changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
-    assert changed != text
-    line = refused("design", changed.encode())
-    assert 'coupling.after = "wor[["' in line
-    assert known in line
+def test_a_coupling_after_a_gear_that_is_none_and_an_id_that_is_no_text() -> None:
+    for design, known in (("ilr33-amber-compliant", "planetary, worm"), ("joint", "harmonic")):
+        text = design_text(design)
+        changed = re.sub(r"(?m)^\[coupling\]\n(?:after = .*\n)?", '[coupling]\nafter = "wor[["\n', text)
+        assert changed != text
+        line = refused("design", changed.encode())
+        assert 'coupling.after = "wor[["' in line
+        assert known in line
+    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
+    for written_id in ("{}", "[1]", "3", "true"):
+        study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
+        assert "id" in refused("study", (study + limit).encode())
 
 
-def test_numbers_of_samples_beyond_floats() -> None:
+def test_numbers_beyond_floats_names_that_cannot_be_read_and_a_status_twice() -> None:
     line = refused("samples", b"motor.resistance,motor.inductance\n%b,1e-5\n" % (b"9" * 400))
     assert "no number" in line
-
-
-@pytest.mark.parametrize("written_id", ["{}", "[1]", "3", "true"])
-def test_an_id_of_a_requirement_that_is_no_text(written_id: str) -> None:
-    study = f'[study]\nname = "s"\nbase = "ctms-motor-position"\n[[requirement]]\nid = {written_id}\n'
-    limit = 'quantity = "bandwidth"\nloop = "position"\nminimum = "1 Hz"\n'
-    assert "id" in refused("study", (study + limit).encode())
+    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
+    assert column in parquet_file()
+    broken = parquet_file().replace(column, unreadable)
+    assert "is no Parquet file" in refused("parquet", broken)
+    made = json.loads(small_report())
+    first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
+    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 
 @pytest.mark.parametrize(
@@ -101,27 +102,11 @@ def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     assert words in refused("report", json.dumps(made).encode())
 
 
-def test_a_parquet_file_whose_columns_have_no_readable_names() -> None:
-    column, unreadable = b"\x18\x01i\x00", b"\x18\x01\xaf\x00"
-    assert column in parquet_file()
-    broken = parquet_file().replace(column, unreadable)
-    assert "is no Parquet file" in refused("parquet", broken)
-
-
-def test_the_name_of_a_row_with_a_status_may_have_one_of_its_own() -> None:
-    made = json.loads(small_report())
-    first("table", made)["rows"][0]["a"] = {"text": "worn", "status": "warn"}
-    BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
-
-
-@pytest.mark.parametrize("rows", [1, 2])
-def test_a_fit_with_no_more_samples_than_parameters(rows: int) -> None:
-    with pytest.raises(InputError, match=rf"{rows} sample\(s\) are left to fit 2 parameter"):
-        solve(np.eye(3)[:rows, :2], np.ones(rows))
+def test_a_fit_of_too_few_samples_and_rows_too_close_for_the_filter() -> None:
+    for rows in (1, 2):
+        words = f"{rows} sample(s) are left to fit 2 parameter"
+        refusals.refused(solve, np.eye(3)[:rows, :2], np.ones(rows), words=words)
     assert solve(np.eye(3)[:, :2], np.ones(3)).values == pytest.approx([1.0, 1.0])
-
-
-@pytest.mark.parametrize("period_s", [5e-324, 1e-300, 1e-9])
-def test_rows_too_close_for_the_filter(period_s: float) -> None:
-    with pytest.raises(InputError, match="too low for rows"):
-        filtered_motion(np.linspace(0.0, 1.0, 100), period_s, cutoff_hz=50.0, order=4)
+    for period_s in (5e-324, 1e-300, 1e-9):
+        asked = {"cutoff_hz": 50.0, "order": 4, "words": "too low for rows"}
+        refusals.refused(filtered_motion, np.linspace(0.0, 1.0, 100), period_s, **asked)

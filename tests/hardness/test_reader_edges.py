@@ -35,7 +35,7 @@ def lists(levels: int) -> str:
     return "[" * levels + "]" * levels
 
 
-def test_depth() -> None:
+def test_depth_values_texts_keys_and_size() -> None:
     assert parse_toml(tables(TOML_DEPTH.most), "f")
     assert "nested too deeply" in refused(parse_toml, tables(TOML_DEPTH.most + 1))
     assert parse_json(lists(JSON_DEPTH.most + 1), "f")  # the innermost holds nothing
@@ -43,17 +43,12 @@ def test_depth() -> None:
     for read, text in ((parse_toml, "a = " + "[" * 10_000), (parse_json, "[" * 10_000)):
         assert "nested too deeply" in refused(read, text)
 
-
-def test_values() -> None:
     def text(count: int) -> str:  # with the file and the list there are two more
         return f"a = [{'1,' * (count - 2)}]"
 
     assert parse_toml(text(TOML_VALUES.most), "f")
     assert f"at most {TOML_VALUES.most}" in refused(parse_toml, text(TOML_VALUES.most + 1))
     assert "more values" in refused(parse_toml, "\n".join(f"k{k} = 1" for k in range(TOML_VALUES.most + 1)))
-
-
-def test_texts_keys_and_size() -> None:
     most = TEXT_CHARACTERS.most
     assert parse_toml(f'a = "{"x" * most}"', "f")
     assert f"{most + 1} characters" in refused(parse_toml, f'a = "{"x" * (most + 1)}"')
@@ -64,29 +59,20 @@ def test_texts_keys_and_size() -> None:
     assert "larger" in refused(parse_toml, "a = 1\n#" + "x" * (room + 1))
 
 
-@pytest.mark.parametrize("number", [2**63, -(2**63) - 1, 10**4000])
-def test_integers(number: int) -> None:
-    for read, text in ((parse_toml, "a = {}"), (parse_json, '{{"a": {}}}')):
-        edge = 2**63 - 1 if number > 0 else -(2**63)
-        assert read(text.format(edge), "f") == {"a": edge}
-        assert "whole numbers of 64 bits" in refused(read, text.format(f"{number:d}"))
-
-
-@pytest.mark.parametrize("code", [0x00, 0x07, 0x1B, 0x7F, 0x85, 0x9B])
-def test_control_characters(code: int) -> None:
-    words = f"U+{code:04X}"
-    assert words in refused(parse_toml, f'a = "x\\u{code:04x}"')
-    assert words in refused(parse_toml, f'"x\\u{code:04x}" = 1')
-    assert words in refused(parse_json, f'{{"a": "x\\u{code:04x}"}}')
+def test_integers_control_characters_and_keys_twice() -> None:
+    for number in (2**63, -(2**63) - 1, 10**4000):
+        for read, text in ((parse_toml, "a = {}"), (parse_json, '{{"a": {}}}')):
+            edge = 2**63 - 1 if number > 0 else -(2**63)
+            assert read(text.format(edge), "f") == {"a": edge}
+            assert "whole numbers of 64 bits" in refused(read, text.format(f"{number:d}"))
+    for code in (0x00, 0x07, 0x1B, 0x7F, 0x85, 0x9B):
+        for text in (f'a = "x\\u{code:04x}"', f'"x\\u{code:04x}" = 1'):
+            assert f"U+{code:04X}" in refused(parse_toml, text)
+        assert f"U+{code:04X}" in refused(parse_json, f'{{"a": "x\\u{code:04x}"}}')
     assert parse_toml('a = "x\\n\\t"', "f") == {"a": "x\n\t"}
-
-
-@pytest.mark.parametrize(
-    ("read", "text"),
-    [(parse_toml, "a = 1\na = 2"), (parse_toml, "[a]\n[a]"), (parse_json, '{"a": 1, "a": 2}')],
-)
-def test_a_key_twice(read, text: str) -> None:
-    refused(read, text)
+    for text in ("a = 1\na = 2", "[a]\n[a]"):
+        refused(parse_toml, text)
+    refused(parse_json, '{"a": 1, "a": 2}')
 
 
 KINDS: dict[str, Callable[[Path], object]] = {
@@ -160,6 +146,13 @@ def test_twenty_thousand_runs_are_read_and_one_more_is_not(tmp_path) -> None:
         (b'separator = ";"', b"separator = { a = 1 }", "separator"),
         (b"[campaign]", b"[campaign]\n" + b"a." * 100 + b"b = 1", "nested too deeply"),
         (b'name = "Bench, March"', b'name = "' + b"x" * 20_000 + b'"', "20000 characters"),
+        (b'"correlation"', b'"guess"', "join.method = 'guess': one of correlation, event, given"),
+        (b'signals.current = { column = "I", unit = "mA" }', b"", "drive.signals.current: is needed"),
+        (b'unit = "rpm"', b'unit = "kg"', "must be a unit like rad/s"),
+        (b"torque_accuracy =", b"torque_acuracy =", 'did you mean "torque_accuracy"'),
+        (b'speed = "104.7 rad/s"', b'speed = "105 N"', "run[1].speed"),
+        (b"[[run]]", b"[[run]]" + CAMPAIGN.partition(b"[[run]]")[2] + b"[[run]]", "given twice"),
+        (b"[campaign]", b"[campaign", "not TOML"),
     ],
 )
 def test_a_campaign_is_read_as_strictly_as_a_design(tmp_path, old, new, words) -> None:

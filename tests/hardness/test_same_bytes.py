@@ -28,14 +28,13 @@ def ran(*words: str, kept: tuple[str, ...] = tuple(os.environ), **environment: s
     return done.stdout
 
 
-def document(**environment: str) -> bytes:
-    return ran("-c", DOCUMENT, SOURCE_DATE_EPOCH="0", **environment)
-
-
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="names of kernels of one family of processors")
 def test_the_document_does_not_depend_on_kernel_and_threads() -> None:
     ways = [("Haswell", "1"), ("SkylakeX", "2"), ("Nehalem", "1")]
-    made = [document(OPENBLAS_CORETYPE=core, OPENBLAS_NUM_THREADS=threads) for core, threads in ways]
+    made = [
+        ran("-c", DOCUMENT, SOURCE_DATE_EPOCH="0", OPENBLAS_CORETYPE=core, OPENBLAS_NUM_THREADS=threads)
+        for core, threads in ways
+    ]
     assert len(made[0]) > 100_000
     assert made[0] == made[1] == made[2]
 
@@ -91,12 +90,6 @@ def test_the_command_line_fixes_the_order_at_its_start_unless_told_otherwise() -
     told = settings_of_a_process("", OPENBLAS_NUM_THREADS="2")
     assert told["OPENBLAS_NUM_THREADS"] == "2"
     assert told["MKL_CBWR"] == same_order()["MKL_CBWR"]
-
-
-def test_a_process_that_adds_up_already_changes_nothing_for_those_that_it_starts() -> None:
-    """Their numbers would be others than its own."""
+    # one that adds up already changes nothing: those that it starts would have other numbers than its own
     assert set(settings_of_a_process("import numpy").values()) == {None}
-
-
-def test_the_tests_add_up_as_the_command_line_does() -> None:
     assert all(os.environ.get(name) for name in same_order())

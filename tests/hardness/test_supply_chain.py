@@ -30,17 +30,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 APART = {"all", "release", "examples"}  # not part of an installation by the lock
 
 
-def test_every_package_is_pinned_with_hashes() -> None:
-    assert len(ENTRIES) > 50
-    for entry in ENTRIES:
-        assert re.match(r"[A-Za-z0-9._-]+==\S+ ", entry), entry[:60]
-        hashes = re.findall(r"--hash=sha256:[0-9a-f]{64}", entry)
-        assert len(hashes) == entry.count("--hash=") >= 1, entry[:60]
-    assert "--index-url" not in CORE + REST
-    assert "://" not in CORE + REST
-
-
-def test_what_make_report_installs_is_what_the_toolkit_itself_needs_and_no_more() -> None:
+def test_what_make_report_installs_is_pinned_and_what_the_toolkit_itself_needs() -> None:
     """And that is locked once: in the one file or in the other."""
     core = versions(CORE)
     asked = (*PROJECT["project"]["dependencies"], *PROJECT["build-system"]["requires"])
@@ -55,6 +45,13 @@ def test_what_make_report_installs_is_what_the_toolkit_itself_needs_and_no_more(
                 todo.append(name)
     assert set(core) == needed
     assert not set(core) & set(versions(REST))
+    assert len(ENTRIES) > 50
+    for entry in ENTRIES:
+        assert re.match(r"[A-Za-z0-9._-]+==\S+ ", entry), entry[:60]
+        hashes = re.findall(r"--hash=sha256:[0-9a-f]{64}", entry)
+        assert len(hashes) == entry.count("--hash=") >= 1, entry[:60]
+    assert "--index-url" not in CORE + REST
+    assert "://" not in CORE + REST
 
 
 def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> None:
@@ -67,6 +64,11 @@ def test_all_that_the_project_asks_for_is_locked_in_a_version_that_fits() -> Non
         name = canonicalize_name(wanted.name)
         assert name in LOCKED, f"{name}: make lock"
         assert wanted.specifier.contains(LOCKED[name], prereleases=True), words
+    for words in PROJECT["build-system"]["requires"]:
+        assert [one.operator for one in Requirement(words).specifier] == ["=="]
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").split():
+        name, _, version = line.partition("==")
+        assert LOCKED.get(canonicalize_name(name), version) == version, f"{name}: make lock"
 
 
 def test_the_extra_all_has_what_the_commands_ask_for() -> None:
@@ -78,17 +80,6 @@ def test_the_extra_all_has_what_the_commands_ask_for() -> None:
         for path in (ROOT / top).rglob("*.py"):
             named.update(re.findall(r'\bneed\("?[\w.]+"?, "(\w+)"', path.read_text(encoding="utf-8")))
     assert {"cluster", "nightly", "pdf", "plot", "tables"} <= named <= extras
-
-
-def test_the_build_back_end_is_pinned() -> None:
-    for words in PROJECT["build-system"]["requires"]:
-        assert [one.operator for one in Requirement(words).specifier] == ["=="]
-
-
-def test_lock_and_constraints_say_the_same() -> None:
-    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").split():
-        name, _, version = line.partition("==")
-        assert LOCKED.get(canonicalize_name(name), version) == version, f"{name}: make lock"
 
 
 def test_every_promise_of_the_security_note_names_a_test_that_is_there() -> None:

@@ -1,6 +1,5 @@
 """Records whose truth is known: simulated motions, written as a recorder would."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,9 +8,15 @@ import numpy as np
 from actuator_lti.design import load_design, model
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
+from tests.changed import changed
 
 Columns = dict[str, np.ndarray]
 NOISE_A = 0.02
+
+
+def bare(name: str) -> model.Design:
+    """A shipped design without what is told of its values."""
+    return replace(load_design(name), parameters={}, requirements=(), correlations=(), facts=())
 
 
 def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = None) -> Trajectory:
@@ -43,15 +48,8 @@ def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Recor
     return Record(name=name, time_s=time, signals=signals, units={}, counts=rows)
 
 
-def write(
-    path: Path,
-    columns: Columns,
-    change: Callable[[Columns], Columns] | None = None,
-    mark: str = ",",
-    fmt: str = "%.12g",
-) -> Path:
+def write(path: Path, columns: Columns, mark: str = ",", fmt: str = "%.12g") -> Path:
     """A CSV file with a header line."""
-    columns = columns if change is None else change(dict(columns))
     table = np.column_stack(list(columns.values()))
     np.savetxt(path, table, delimiter=mark, header=mark.join(columns), comments="", fmt=fmt)
     return path
@@ -75,28 +73,26 @@ HALF_PLAY = 1e-3
 
 def two_mass_design() -> model.Design:
     """10:1, 2 mrad of play, dry friction, 16-bit and 20-bit encoders, 30 mA rms and 5 mA steps of current."""
-    base = load_design("ilr33-amber")
-    gear = replace(base.gears[0], name="gear", ratio=10.0, input_inertia_kgm2=0.0, output_inertia_kgm2=0.0)
-    motor = replace(
-        base.motor, rotor_inertia_kgm2=2e-5, resistance_ohm=1.0, inductance_H=2e-3,
-        torque_constant_Nm_A=0.05, back_emf_constant_Vs_rad=0.05,
-    )  # fmt: skip
-    load = replace(
-        base.load, path="back-drivable", inertia_kgm2=2e-3, moment_max_Nm=0.0,
-        friction=model.LoadFriction(viscous_Nms_rad=0.02),
-    )  # fmt: skip
-    limits = replace(
-        base.limits, voltage_V=48.0, speed_rad_s=900.0, peak_current_A=30.0, continuous_current_A=30.0
-    )
-    current = model.CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
+    constants = dict.fromkeys(("torque_constant_Nm_A", "back_emf_constant_Vs_rad"), 0.05)
     tools = model.Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
-    parts = {"gears": (gear,), "motor": motor, "load": load, "limits": limits, "instruments": tools}
-    parts |= {
-        "friction": model.Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
-        "controller": model.Controller(period_s=1e-4, computing_delay_s=1e-4, current=current),
-        "coupling": model.Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
-        "encoder": model.Encoder(counts_per_rev=65536),
-        "output_encoder": model.OutputEncoder(counts_per_rev=1 << 20),
-    }
-    bare = {"parameters": {}, "requirements": (), "correlations": (), "facts": ()}
-    return replace(base, name="two-mass", **parts, **bare)
+    return changed(
+        bare("ilr33-amber"),
+        name="two-mass",
+        gears=(model.Gear(name="gear", ratio=10.0),),
+        motor={"rotor_inertia_kgm2": 2e-5, "resistance_ohm": 1.0, "inductance_H": 2e-3, **constants},
+        load=model.Load(
+            path="back-drivable", inertia_kgm2=2e-3, friction=model.LoadFriction(viscous_Nms_rad=0.02)
+        ),
+        limits={"voltage_V": 48.0, "speed_rad_s": 900.0}
+        | dict.fromkeys(("peak_current_A", "continuous_current_A"), 30.0),
+        instruments=tools,
+        friction=model.Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
+        controller=model.Controller(
+            period_s=1e-4,
+            computing_delay_s=1e-4,
+            current=model.CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3),
+        ),
+        coupling=model.Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
+        encoder=model.Encoder(counts_per_rev=65536),
+        output_encoder=model.OutputEncoder(counts_per_rev=1 << 20),
+    )

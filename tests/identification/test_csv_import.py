@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from actuator_lti.errors import InputError
 from analyses.records import csv_stream as module
@@ -48,34 +50,82 @@ def test_layouts(tmp_path, text: str, layout: CsvFormat) -> None:
     assert record.counts.rows_in == record.counts.rows_out == 2
 
 
-def test_every_line_is_accounted_for(tmp_path) -> None:
+def test_every_line_counts_ticks_wrap_around_and_careful_reading_is_fast_reading(tmp_path) -> None:
     text = "# log\nt,n\n0,1\n\n1,nan\n# pause\n2,3\n3,4\n"
     counts = read_csv_record(_write(tmp_path, text), _spec()).counts
     assert (counts.lines, counts.comments, counts.blanks, counts.header) == (8, 2, 1, 1)
     assert (counts.rows_in, counts.rows_out) == (4, 3)
     assert counts.dropped == {"with a missing value": 1}
     assert counts.first_dropped == {"with a missing value": "line 5"}
-
-
-def test_ticks_that_wrap_around(tmp_path) -> None:
+    # rows are dropped only on demand
+    for what, text, reason in (
+        ("bad_rows", "0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n", "not a row of numbers"),
+        ("disorder", "0,1\n2,1\n1,1\n3,1\n", "whose time does not increase"),
+    ):
+        spec, count = _spec(**{what: "drop"}), text.count("\n")
+        counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), spec).counts
+        assert (counts.rows_in, counts.rows_out, counts.dropped) == (count, 3, {reason: count - 3})
     rows = "".join(f"{(60000 + 3000 * k) % 65536},1\n" for k in range(6))
     time = TimeColumn(column="t", tick_s=1e-3, wrap=65536.0)
     record = read_csv_record(_write(tmp_path, "t,n\n" + rows), _spec(time=time))
     assert np.diff(record.time_s) == pytest.approx(3.0)
+    rng = np.random.default_rng(3)
+    values = rng.standard_normal(500)
+    plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))
+    with_comment = plain + "# the end\n"
+    fast = read_csv_record(_write(tmp_path, plain), _spec())
+    careful = read_csv_record(_write(tmp_path, with_comment), _spec())
+    assert np.array_equal(fast["speed"], careful["speed"])
 
 
-@pytest.mark.parametrize(
-    ("what", "text", "rows", "reason"),
-    [
-        ("bad_rows", "0,1\n1,abc\n2\n3,4\n4,inf\n5,6\n", 6, "not a row of numbers"),
-        ("disorder", "0,1\n2,1\n1,1\n3,1\n", 4, "whose time does not increase"),
-    ],
+CELLS = st.one_of(
+    st.integers(-3, 9).map(str),
+    st.floats(allow_nan=True, width=32).map(str),
+    st.sampled_from(["", "nan", "abc", "1,5", "1_0", '"2"', "#", "1e999", "\u00b5", "-"]),
 )
-def test_rows_are_dropped_only_on_demand_and_counted(
-    what: str, text: str, rows: int, reason: str, tmp_path
-) -> None:
-    counts = read_csv_record(_write(tmp_path, f"t,n\n{text}"), _spec(**{what: "drop"})).counts
-    assert (counts.rows_in, counts.rows_out, counts.dropped) == (rows, 3, {reason: rows - 3})
+TABLES = st.lists(st.lists(CELLS, min_size=0, max_size=4), max_size=12)
+BYTES = st.builds(
+    bytes.__add__, st.sampled_from([b"", b"t,x\n", b"t,x\n0,1\n1,2\n"]), st.binary(max_size=300)
+)
+LAYOUTS = st.sampled_from(
+    [
+        CsvFormat(),
+        CsvFormat(separator=";", decimal=","),
+        CsvFormat(separator="whitespace"),
+        CsvFormat(names=("t", "x")),
+    ]
+)
+
+
+@settings(max_examples=240)
+@given(
+    held=TABLES | BYTES, layout=LAYOUTS, policy=st.sampled_from(["error", "drop"]),
+    end=st.sampled_from(["\n", "\r\n"]),
+)  # fmt: skip
+def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path_factory) -> None:
+    """Tables of odd cells, and any bytes; or it is refused in one line."""
+    content = held
+    if isinstance(held, list):
+        separator = " " if layout.separator == "whitespace" else layout.separator
+        head = [] if layout.names else [f"t{separator}x"]
+        content = end.join([*head, *(separator.join(row) for row in held), ""]).encode()
+    path = _write(tmp_path_factory.getbasetemp(), content)
+    columns, said = (SignalColumn(name="x", column="x"),), ""
+    try:
+        record = read_csv_record(
+            path, _spec(format=layout, signals=columns, bad_rows=policy, disorder=policy)
+        )
+    except InputError as error:
+        said, record = str(error), None
+    assert bool(said) == (record is None)
+    assert "\n" not in said
+    if record is None:
+        return
+    counts = record.counts
+    assert counts.rows_in == counts.rows_out + sum(counts.dropped.values())
+    assert counts.rows_out == len(record)
+    lines = content.removesuffix(b"\n").count(b"\n") + 1
+    assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
 
 
 @pytest.mark.parametrize(
@@ -124,16 +174,6 @@ def test_the_checksum_is_that_of_what_was_read_with_a_byte_order_mark(tmp_path, 
 
     monkeypatch.setattr(BoundedRows, "array", and_a_row_comes)
     assert read_csv_record(path, _spec()).sha256 == digest
-
-
-def test_careful_and_fast_reading_agree(tmp_path) -> None:
-    rng = np.random.default_rng(3)
-    values = rng.standard_normal(500)
-    plain = "t,n\n" + "".join(f"{k},{v!r}\n" for k, v in enumerate(values.tolist()))
-    with_comment = plain + "# the end\n"
-    fast = read_csv_record(_write(tmp_path, plain), _spec())
-    careful = read_csv_record(_write(tmp_path, with_comment), _spec())
-    assert np.array_equal(fast["speed"], careful["speed"])
 
 
 def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:

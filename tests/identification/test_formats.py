@@ -1,5 +1,7 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
+import gzip
+import io
 import json
 from collections.abc import Callable
 from datetime import datetime, timedelta, timezone
@@ -12,6 +14,7 @@ import pytest
 from scipy.io import savemat
 
 from actuator_lti.errors import InputError
+from actuator_lti.files.mat5 import read_mat5
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from tests.identification.bench_records import record_of
@@ -119,6 +122,27 @@ def test_one_record_in_many_formats(form: str, tmp_path) -> None:
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)
 
 
+def test_revolutions_per_minute_as_recorders_spell_them(tmp_path) -> None:
+    (tmp_path / "r.csv").write_text("t,n\n0,0\n1,60\n2,120\n")
+    for unit in ("rpm", "1/min", "U/min", "min^-1"):
+        text = f'file = "r.csv"\ntime = {{ column = 1 }}\nsignals.speed = {{ column = 2, unit = "{unit}" }}\n'
+        (tmp_path / "r.toml").write_text(text)
+        assert open_record(tmp_path / "r.toml")["speed"] == pytest.approx([0.0, 2.0 * np.pi, 4.0 * np.pi])
+
+
+def test_a_compressed_and_a_plain_file_read_alike() -> None:
+    values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
+    for packed in (False, True):
+        stream = io.BytesIO()
+        savemat(stream, values, do_compression=packed)
+        content = read_mat5(stream.getvalue())
+        assert content.arrays["t"].ravel().tolist() == [0.0, 1.0, 2.0, 3.0, 4.0]
+        assert content.arrays["n"].tolist() == [[1.0, 2.0], [3.0, 4.0]]
+        assert content.arrays["k"].item() == 3.5
+        assert content.passed_over == []
+        assert content.texts == {"text": ("abc",)}
+
+
 @pytest.mark.parametrize(
     ("header", "signal", "factor"),
     [
@@ -145,23 +169,28 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) 
 
 
 @pytest.mark.parametrize(
-    ("options", "factor"),
+    ("value", "between", "factor", "power"),
     [
-        ("", 1.0),
-        (', value = "rms"', np.sqrt(2.0)),
-        (', between = "phase"', np.sqrt(3.0)),
-        (', value = "rms", between = "phase"', np.sqrt(6.0)),
+        ("", "", 1.0, None),
+        ("rms", "", np.sqrt(2.0), None),
+        ("", "phase", np.sqrt(3.0), None),
+        ("peak", "phase", np.sqrt(3.0), 1.5),
+        ("rms", "phase", np.sqrt(6.0), 3.0),
     ],
 )
-def test_rms_and_phase_voltages_become_those_of_the_equivalent_dc_motor(
-    options: str, factor: float, tmp_path
-) -> None:
-    (tmp_path / "s.csv").write_text("t,u\n" + "".join(f"{k},{k}\n" for k in range(9)))
-    voltage = f'signals.voltage = {{ column = "u", unit = "V"{options} }}'
-    _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', voltage)
+def test_ac_values_are_those_of_the_equivalent_dc_motor(value, between, factor, power, tmp_path) -> None:
+    """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
+    rows, value = np.arange(1.0, 10.0), f', value = "{value}"' if value else ""
+    (tmp_path / "s.csv").write_text("t,i,u\n" + "".join(f"{k - 1},{k},{k}\n" for k in range(1, 10)))
+    phase = f', between = "{between}"' if between else ""
+    current = f'signals.current = {{ column = "i", unit = "A"{value} }}'
+    voltage = f'signals.voltage = {{ column = "u", unit = "V"{value}{phase} }}'
+    _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', voltage, current)
     record = open_record(tmp_path / "r.toml")
-    assert record["voltage"] == pytest.approx(factor * np.arange(9.0))
-    assert bool(record.inputs[1].note) == bool(options)
+    assert record["voltage"] == pytest.approx(factor * rows)
+    assert bool(record.inputs[1].note) == bool(value + phase)
+    if power is not None:
+        assert record["current"] * record["voltage"] == pytest.approx(power * rows**2)
 
 
 def _uneven(keep: np.ndarray, jitter: float = 0.0) -> Record:
@@ -175,15 +204,12 @@ def _errors(record: Record) -> tuple[float, float]:
     return float(np.max(np.abs(record["angle"] - 3.0 * np.sin(5.0 * record.time_s))) / 6.0), stated
 
 
-def test_jitter_is_resampled_with_an_error_that_holds() -> None:
+def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_tolerance(tmp_path) -> None:
     """The stated error bounds that of linear interpolation: h^2/8 of the curvature, here 0.3 per mille."""
     record = _uneven(np.ones(len(TIME), dtype=bool), 2e-3).resampled()
     real, stated = _errors(record)
     assert 0.5 * real < stated < 5.0 * real
     assert stated < 1e-3
-
-
-def test_a_gap_is_bridged_only_within_the_tolerance() -> None:
     keep = np.ones(len(TIME), dtype=bool)
     keep[80:120] = False
     with pytest.raises(InputError, match=r"longest step 0\.41 s at 0\.79 s.*allowed: 5 %"):
@@ -193,9 +219,6 @@ def test_a_gap_is_bridged_only_within_the_tolerance() -> None:
     record = _uneven(short).resampled()
     real, stated = _errors(record)
     assert real <= 1.3 * stated < 0.01
-
-
-def test_the_tolerance_is_an_option_of_the_record_file(tmp_path) -> None:
     rows = [f"{t},{a}" for t, a in zip(TIME, ANGLE, strict=True)]
     (tmp_path / "r.csv").write_text("\n".join(["t,a", *rows[:80], *rows[120:]]) + "\n")
     text = 'file = "r.csv"\ntime = { column = "t" }\nsignals.angle = { column = "a", unit = "rad" }\n'
@@ -216,6 +239,11 @@ def test_the_tolerance_is_an_option_of_the_record_file(tmp_path) -> None:
         (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
         (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
         (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
+        (lambda p: (p / "r.csv").write_text("a,b,c,d,e,f\n1,2,3,4,5,6\n"), '"f": no name'),
+        (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "its number from 1"),
+        (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
+        (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
+        (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),
         (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
     ],
 )
@@ -224,15 +252,3 @@ def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> N
     file = next(tmp_path.iterdir())
     with pytest.raises(InputError, match=reason):
         open_record(file)
-
-
-@pytest.mark.parametrize("value", ["rms", "peak"])
-def test_ac_currents_carry_the_power_of_the_equivalent_dc_motor(value: str, tmp_path) -> None:
-    """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
-    (tmp_path / "s.csv").write_text("t,i,u\n" + "".join(f"{k},{k + 1},{k + 1}\n" for k in range(9)))
-    current = f'signals.current = {{ column = "i", unit = "A", value = "{value}" }}'
-    voltage = f'signals.voltage = {{ column = "u", unit = "V", value = "{value}", between = "phase" }}'
-    _described(tmp_path, 'file = "s.csv"', 'time = { column = "t" }', current, voltage)
-    record = open_record(tmp_path / "r.toml")
-    power = (3.0 if value == "rms" else 1.5) * np.arange(1.0, 10.0) ** 2
-    assert record["current"] * record["voltage"] == pytest.approx(power)

@@ -27,9 +27,7 @@ def files(tmp_path_factory) -> dict[str, str]:
     return {name: str(write(folder / f"{name.replace(' ', '_')}.csv", c)) for name, c in made.items()}
 
 
-def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_another(
-    files: dict[str, str], tmp_path, cli
-) -> None:
+def test_records_with_loads_of_their_own_are_one_fit_judged_on_another(files, tmp_path, cli) -> None:
     """Truth: the coefficients of the design that was simulated (Table 1 of the paper)."""
     arguments = ("identify", files["a"], files["b"], files["loaded"], "--validate", files["unseen"])
     result = cli.data(*arguments, "--design", "ilr33-amber", "--refine", "--out", tmp_path)
@@ -49,17 +47,14 @@ def test_records_with_loads_of_their_own_are_fitted_together_and_judged_on_anoth
         assert tolerance.std == pytest.approx(refined["standard_error"], rel=1e-5)
 
 
-def test_a_held_out_record_of_another_drive_fails(files: dict[str, str], tmp_path, cli) -> None:
+def test_a_held_out_record_is_filtered_and_that_of_another_drive_fails(files, tmp_path, cli) -> None:
     other = with_values(load_design("ilr33-amber"), {"friction.dry_torque": 3.5e-3})
     path = str(write(tmp_path / "other.csv", columns_of(motion(6, design=other), 7)))
     told = cli.data("identify", files["a"], "--validate", path, "--design", "ilr33-amber", status=1)
     checks = {check["id"]: check for check in told["items"]}
     assert not checks["held-out-other.csv"]["passed"]
     assert checks["residual"]["passed"]
-
-
-def test_a_held_out_record_is_filtered_as_those_of_the_fit(files: dict[str, str], tmp_path, cli) -> None:
-    """The same record again has the residual of the fit, less what its own bias is."""
+    # the same record again has the residual of the fit, less what its own bias is
     again = shutil.copy(files["a"], tmp_path / "again.csv")
     words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
     told = cli.data(*words)
@@ -84,7 +79,7 @@ def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
         assert reason in cli.refused(*common, "--fix", wrong)
 
 
-def test_a_torque_command_is_the_drive(identify) -> None:
+def test_a_torque_command_is_the_drive_and_a_contradiction_fails(identify, tmp_path, cli) -> None:
     columns = columns_of(motion(2))
     columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
     result = identify(columns).data
@@ -94,6 +89,10 @@ def test_a_torque_command_is_the_drive(identify) -> None:
     assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
         load_design("ilr33-amber").inertia_kgm2, rel=0.01
     )
+    columns = columns_of(motion(2))
+    columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
+    told = cli.data("correlate", "ilr33-amber", write(tmp_path / "r.csv", columns), status=1)
+    assert "60/2 pi" in json.dumps(told["records"][0]["findings"])
 
 
 @pytest.mark.parametrize("name", ["one way", "one speed"])
@@ -168,10 +167,3 @@ def test_correlation_over_several_records(files: dict[str, str], cli) -> None:
     assert result["worst"] == worst["record"]
     said = f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off"
     assert said in cli("correlate", "ilr33-amber", *paths).out
-
-
-def test_a_record_that_contradicts_itself_fails_the_correlation(tmp_path, cli) -> None:
-    columns = columns_of(motion(2))
-    columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
-    told = cli.data("correlate", "ilr33-amber", write(tmp_path / "r.csv", columns), status=1)
-    assert "60/2 pi" in json.dumps(told["records"][0]["findings"])

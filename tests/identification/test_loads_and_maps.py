@@ -77,17 +77,17 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
     assert gravity.offset_rad == pytest.approx(0.2, abs=2e-3)
 
 
-def test_a_pendulum_through_a_self_locking_gear_is_refused() -> None:
-    with pytest.raises(InputError, match="self-locking"):
-        fit_records(load_design("ilr33-amber"), [_pendulum_record(0.0, drive="current")], gravity=True)
-
-
-def test_gravity_left_out_shows_in_the_residual() -> None:
+def test_gravity_left_out_shows_in_the_residual_and_what_cannot_be_is_refused() -> None:
     """The same record without a pendulum in the model: ten times as far off."""
     record = _pendulum_record(0.02, drive="current")
     without = fit_records(_joint(), [record])
     assert without.relative_residual > 0.15
     assert fit_records(_joint(), [record], gravity=True).relative_residual < 0.02
+    with pytest.raises(InputError, match="self-locking"):
+        fit_records(load_design("ilr33-amber"), [_pendulum_record(0.0, drive="current")], gravity=True)
+    record = _record(position=_waves(0, 0.05), supply=np.full(len(TIME), 12.0))
+    with pytest.raises(InputError, match="no drive signal"):
+        fit_records(load_design("emps"), [record])
 
 
 def _stribeck(speed: np.ndarray) -> np.ndarray:
@@ -103,12 +103,19 @@ def _axis_record(law: str, seed: int = 0) -> Record:
     return _record(position=_waves(0, 0.05), force=force)
 
 
-def test_a_plain_law_needs_no_map() -> None:
+def test_a_plain_law_needs_no_map_and_a_design_with_one_is_moved_like_any_other() -> None:
     """Over five draws of noise the criterion never takes a map for a drive that has none."""
     for seed in range(5):
         model = fit_map(load_design("emps"), [_axis_record("plain", seed)])
         assert model.knots_rad_s is None
         assert next(law for law in model.laws if law.taken).name.startswith("plain")
+    record = _axis_record("map")
+    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
+    result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))
+    assert result.design.friction.points
+    outcome = correlate_record(result.design, record)
+    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
+    assert "torque needed for its motion" not in result.resimulated[0].how
 
 
 def test_a_friction_map_is_found_with_its_break_points_and_goes_into_the_design() -> None:
@@ -132,12 +139,6 @@ def test_a_friction_map_is_found_with_its_break_points_and_goes_into_the_design(
     assert torque == pytest.approx(_stribeck(speeds), rel=0.05)
 
 
-def test_a_voltage_drive_needs_a_resistance() -> None:
-    record = _record(position=_waves(0, 0.05), supply=np.full(len(TIME), 12.0))
-    with pytest.raises(InputError, match="no drive signal"):
-        fit_records(load_design("emps"), [record])
-
-
 def test_only_what_was_recorded_while_enabled_is_used() -> None:
     """With the torque off for a second the fit is that of the rest, exactly."""
     record = _axis_record("plain")
@@ -152,16 +153,6 @@ def test_only_what_was_recorded_while_enabled_is_used() -> None:
     assert any("enabled from 0 s" in note for note in whole.records[0].notes)
 
 
-def test_a_design_with_a_friction_map_is_moved_by_the_record_like_any_other() -> None:
-    record = _axis_record("map")
-    record = replace(record, signals={**record.signals, "position_reference": record["position"]})
-    result = identify_bench(load_design("emps"), [record], settings=Settings(friction="map"))
-    assert result.design.friction.points
-    outcome = correlate_record(result.design, record)
-    assert all(np.isfinite(signal.relative_error) for signal in outcome.signals.values())
-    assert "torque needed for its motion" not in result.resimulated[0].how
-
-
 def _voltage_record(noise: float, *, fast: bool) -> Record:
     """u = R i + kE w + L di/dt with R 0.5 ohm, kE 0.02, L 3 mH; fast: the current has a part at 60 Hz."""
     w, turn, part = 200.0 * _waves(1), 2.0 * np.pi * 60.0, 0.5 * fast
@@ -172,7 +163,7 @@ def _voltage_record(noise: float, *, fast: bool) -> Record:
     return _record(angle=200.0 * _waves(0), current=current, voltage=voltage, speed=w)
 
 
-def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
+def test_no_inductance_is_invented_and_a_cutoff_keeps_out_what_is_above_it() -> None:
     """The same motor twice: a calm record tells R and kE only, a fast one the inductance as well."""
     calm = fit_electrical(_joint(), [_voltage_record(0.5, fast=False)])
     assert "inductance" not in calm.names
@@ -182,9 +173,6 @@ def test_no_inductance_is_invented_where_the_record_does_not_show_it() -> None:
     for fit in (calm, fast):
         assert fit["resistance"] == pytest.approx(0.5, abs=4.0 * fit.std("resistance") + 0.02)
         assert fit["back_emf"] == pytest.approx(0.02, rel=0.02)
-
-
-def test_a_cutoff_keeps_out_of_the_voltage_equation_what_is_above_it() -> None:
     record = _voltage_record(0.0, fast=False)
     tone = np.sin(2.0 * np.pi * 90.0 * TIME)
     record = replace(record, signals={**record.signals, "voltage": record["voltage"] + tone})

@@ -10,7 +10,7 @@ from analyses.records.open_record import open_record
 from examples.odrive_motor import find_chirp, fit_step, main, predict_chirp
 
 
-def test_the_motor_of_the_step_predicts_the_chirp(odrive_files: dict[str, Path], capsys) -> None:
+def test_the_motor_of_the_steps_predicts_the_chirp(odrive_files: dict[str, Path], capsys) -> None:
     """Published: 4.52 turns/s. 1.9 % of the speed from 1 to 48 Hz, no band worse than 3.5 %."""
     motor = fit_step([open_record(odrive_files["step1"])])
     assert motor.steady_speeds_rad_s[0] / (2.0 * np.pi) == pytest.approx(4.52, abs=0.005)
@@ -23,10 +23,7 @@ def test_the_motor_of_the_step_predicts_the_chirp(odrive_files: dict[str, Path],
     assert max(band.relative_error for _, _, band in result.bands) < 0.035
     main([str(odrive_files[name]) for name in ("step1", "chirp1")])
     assert f"speed: error {100.0 * result.whole.relative_error:.2f} %" in capsys.readouterr().out
-
-
-def test_pooled_steps_agree_with_the_scatter_of_single_ones(odrive_files: dict[str, Path]) -> None:
-    """Two steps 0.35 ms apart cannot be pooled to 0.04 ms."""
+    # two steps 0.35 ms apart cannot be pooled to 0.04 ms
     steps = [open_record(odrive_files[name]) for name in ("step1", "step2")]
     alone = [fit_step([step]).time_constant_s for step in steps]
     together = fit_step(steps)

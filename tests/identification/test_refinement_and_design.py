@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments
 from analyses.records.open_record import open_record
+from tests.refusals import refused
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
 BOUNDS = Instruments(torque_accuracy=0.005, current_gain=0.005, current_offset_A=0.002)
@@ -30,8 +30,8 @@ WINDOW = SteadyWindow(
 )
 
 
-def _points(seed: int, noise: float = 2e-6) -> list[SteadyPoint]:
-    rng = np.random.default_rng(seed)
+def _points(seed: int) -> list[SteadyPoint]:
+    rng, noise = np.random.default_rng(seed), 2e-6
     grid = product((0.0, 2.0, 5.0, 8.9), np.linspace(105.0, 942.0, 6).tolist())
     return [
         SteadyPoint(
@@ -55,7 +55,7 @@ def fit() -> SurfaceFit:
     return fit_surface(_points(0), BOUNDS, 5.9e-3)
 
 
-def test_random_errors_alone_have_the_least_squares_covariance() -> None:
+def test_random_errors_have_the_least_squares_covariance_and_what_is_not_told_is_kept() -> None:
     points = _points(1)
     result = fit_surface(points, Instruments(), 5.9e-3)
     x = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in points])
@@ -63,19 +63,15 @@ def test_random_errors_alone_have_the_least_squares_covariance() -> None:
     own = own + result.run_scatter_Nm**2
     expected = np.linalg.inv(x.T @ (x / own[:, None]))
     assert result.covariance == pytest.approx(expected, rel=1e-6)
-
-
-def test_too_few_runs_are_refused_and_what_they_do_not_tell_is_kept() -> None:
     points = _points(2)
-    with pytest.raises(InputError, match="3 usable runs: at least 4"):
-        fit_surface(points[:3], Instruments(), 5.9e-3)
+    refused(fit_surface, points[:3], Instruments(), 5.9e-3, words="3 usable runs: at least 4")
     one_speed = [replace(p, speed_rad_s=500.0) for p in points]
     fit = fit_surface(one_speed, Instruments(), 5.9e-3, kept={"Cv": 5.25e-6})
     assert fit.fixed["Cv"].value == 5.25e-6
     assert fit["C0"] == pytest.approx(2.25e-3, abs=4.0 * fit.std("C0"))
 
 
-def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceFit) -> None:
+def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: SurfaceFit) -> None:
     design = load_design("ilr33-amber")
     result = suggest_runs(design, fit, count=3)
     left = [run.remaining for run in result.runs]
@@ -92,6 +88,12 @@ def test_suggested_runs_shrink_the_margins_spread_more_than_others(fit: SurfaceF
     worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in result.runs]
     assert spread(result.runs) < spread(worse) < spread([])
     assert left[-1] == pytest.approx(spread(result.runs) / spread([]))
+    result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
+    assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
+    assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
+    assert 0.5 < result.shared_part <= 1.0
+    assert result.largest_shared in fit.shared_shifts
+    refused(suggest_runs, load_design("ilr33-amber"), fit, criterion="E", words="criterion")
 
 
 def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:
@@ -117,19 +119,7 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
     assert spread.slopes[0] == pytest.approx(slope, rel=0.05)
 
 
-def test_the_determinant_is_served_by_extreme_points_and_what_no_run_reduces_is_named(
-    fit: SurfaceFit,
-) -> None:
-    result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
-    assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
-    assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
-    assert 0.5 < result.shared_part <= 1.0
-    assert result.largest_shared in fit.shared_shifts
-    with pytest.raises(InputError, match="criterion"):
-        suggest_runs(load_design("ilr33-amber"), fit, criterion="E")
-
-
-def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
+def test_output_error_finds_the_values_of_a_record_and_names_one_at_its_bound() -> None:
     from nonlinear import commands, simulate
 
     design = load_design("emps")
@@ -145,10 +135,7 @@ def test_output_error_finds_the_parameters_of_a_simulated_record() -> None:
     found = fit_output(start, paths, force, force(design))
     assert found.values == pytest.approx([parameter_value(design, path) for path in paths], rel=2e-3)
     assert np.linalg.norm(found.rest) < 0.05 * np.linalg.norm(found.first)
-
-
-def test_a_value_that_ends_at_its_bound_is_named() -> None:
-    """An output proportional to the friction, measured as of a negative one."""
+    # an output proportional to the friction, measured as of a negative one
     key = "friction.viscous"
 
     def output(tried: Design) -> np.ndarray:
@@ -157,9 +144,12 @@ def test_a_value_that_ends_at_its_bound_is_named() -> None:
     found = fit_output(load_design("emps"), (key,), output, -np.linspace(1.0, 2.0, 50))
     assert found.values == [0.0]
     assert found.at_bound == (key,)
+    fit = Fit(names=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14)
+    with pytest.raises(InputError, match=r"identified friction\.viscous = -1e-06.* longer motion"):
+        design_with_fit(load_design("ilr33-amber"), fit, "test")
 
 
-def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_file: Path) -> None:
+def test_refinement_on_emps_lowers_the_force_error_and_every_result_is_what_is_written(emps_file) -> None:
     design, record = load_design("emps"), open_record(emps_file)
     result = identify_bench(design, [record], settings=Settings(refine=True))
     assert result.refined.error_after < result.refined.error_before < 0.05848
@@ -167,10 +157,6 @@ def test_refinement_on_emps_lowers_the_force_error_and_is_what_is_written(emps_f
         assert parameter_value(read_design_text(result.text), path) == pytest.approx(value, rel=1e-6)
     assert result.refined["motor.rotor_inertia"] == pytest.approx(95.1, abs=1.0)
     assert result.resimulated[0].relative_error == pytest.approx(result.refined.error_after, rel=1e-4)
-
-
-def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
-    design, record = load_design("emps"), open_record(emps_file)
     for form in ("symmetric", "per-direction"):
         model = fit_records(design, [record], form=form)
         identified = design_with_fit(design, joint_values(design, model), "EMPS")
@@ -181,9 +167,3 @@ def test_the_emps_result_becomes_a_design(emps_file: Path) -> None:
             assert back.friction.offset_torque_Nm == 0.0
         else:
             assert back.friction.offset_torque_Nm == pytest.approx(model["offset"], rel=1e-6)
-
-
-def test_an_estimate_that_no_drive_has_is_refused_with_advice() -> None:
-    fit = Fit(names=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14)
-    with pytest.raises(InputError, match=r"identified friction\.viscous = -1e-06.* longer motion"):
-        design_with_fit(load_design("ilr33-amber"), fit, "test")

@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from actuator_lti.design import load_design, parameter_value
+from actuator_lti.design import model, parameter_value, write_design
+from actuator_lti.errors import InputError
 from analyses.identification.measured_response import ResponseResult, identify_response
 from reports.charts.chart import Curve
 from reports.charts.data import chart_of
 from reports.sections.identify import section
+from tests.changed import changed
 
 TICK, GAIN, N = 1e-3, 0.8, 50.0
 TRUTH = {
@@ -21,46 +23,27 @@ TRUTH = {
     "friction.viscous": 4e-4,
     "control.computing_delay": 0.6e-3,
 }
-COUPLED = """
-[design]
-name = "two-mass"
-revision = "1"
-[motor]
-source_gain = "1 N*m/V"
-rotor_inertia = "{J} kg*m^2"
-[[gear]]
-name = "gear"
-ratio = 50
-[coupling]
-stiffness = "{k} N*m/rad"
-damping = "{c} N*m*s/rad"
-[load]
-path = "back-drivable"
-inertia = "{Jl} kg*m^2"
-[friction]
-viscous = "{C} N*m*s/rad"
-[encoder]
-speed = "ideal"
-[limits]
-voltage = "10 V"
-[control]
-period = "1 ms"
-computing_delay = "{d} s"
-[control.position]
-gain = "0.8 V/rad"
-"""
-RIGID = COUPLED.replace('[coupling]\nstiffness = "{k} N*m/rad"\ndamping = "{c} N*m*s/rad"\n', "")
+COUPLED = model.Design(
+    name="two-mass",
+    title="",
+    motor=model.Motor(source_gain_Nm_V=1.0, rotor_inertia_kgm2=1.0),
+    gears=(model.Gear(name="gear", ratio=N),),
+    coupling=model.Coupling(stiffness_Nm_rad=1.0, damping_Nms_rad=1.0),
+    load=model.Load(path="back-drivable"),
+    encoder=model.Encoder(speed="ideal"),
+    limits=model.Limits(voltage_V=10.0),
+    controller=model.Controller(period_s=TICK, computing_delay_s=0.0, position=model.PositionLoop(gain=GAIN)),
+    validation=model.Validation(full_deflection_rad=0.1),
+)
 
 
-def _design(folder: Path, off: dict[str, float]) -> Path:
-    J, Jl, k, c, C, d = (value * off.get(key, 1.0) for key, value in TRUTH.items())
-    (folder / "start.toml").write_text(COUPLED.format(J=J, Jl=Jl, k=k, c=c, C=C, d=d))
-    return folder / "start.toml"
+def _design(off: dict[str, float]) -> model.Design:
+    return COUPLED.with_values({key: value * off.get(key, 1.0) for key, value in TRUTH.items()})
 
 
-def open_loop(hertz: np.ndarray) -> np.ndarray:
+def open_loop(hertz: np.ndarray, values: dict[str, float] = TRUTH) -> np.ndarray:
     """P control of the motor angle, held over a tick and late by a part of it (Astrom, Wittenmark, 3.2)."""
-    J, Jl, k, c, C, d = TRUTH.values()
+    J, Jl, k, c, C, d = values.values()
     spring = np.array([k / N, c / N, -k, -c])  # of motor angle and speed, load angle and speed
     a = np.zeros((4, 4))
     a[0, 1] = a[2, 3] = 1.0
@@ -83,11 +66,6 @@ HERTZ = np.geomspace(0.5, 400.0, 60)
 OFF = dict(zip(TRUTH, (1.15, 0.85, 1.1, 0.7, 1.3, 0.8), strict=True))
 
 
-def _seen(of: str) -> np.ndarray:
-    loop = open_loop(HERTZ)
-    return {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
-
-
 def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: float | None = None) -> Path:
     columns = {"frequency_hz": hertz, "real": response.real, "imag": response.imag}
     if deviation is not None:
@@ -99,13 +77,15 @@ def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: f
 
 def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: bool = True) -> Path:
     noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ))) / np.sqrt(2.0)
-    value = _seen(of) * (1.0 + deviation * (noise[0] + 1j * noise[1]))
+    loop = open_loop(HERTZ)
+    seen = {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
+    value = seen * (1.0 + deviation * (noise[0] + 1j * noise[1]))
     return _written(folder, HERTZ, value, deviation if stated else None)
 
 
 def _found(folder: Path, *measured: object, **options: object) -> ResponseResult:
     file = _measured(folder, *measured, stated=bool(options.pop("stated", True)))  # type: ignore[arg-type]
-    return identify_response(load_design(_design(folder, OFF)), file, of=measured[0], **options)  # type: ignore[arg-type]
+    return identify_response(_design(OFF), file, of=measured[0], **options)  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("of", ["L", "T", "S"])
@@ -127,57 +107,101 @@ def test_intervals_hold_what_they_say(tmp_path) -> None:
     assert all(one.passed for one in results)
 
 
-def test_what_a_response_does_not_determine_is_kept_and_said(tmp_path) -> None:
-    """A rigid drive: two inertias on one shaft; far too much noise: the small values drown."""
-    design = tmp_path / "rigid.toml"
-    design.write_text(RIGID.format(J=2e-5, Jl=0.04, C=4e-4, d=6e-4))
-    hertz, total = HERTZ[HERTZ < 4.0], 2e-5 + 0.04 / N**2
-    fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
-    assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
-    inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
-    assert inertia == pytest.approx(total, rel=0.02)
-    assert all("not determined, the design's value kept" in one.reason for one in fit.fixed.values())
+STUDENT_2 = 4.302653
+"""97.5 % of Student's distribution of two degrees of freedom, of a table."""
 
 
-def test_a_load_without_inertia_is_kept_without(tmp_path) -> None:
-    """A rigid drive whose rotor has it all: its inertia is the whole one at the motor."""
-    design = tmp_path / "rigid.toml"
-    design.write_text(RIGID.format(J=5e-5, Jl=0.0, C=4e-4, d=6e-4))
-    hertz = HERTZ[HERTZ < 4.0]
-    fit = identify_response(load_design(design), _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
-    assert fit["motor.rotor_inertia"] == pytest.approx(2e-5 + 0.04 / N**2, rel=0.02)
-    assert fit.fixed["load.inertia"].value == 0.0
+def test_few_degrees_of_freedom_widen_the_interval(tmp_path) -> None:
+    """Two inertias of two frequencies: slopes by differences of the exact loop, Student at 4 - 2."""
+    hertz, free = np.array([3.0, 40.0]), ("motor.rotor_inertia", "load.inertia")
+    file = _written(tmp_path, hertz, open_loop(hertz) * (1.0 + np.array([0.004 - 0.002j, 0.003j])))
+    held = {key: value for key, value in TRUTH.items() if key not in free}
+    fit = identify_response(_design({}), file, fixed=held).fit
+    seen = np.loadtxt(file, delimiter=",", skiprows=1)[:, 1:] @ [1.0, 1.0j]
+
+    def parts(off: dict[str, float]) -> np.ndarray:
+        values = {key: off.get(key, 1.0) * {**TRUTH, **{n: fit[n] for n in free}}[key] for key in TRUTH}
+        share = open_loop(hertz, values) / np.abs(seen) - seen / np.abs(seen)
+        return np.concatenate([share.real, share.imag])
+
+    rest = parts({})
+    slopes = np.column_stack([(parts({k: 1.0 + 1e-5}) - parts({k: 1.0 - 1e-5})) / 2e-5 for k in free])
+    shares = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)) * (rest @ rest) / 2.0)
+    for key, share in zip(free, shares, strict=True):
+        low, high = fit.interval(key)
+        assert 0.5 * (high - low) == pytest.approx(STUDENT_2 * share * fit[key], rel=1e-3)
 
 
-def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
-    """A stiffness that is held at half: no other values make up for it, and the page says so."""
-    file, design = _measured(tmp_path, "L", 0.01, 3), _design(tmp_path, OFF)
-    words = ("identify", "--response", file, "--design", design, "--out", tmp_path / "o")
-    assert cli(*words).status == 0
-    result = cli.data(*words, "--fix", "coupling.stiffness=450", status=1)
-    assert result["fit"]["misfit"] > 5.0
-    assert next(item["passed"] for item in result["items"]) is False
+@pytest.mark.parametrize("count", [2, 3])
+def test_no_more_numbers_than_unknowns_are_refused(count: int, tmp_path) -> None:
+    hertz = HERTZ[10 : 10 + count]
+    with pytest.raises(InputError, match="allowed: 4 frequencies or more"):
+        identify_response(_design({}), _written(tmp_path, hertz, open_loop(hertz)))
 
 
-def test_a_response_that_leaves_no_load_behind_the_coupling_is_refused(tmp_path, cli) -> None:
-    """Ten times the loop is that of a tenth of the inertia: less than the rotor's, which is held."""
-    file, design = _written(tmp_path, HERTZ, 10.0 * open_loop(HERTZ)), _design(tmp_path, OFF)
-    words = ("identify", "--response", file, "--design", design)
-    said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
-    assert "wants no inertia behind the coupling; allowed: a response of position, --of L" in said
+def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> None:
+    """A source 10 % stronger, with all inertias, stiffness and friction 10 % larger, is the same loop."""
+    result = _found(tmp_path, "L", 1e-7, 0, stated=False)
+    kept = result.fit.fixed["source_gain"]
+    shares = {key: -kept.moves[key] * kept.value / TRUTH[key] for key in TRUTH}
+    assert list(shares.values()) == pytest.approx([1.0] * 5 + [0.0], abs=0.01)
+    (item,) = (one for one in result.items if one.id == "kept-source_gain")
+    assert item.passed is None
+    assert "at motor.source_gain = 1 N m/V" in result.text
 
 
 @pytest.mark.parametrize(
-    ("more", "reason"),
-    [
+    ("J", "Jl"), [(2e-5, 0.04), (5e-5, 0.0)], ids=["on one shaft", "the rotor has it all"]
+)
+def test_what_a_rigid_drive_s_response_does_not_determine_is_kept_and_said(J, Jl, tmp_path) -> None:
+    """Far too much noise: the small values drown; the inertia of a load without any stays zero."""
+    values = {"motor.rotor_inertia": J, "load.inertia": Jl}
+    design = changed(_design({}), coupling=None).with_values(values)
+    hertz = HERTZ[HERTZ < 4.0]
+    fit = identify_response(design, _written(tmp_path, hertz, open_loop(hertz), 0.01)).fit
+    assert "motor.rotor_inertia" in fit.fixed or "load.inertia" in fit.fixed
+    inertia = fit["motor.rotor_inertia"] + fit["load.inertia"] / N**2
+    assert inertia == pytest.approx(2e-5 + 0.04 / N**2, rel=0.02)
+    said = "not determined, the design's value kept"
+    kept = {key: one.reason for key, one in fit.fixed.items() if key != "source_gain"}
+    assert all(said in reason for reason in kept.values()) == (Jl > 0.0)
+    assert Jl > 0.0 or fit.fixed["load.inertia"].value == 0.0
+
+
+def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
+    """A stiffness that is held at half: no other values make up for it, and the page says so.
+
+    Ten times the loop is that of a tenth of the inertia: less than the rotor's, which is held.
+    """
+    file, design = _measured(tmp_path, "L", 0.01, 3), tmp_path / "start.toml"
+    design.write_text(write_design(_design(OFF)))
+    words = ("identify", "--response", file, "--design", design)
+    assert cli(*words, "--out", tmp_path / "o").status == 0
+    result = cli.data(*words, "--out", tmp_path / "o", "--fix", "coupling.stiffness=450", status=1)
+    assert result["fit"]["misfit"] > 5.0
+    assert next(item["passed"] for item in result["items"]) is False
+    for more, reason in (
         (("--loop", "speed"), 'speed": allowed: position'),
         (("--of", "X"), "'L', 'T', 'S', 'closed'"),
         (("--fix", "motor.resistance=1"), "motor.resistance"),
-    ],
-)
-def test_what_cannot_be_is_refused(more: tuple[str, ...], reason: str, tmp_path, cli) -> None:
-    file, design = _measured(tmp_path, "L", 0.01, 0), _design(tmp_path, {})
-    assert reason in cli.refused("identify", "--response", file, "--design", design, *more)
+    ):
+        assert reason in cli.refused(*words, *more)
+    _written(tmp_path, HERTZ, 10.0 * open_loop(HERTZ))
+    said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
+    assert "has it as a response of position, --of L; allowed: --loop position" in said
+
+
+def test_coherence_weighs_with_its_averages_and_is_said_to_be_unread_without(tmp_path) -> None:
+    """Of 16 averages 0.99 is a deviation of sqrt(0.01/(0.99 * 15)), 2.6 %: the noise that is there."""
+    deviation = np.sqrt(0.01 / (0.99 * 15.0))
+    file = _measured(tmp_path, "L", deviation, 3, stated=False)
+    names, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([f"{names},coherence", *(f"{row},0.99" for row in rows)]))
+    read, unread = (identify_response(_design(OFF), file, averages=n) for n in (16, None))
+    assert 0.8 < read.fit.misfit < 1.2
+    assert "misfit" in section(read)["intro"]
+    assert unread.fit.misfit is None
+    assert "the coherence is not read without --averages N" in section(unread)["intro"]
 
 
 def test_a_fit_is_drawn_in_decibels_with_a_phase_that_does_not_wrap(tmp_path) -> None:

@@ -37,7 +37,7 @@ def sixteen(tmp_path_factory) -> Path:
     return folder / "runs.toml"
 
 
-def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
+def test_sixteen_records_of_four_gains_are_one_fit(sixteen, cli, tmp_path) -> None:
     """The inertia at the output is known of each: what is found is the motor's own, from all sixteen."""
     design = load_design("ilr33-amber")
     model = cli.data("identify", sixteen, "--design", "ilr33-amber")["model"]
@@ -46,9 +46,8 @@ def test_sixteen_records_of_four_gains_are_one_fit(sixteen: Path, cli) -> None:
     for name, value in truth.items():
         found = model["parameters"][name]
         assert abs(found["value"] - value) < 4.0 * found["standard_error"] + 1e-3 * value, name
-
-
-def test_each_record_is_simulated_with_its_own_settings(sixteen: Path, cli, tmp_path) -> None:
+    records = open_records(sixteen)
+    assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4
     records = cli.data("correlate", "ilr33-amber", sixteen, "--error-limit", "3")["records"]
     told = [note for record in records for note in record["notes"]]
     assert [told.count(f"set: control.position.gain = {gain} 1/s") for gain in GAINS] == [4] * 4
@@ -104,22 +103,14 @@ def test_a_setting_that_cannot_be_is_refused(settings: str, reason: str, sixteen
     assert "wrong.toml" in err or ".csv" in err
 
 
-@pytest.mark.parametrize(
-    "words", [("correlate", "ilr33-amber", "DESIGN"), ("identify", "DESIGN"), ("identify", "FILE", "DESIGN")]
-)
-def test_a_design_in_the_place_of_a_record_is_named(words: tuple[str, ...], sixteen: Path, cli) -> None:
+def test_a_design_in_the_place_of_a_record_is_named(sixteen, cli) -> None:
     file = sixteen.with_name("my.toml")
     file.write_text(write_design(load_design("ilr33-amber")))
-    names = {"DESIGN": file, "FILE": sixteen}
-    status, _, err = cli(*(names.get(word, word) for word in words))
-    assert status == 2
-    assert "my.toml: a design, and no record; allowed: CSV" in err
-    assert "correlate takes the design first, identify behind --design" in err
+    for words in (("correlate", "ilr33-amber", file), ("identify", sixteen, file)):
+        status, _, err = cli(*words)
+        assert status == 2
+        assert "my.toml: a design, and no record; allowed: CSV" in err
+        assert "correlate takes the design first, identify behind --design" in err
     status, _, err = cli("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
     assert status == 2
     assert "a table of numbers, TOML is wanted: a record, and no design?" in err
-
-
-def test_a_list_of_records_names_them(sixteen: Path) -> None:
-    records = open_records(sixteen)
-    assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4

@@ -9,7 +9,6 @@ import pytest
 
 from actuator_lti.design import read_design_text
 from actuator_lti.design.model import Design, Friction
-from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import identify_frequency
 from analyses.identification.two_mass import (
     NAMES,
@@ -21,7 +20,9 @@ from analyses.identification.two_mass import (
     start_of,
 )
 from analyses.records.record import Record
+from tests.changed import changed
 from tests.identification.bench_records import record_of, two_mass_design
+from tests.refusals import refused
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -40,12 +41,10 @@ def _design() -> Design:
 
     As of a recorder of its own: the records below are of a torque without steps between the samples.
     """
-    base = two_mass_design()
-    motor = replace(base.motor, rotor_inertia_kgm2=1e-5)
-    load = replace(base.load, inertia_kgm2=1e-3, friction=None)
-    control = replace(base.controller, period_s=7e-5)
-    bare = replace(base, friction=Friction(), coupling=None)
-    return replace(bare, motor=motor, load=load, controller=control)
+    return changed(
+        two_mass_design(), friction=Friction(), coupling=None, motor={"rotor_inertia_kgm2": 1e-5},
+        load={"inertia_kgm2": 1e-3, "friction": None}, controller={"period_s": 7e-5},
+    )  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -85,34 +84,27 @@ def _lines(seed: int, *outputs: str) -> Lines:
 def test_intervals_hold_the_truth_at_their_rate_over_100_seeds() -> None:
     """95 % intervals: of 100 draws 88 to 100 hold the truth, for every parameter and both resonances."""
     held = dict.fromkeys((*NAMES, "resonance", "antiresonance"), 0)
+    truths = TRUTH | {"resonance": 632.4555, "antiresonance": 447.2136}
     for seed in range(100):
         lines = _lines(seed, "angle", "output_angle")
         fit = fit_two_mass(lines, start_of(lines, N), N)
-        for name in NAMES:
-            low, high = fit.interval(name)
-            held[name] += low <= TRUTH[name] <= high
-        for name, truth, (value, std) in (
-            ("resonance", 632.4555, fit.resonance_rad_s),
-            ("antiresonance", 447.2136, fit.antiresonance_rad_s),
-        ):
-            held[name] += abs(value - truth) <= 1.96 * std
+        found = {name: (fit[name], fit.std(name)) for name in NAMES}
+        found |= {"resonance": fit.resonance_rad_s, "antiresonance": fit.antiresonance_rad_s}
+        for name, (value, std) in found.items():
+            held[name] += abs(value - truths[name]) <= 1.96 * std
     assert all(88 <= count <= 100 for count in held.values()), held
 
 
-def test_the_motors_angle_alone_tells_the_drive_too() -> None:
+def test_the_motors_angle_alone_tells_the_drive_and_the_command_its_period() -> None:
     lines = _lines(1, "angle")
     fit = fit_two_mass(lines, start_of(lines, N), N)
     for name in ("motor_inertia", "load_inertia", "stiffness"):
         assert fit[name] == pytest.approx(TRUTH[name], abs=4.0 * fit.std(name))
         assert fit[name] == pytest.approx(TRUTH[name], rel=0.01)
-
-
-def test_the_period_is_found_from_the_command() -> None:
     assert period_of_excitation(_record(0), "current_reference") == pytest.approx(0.5)
     noise = np.random.default_rng(0).standard_normal(4000)
     record = replace(_record(0).slice(0, 4000), signals={"current_reference": noise})
-    with pytest.raises(InputError, match="does not repeat itself"):
-        period_of_excitation(record, "current_reference")
+    refused(period_of_excitation, record, "current_reference", words="does not repeat itself")
 
 
 def test_a_two_mass_model_of_something_else_is_refused() -> None:
@@ -131,13 +123,29 @@ def test_a_two_mass_model_of_something_else_is_refused() -> None:
     assert not result.passed
 
 
+def test_what_the_design_alone_tells_is_said_with_what_it_moves() -> None:
+    """The records have no load friction: a design that has some gives the same resonance, and another k.
+
+    With r = 1/N + CM in the place of 1/N the same lines are those of k, c, J_l and Cv_l over N r.
+    """
+    plain = identify_frequency(_design(), _record(5))
+    assert "+10 % of every value" in plain.fit.fixed["torque_constant"].reason
+    assert "load_coefficient" not in plain.fit.fixed
+    design = replace(_design(), friction=replace(_design().friction, load_coefficient=0.005))
+    result = identify_frequency(design, _record(5))
+    (item,) = (one for one in result.items if one.id == "kept-load_coefficient")
+    assert item.passed is None
+    assert "of load_inertia, stiffness, damping, load_viscous" in item.reason
+    assert result.fit["stiffness"] * (1.0 + 0.005 * N) == pytest.approx(plain.fit["stiffness"], rel=1e-4)
+    assert result.fit.resonance_rad_s == pytest.approx(plain.fit.resonance_rad_s, rel=1e-4)
+
+
 def test_what_the_design_cannot_hold_is_fixed_or_refused() -> None:
-    result = identify_frequency(_design(), _record(5), fixed={"coupling.damping": 0.02})
+    record = _record(5)
+    result = identify_frequency(_design(), record, fixed={"coupling.damping": 0.02})
     assert result.fit["damping"] == 0.02 == result.fit.fixed["damping"].value
     assert read_design_text(result.text).coupling is not None
-    with pytest.raises(InputError, match="can be fixed here"):
-        identify_frequency(_design(), _record(5), fixed={"motor.resistance": 1.0})
-    record = _record(5)
+    wrong = {"motor.resistance": 1.0}
+    refused(identify_frequency, _design(), record, fixed=wrong, words="can be fixed here")
     blind = replace(record, signals={name: v for name, v in record.signals.items() if name != "angle"})
-    with pytest.raises(InputError, match="motor angle is needed"):
-        identify_frequency(_design(), blind)
+    refused(identify_frequency, _design(), blind, words="motor angle is needed")

@@ -13,6 +13,7 @@ from analyses.identification.frequency_bench import FrequencyResult, identify_fr
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 from examples.virtual_bench.__main__ import main as simulate
 from tests.identification.bench_records import HALF_PLAY, two_mass_design
+from tests.refusals import refused
 
 TRUTH = {
     "motor_inertia": 2e-5,
@@ -68,14 +69,21 @@ def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
     astray = _identified(25)
     assert astray.passed
     assert astray.fit["stiffness"] == pytest.approx(400.0, rel=0.03)
+    # the twist in contact is b + T/k: an error of k moves b by T/k times it
+    result = _identified(0)
+    share = result.fit.std("stiffness") / result.fit["stiffness"]
+    torque = 0.05 * 10.0 * 0.5  # N m at the coupling: half of the motor's peak, as the inertias are equal
+    assert result.play.half_std_rad > 0.3 * share * torque / 400.0
 
 
-def test_a_motion_on_one_flank_does_not_tell_the_play() -> None:
+def test_where_the_bench_cannot_measure_and_its_record_does_not_tell() -> None:
     design = two_mass_design()
     with pytest.raises(InputError, match="must reverse"):
         identify_frequency(
             _guess(), sweep_record(design, seed=0), play_record=reversal_record(design, seed=0).slice(0, 200)
         )
+    refused(sweep_record, design, TwoMassPlan(moment_Nm=0.05), words="leaves its flank")
+    refused(sweep_record, replace(design, coupling=None), words="current loop and a coupling")
 
 
 def test_a_small_friction_is_not_held_at_zero() -> None:
@@ -89,22 +97,6 @@ def test_a_small_friction_is_not_held_at_zero() -> None:
         found.append((fit["damping"] - 0.02) / fit.std("damping"))
     assert abs(np.mean(found)) < 2.6 / np.sqrt(10.0)
     assert np.std(found) < 1.6
-
-
-def test_the_errors_of_the_stiffness_are_in_that_of_the_play() -> None:
-    """The twist in contact is b + T/k: an error of k moves b by T/k times it."""
-    result = _identified(0)
-    share = result.fit.std("stiffness") / result.fit["stiffness"]
-    torque = 0.05 * 10.0 * 0.5  # N m at the coupling: half of the motor's peak, as the inertias are equal
-    assert result.play.half_std_rad > 0.3 * share * torque / 400.0
-
-
-def test_the_bench_says_where_it_cannot_measure() -> None:
-    design = two_mass_design()
-    with pytest.raises(InputError, match="leaves its flank"):
-        sweep_record(design, TwoMassPlan(moment_Nm=0.05))
-    with pytest.raises(InputError, match="current loop and a coupling"):
-        sweep_record(replace(design, coupling=None))
 
 
 WRONG = ("motor.rotor_inertia=1.1 kg*cm^2", "load.inertia=0.4 kg*m^2", "coupling.stiffness=1.7e4 N*m/rad")

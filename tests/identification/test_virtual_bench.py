@@ -70,16 +70,13 @@ def from_files(design: Design, runs: tuple[TrueRun, ...], tmp_path_factory) -> C
     return identify_campaign(import_campaign(load_campaign(path)), design)
 
 
-def test_the_plan_is_the_paper_s(runs: tuple[TrueRun, ...]) -> None:
+def test_plan_and_surface_are_those_of_the_paper(runs: tuple[TrueRun, ...]) -> None:
     speeds = sorted({run.speed_setting_rad_s for run in runs})
     loads = sorted({run.load_setting_Nm for run in runs})
     assert len(runs) == 54
     assert (round(speeds[0], 1), round(speeds[-1], 1)) == (104.7, 942.5)
     assert (loads[0], loads[1], loads[-1]) == (0.0, 2.0, 8.9)
-
-
-def test_what_happens_on_the_bench_is_the_surface(runs: tuple[TrueRun, ...]) -> None:
-    """In steady motion the simulated current carries exactly C0 + Cv w + CM |M_ext|."""
+    # in steady motion the simulated current carries exactly C0 + Cv w + CM |M_ext|
     part = slice(1200, 1700)
     for run in runs[::5]:
         torque = 5.9e-3 * run.current_A[part].mean()
@@ -95,79 +92,35 @@ def test_the_intervals_cover_the_true_values(design: Design, runs: tuple[TrueRun
     assert np.all((covered >= 90) & (covered <= 99)), covered
 
 
-def test_files_give_the_true_values_and_name_the_broken_run(from_files: CampaignResult) -> None:
+def test_files_give_true_values_clocks_and_law(from_files: CampaignResult, runs: tuple[TrueRun, ...]) -> None:
     assert np.all(np.abs(from_files.fit.values / TABLE_1 - 1.0) < 0.012)
     assert [run.id for run in from_files.set_aside] == ["17"]
     assert 'run17_drive.csv:101: column "Current" = "oops"' in from_files.set_aside[0].reason
     assert len(from_files.fit.points) == 53
     assert from_files.imported.rows_in == from_files.imported.rows_out > 53 * 2000
-
-
-def test_clocks_are_found_from_the_files(from_files: CampaignResult, runs: tuple[TrueRun, ...]) -> None:
     logs, _ = measure_bench(runs, 11, INSTRUMENTS)
     true = {log.id: log.sensor_offset_s for log in logs}
     joined = [run for run in from_files.imported.runs if run.join is not None]
     assert len(joined) == 44
     for run in joined:
         assert run.join.offset_s == pytest.approx(true[run.id], abs=0.012)
-
-
-def test_the_contributions_are_those_of_the_paper(from_files: CampaignResult) -> None:
-    exact = [round(100.0 * term.share, 1) for term in contributions(TABLE_1)]
-    assert exact == [12.6, 27.6, 59.8]
-    result = contributions(from_files.fit.values, from_files.fit.covariance)
-    for term, share in zip(result, exact, strict=True):
-        assert 100.0 * term.share == pytest.approx(share, abs=3.0 * 100.0 * term.share_std + 0.05)
-
-
-def test_no_richer_law_is_warranted_on_a_plain_bench(from_files: CampaignResult) -> None:
     assert from_files.laws.best == "plain"
     impossible = [score.name for score in from_files.laws.scores if not score.possible]
     assert impossible == ["per direction"]
 
 
-def _mirrored(run: TrueRun) -> TrueRun:
-    reverse = {name: -getattr(run, name) for name in ("current_A", "speed_rad_s", "angle_rad")}
-    return replace(run, **reverse) if int(run.id) % 2 else run
-
-
-def test_runs_in_both_directions_share_one_law(design: Design, runs: tuple[TrueRun, ...]) -> None:
-    result = identify_campaign(_imported(tuple(_mirrored(run) for run in runs), 8), design)
-    assert {point.direction for point in result.fit.points} == {-1, 1}
-    assert np.all(np.abs(result.fit.values - TABLE_1) <= result.fit.half_widths)
-    per_direction = next(score for score in result.laws.scores if score.name == "per direction")
-    assert per_direction.possible
-    assert not per_direction.warranted
-
-
-def test_a_richer_law_is_found(design: Design, runs: tuple[TrueRun, ...]) -> None:
-    """3 % more friction in reverse, which the offset of the current measurement (2 mA) cannot explain."""
-    bent = [replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs]
-    more = [replace(r, current_A=r.current_A * (1.03 if int(r.id) % 2 else 1.0)) for r in runs]
-    for law, made, seed in (("quadratic", bent, 3), ("per direction", map(_mirrored, more), 8)):
-        assert identify_campaign(_imported(tuple(made), seed), design).laws.best == law
-
-
-def test_an_outlier_is_named_and_set_aside_on_demand(design: Design, runs: tuple[TrueRun, ...]) -> None:
-    strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
-    imported = _imported(strange, 5)
-    kept = identify_campaign(imported, design, richer=False).fit
-    assert [outlier.run for outlier in kept.outliers] == ["30"]
-    aside = fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside")
-    assert len(aside.points) == 53
-    assert aside.outliers[0].set_aside
-
-
-def test_the_shared_errors_are_in_the_interval(from_files: CampaignResult) -> None:
-    """Without them the intervals would be far too narrow."""
+def test_contributions_are_those_of_the_paper_and_go_into_a_design(from_files, design: Design) -> None:
+    exact = [round(100.0 * term.share, 1) for term in contributions(TABLE_1)]
+    assert exact == [12.6, 27.6, 59.8]
+    result = contributions(from_files.fit.values, from_files.fit.covariance)
+    for term, share in zip(result, exact, strict=True):
+        assert 100.0 * term.share == pytest.approx(share, abs=3.0 * 100.0 * term.share_std + 0.05)
+    # without them the intervals would be far too narrow
     fit = from_files.fit
     random = np.sqrt(np.diag(fit.random_covariance))
     assert np.all(fit.standard_errors > 3.0 * random)
     blind = fit_surface(fit.points, replace(INSTRUMENTS.bounds, current_gain=0.0), 5.9e-3)
     assert np.all(blind.half_widths[1:] < fit.half_widths[1:])
-
-
-def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult, design: Design) -> None:
     identified = design_with_fit(design, from_files.fit.by_key(), "a bench")
     back = read_design_text(write_design(identified))
     for k, path in enumerate(PATHS):
@@ -176,6 +129,32 @@ def test_the_result_becomes_a_design_with_tolerances(from_files: CampaignResult,
         assert back.parameters[path].value == pytest.approx(from_files.fit.values[k], rel=1e-6)
     result = {(c.first, c.second): c.coefficient for c in back.correlations}
     assert result[PATHS[0], PATHS[1]] == pytest.approx(from_files.fit.correlation[0, 1], abs=1e-5)
+
+
+def _mirrored(run: TrueRun) -> TrueRun:
+    reverse = {name: -getattr(run, name) for name in ("current_A", "speed_rad_s", "angle_rad")}
+    return replace(run, **reverse) if int(run.id) % 2 else run
+
+
+def test_a_richer_law_is_found_and_an_outlier_named(design, runs) -> None:
+    """3 % more friction in reverse, which the offset of the current measurement (2 mA) cannot explain."""
+    bent = [replace(r, current_A=r.current_A + 2e-7 * r.speed_rad_s**2) for r in runs]
+    more = [replace(r, current_A=r.current_A * (1.03 if int(r.id) % 2 else 1.0)) for r in runs]
+    for law, made, seed in (("quadratic", bent, 3), ("per direction", map(_mirrored, more), 8)):
+        assert identify_campaign(_imported(tuple(made), seed), design).laws.best == law
+    result = identify_campaign(_imported(tuple(_mirrored(run) for run in runs), 8), design)
+    assert {point.direction for point in result.fit.points} == {-1, 1}
+    assert np.all(np.abs(result.fit.values - TABLE_1) <= result.fit.half_widths)
+    per_direction = next(score for score in result.laws.scores if score.name == "per direction")
+    assert per_direction.possible
+    assert not per_direction.warranted
+    strange = tuple(replace(r, current_A=r.current_A * (1.05 if r.id == "30" else 1.0)) for r in runs)
+    imported = _imported(strange, 5)
+    kept = identify_campaign(imported, design, richer=False).fit
+    assert [outlier.run for outlier in kept.outliers] == ["30"]
+    aside = fit_surface(kept.points, INSTRUMENTS.bounds, 5.9e-3, outliers="set-aside")
+    assert len(aside.points) == 53
+    assert aside.outliers[0].set_aside
 
 
 def test_the_same_seed_writes_the_same_files(runs: tuple[TrueRun, ...], tmp_path) -> None:

@@ -14,9 +14,7 @@ from tests.changed import changed
 GAINS = {"current": 0.01, "velocity": 1.0, "current velocity": 0.05}  # of the stage outside the gap
 
 
-def amber(
-    n_v: int = 1, n_p: int = 1, delay_s: float = 1e-4, feedforward: float = 0.0, **changes: Any
-) -> model.Design:
+def amber(n_v: int = 1, n_p: int = 1, delay_s: float = 0.0001, feedforward: float = 0.0, **changes: Any):
     """The shipped baseline with J = 1.05e-6 kg m2 in all, at its motor, and angles that are not counted."""
     base = load_design("ilr33-amber")
     bare = model.Design(
@@ -43,6 +41,18 @@ def sprung(name: str, slope_Nm_rad: float, **more: Any) -> model.Design:
     return changed(
         load_design(name), load={"path": "back-drivable", "moment_slope_Nm_rad": slope_Nm_rad, **more}
     )
+
+
+def source_drive(J: float, gain_Nm_V: float, period_s: float, voltage_V: float, **parts: Any) -> model.Design:
+    """An inertia on an ideal torque source, without delay or controller; and `parts` of it changed."""
+    bare = model.Design(
+        name="source",
+        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=gain_Nm_V),
+        controller=model.Controller(period_s=period_s, computing_delay_s=0.0),
+        limits=model.Limits(voltage_V=voltage_V),
+        validation=model.Validation(full_deflection_rad=1.0),
+    )
+    return changed(bare, **parts)
 
 
 def faster(design: model.Design, factor: float) -> model.Design:

@@ -9,6 +9,7 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.law import LAW_INPUTS, Law
 from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
+from tests.changed import changed
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
          "output_speed": 1e-3}  # fmt: skip
@@ -32,20 +33,13 @@ def as_law(design: Design, stage: str, **settings: Any) -> Design:
 
 def linear(design: Design) -> Design:
     """Without counts, dry friction, limits and what bends: what the linear loops are of."""
-    return replace(
-        design,
-        encoder=Encoder(speed=design.encoder.speed, bandwidth_rad_s=design.encoder.bandwidth_rad_s),
-        output_encoder=OutputEncoder(),
-        friction=replace(
-            design.friction,
-            dry_torque_Nm=0.0, dry_torque_reverse_Nm=None, load_coefficient=0.0, points=(),
-            offset_torque_Nm=0.0, viscous_reverse_Nms_rad=None, law="coulomb",
-        ),
-        coupling=None if design.coupling is None else replace(design.coupling, play_rad=0.0),
-        load=replace(design.load, gravity=None, friction=None),
-        limits=Limits(voltage_V=1e12),
-        command=Command(), instruments=Instruments(), supply=None,
-    )  # fmt: skip
+    smooth = {"dry_torque_Nm": 0.0, "dry_torque_reverse_Nm": None, "load_coefficient": 0.0, "points": ()}
+    smooth |= {"offset_torque_Nm": 0.0, "viscous_reverse_Nms_rad": None, "law": "coulomb"}
+    encoder = Encoder(speed=design.encoder.speed, bandwidth_rad_s=design.encoder.bandwidth_rad_s)
+    parts = {"encoder": encoder, "output_encoder": OutputEncoder(), "friction": smooth, "supply": None}
+    parts |= {"load": {"gravity": None, "friction": None}, "limits": Limits(voltage_V=1e12)}
+    parts |= {"coupling": design.coupling and {"play_rad": 0.0}}
+    return changed(design, command=Command(), instruments=Instruments(), **parts)
 
 
 def radius(design: Design) -> float:

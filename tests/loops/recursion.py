@@ -60,15 +60,7 @@ class Unlimited(Controller):
         return value + self.inject[point][k] if point in self.inject else value
 
 
-def run(
-    design: Design,
-    command: np.ndarray,
-    torque_Nm: float = 0.0,
-    moment_Nm: float = 0.0,
-    contact: float = 1.0,
-    initial: tuple[float, float, float] = (0.0, 0.0, 0.0),
-    inject: dict[str, np.ndarray] | None = None,
-) -> dict[str, np.ndarray]:
+def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0, 0.0, 0.0), inject=None):
     """Run the drive while it slips forward, the command at the motor where the outermost stage is the speed.
 
     Signals i, w, th, phi at every tick; w_ref, i_ref and u, before what is injected, at each of their

@@ -64,9 +64,7 @@ def in_one_loop(parts: list[Rational], delays: np.ndarray) -> DelaySystem:
     return loop
 
 
-def truth(
-    parts: list[Rational], delays: np.ndarray, times: np.ndarray, u: np.ndarray, patch: pytest.MonkeyPatch
-) -> np.ndarray:
+def truth(parts, delays, times, u, patch) -> np.ndarray:
     """Response of 1/(1 + L) to an input that jumps to its first value and is straight between its bends."""
     fastest, end = max(np.abs(np.roots(den)).max() for _, den in parts), times.max()
     patch.setattr(flint.ctx, "cap", int(4.0 * fastest * end) + 80)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, emps, without
+from loop_designs import amber, controlled, emps, source_drive, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
@@ -19,16 +19,10 @@ from nonlinear import commands, simulate
 @pytest.mark.parametrize(("load", "starts"), [(-20.0, True), (-29.0, True), (-31.0, False)])
 def test_j10_the_breakaway_ratio_acts_on_the_dry_part_only(load: float, starts: bool) -> None:
     """An ideal source of 40 N m on 2 kg m2 against 2 x 5 + load: starts up to 30 N m, held by 5 + load."""
-    loop = model.PositionLoop(gain=1e6)
-    design = model.Design(
-        name="source",
-        motor=model.Motor(rotor_inertia_kgm2=2.0, source_gain_Nm_V=4.0),
-        controller=model.Controller(period_s=1e-4, computing_delay_s=0.0, position=loop),
-        limits=model.Limits(voltage_V=10.0),
-        validation=model.Validation(full_deflection_rad=1.0),
-        load=model.Load(path="back-drivable", moment_max_Nm=30.0),
-        friction=model.Friction(dry_torque_Nm=5.0, breakaway_ratio=2.0),
-    )
+    parts = {"load": {"path": "back-drivable", "moment_max_Nm": 30.0}}
+    parts |= {"friction": model.Friction(dry_torque_Nm=5.0, breakaway_ratio=2.0)}
+    stages = {"position": model.PositionLoop(gain=1e6)}
+    design = source_drive(2.0, 4.0, 1e-4, 10.0, controller=stages, **parts)
     expected = (40.0 - 5.0 - abs(load)) / 2.0 if starts else 0.0
     assert drive_figures(design, load).acceleration_rad_s2 == pytest.approx(expected)
     run = simulate(design, commands.step(1.0), duration_s=0.02, load_Nm=load)

@@ -132,8 +132,8 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
         design = base.with_law(stage, system, inputs, L=L, gain=0.7)
         control_, drive = design.controller, Drive(design)
         law, N = PlainLaw(getattr(control_, stage).law), design.total_ratio
-        n_v, n_p = control_.velocity.every, control_.position.every
-        line, w_ref, i_ref, speed, limited = [0.0, 0.0], 0.0, 0.0, 0.0, 0
+        n_v, every = control_.velocity.every, getattr(getattr(control_, stage), "every", 1)
+        line, last, speed, limited = [0.0, 0.0], 0.0, 0.0, 0
         for k in range(300):
             i, w, th, W = (float(value) for value in rng.standard_normal(4) * (1.0, 5.0, 0.5, 0.1))
             y, command = th / N + 1e-3 * float(rng.standard_normal()), 0.3 * float(np.sin(0.05 * k))
@@ -142,31 +142,21 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
             counted, out = floor(th * q) / q, floor(y * qo) / qo
             if k % n_v == 0:
                 speed, line = (counted - line[0]) / (2 * n_v * 1e-4), [line[1], counted]
+            if k % every:
+                continue
+            place = counted if control_.position.sensor == "motor" else N * out
+            amperes = drive.value("current_reference")
+            reference, own, top, step, ours = {
+                "position": (N * command, place, 30.0, 4e4 * T, drive.value("speed_command")),
+                "velocity": (drive.value("speed_reference"), speed, 2.0, 4e3 * T, amperes),
+                "current": (amperes, i, 24.0, inf, u),
+            }[stage]
             seen = {"speed": speed, "angle": counted, "current": i, "output_angle": out, "output_speed": W}
-            if stage == "position" and k % n_p == 0:
-                own = counted if control_.position.sensor == "motor" else N * out
-                v = law.output(seen | {"command": N * command, "error": N * command - own})
-                clamped, step = min(max(v, -30.0), 30.0), 4e4 * T
-                new = w_ref + min(max(clamped - w_ref, -step), step)
-                limited += new != v
-                w_ref = new
-                law.step(w_ref)
-                assert drive.value("speed_command") == pytest.approx(w_ref, rel=1e-12, abs=1e-12)
-            if stage == "velocity" and k % n_v == 0:
-                reference = drive.value("speed_reference")
-                v = law.output(seen | {"command": reference, "error": reference - speed})
-                clamped, step = min(max(v, -2.0), 2.0), 4e3 * T
-                new = i_ref + min(max(clamped - i_ref, -step), step)
-                limited += new != v
-                i_ref = new
-                law.step(i_ref)
-                assert drive.value("current_reference") == pytest.approx(i_ref, rel=1e-12, abs=1e-12)
-            if stage == "current":
-                reference = drive.value("current_reference")
-                v = law.output(seen | {"command": reference, "error": reference - i})
-                limited += abs(v) > 24.0
-                law.step(min(max(v, -24.0), 24.0))
-                assert u == pytest.approx(min(max(v, -24.0), 24.0), rel=1e-12, abs=1e-12)
+            v = law.output(seen | {"command": reference, "error": reference - own})
+            last = float(np.clip(np.clip(v, -top, top), last - step, last + step))
+            limited += last != v
+            law.step(last)
+            assert ours == pytest.approx(last, rel=1e-12, abs=1e-12)
         assert 5 < limited < 290, (stage, limited)
 
 

@@ -57,9 +57,7 @@ def test_lqg_velocity_controller() -> None:
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
 
 
-def bilinear(
-    A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0
-) -> tuple[np.ndarray, ...]:
+def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0):
     """s = (z - 1)/(z + 1): sampled to continuous, or back with ``way`` -1; the unit circle is the axis."""
     one = np.eye(len(A))
     inverse = np.linalg.inv(one + way * A)

@@ -56,6 +56,8 @@ ESTIMATES = (
     model.Encoder(speed="difference", difference_samples=3),
     model.Encoder(speed="difference", difference_samples=2, filter_time_s=8e-4),
 )
+LATE = [{"delay_s": delay * TICK} for delay in DELAYS]
+ESTIMATED = [{"delay_s": 1.5e-4, "feedforward": 0.8, "encoder": encoder} for encoder in ESTIMATES]
 
 
 @pytest.mark.parametrize("name", KINDS)
@@ -64,13 +66,7 @@ def test_every_kind_of_drive(name: str) -> None:
 
 
 @pytest.mark.parametrize("rates", RATES)
-@pytest.mark.parametrize(
-    "changes",
-    [
-        *({"delay_s": delay * TICK} for delay in DELAYS),
-        *({"delay_s": 1.5e-4, "feedforward": 0.8, "encoder": encoder} for encoder in ESTIMATES),
-    ],
-)
+@pytest.mark.parametrize("changes", [*LATE, *ESTIMATED])
 def test_delays_rates_and_speed_estimates(changes: dict[str, Any], rates: tuple[int, int]) -> None:
     ticks = 20_000 if changes == {"delay_s": 1.5 * TICK} else 4000
     agree(amber(*rates, **changes), ticks, 1e-10, torque=-2.25e-3, start=START)

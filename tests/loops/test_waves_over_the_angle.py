@@ -5,7 +5,7 @@ from math import acos, asin, cos, exp, pi, sin, sqrt
 
 import numpy as np
 import pytest
-from loop_designs import controlled
+from loop_designs import controlled, source_drive
 
 from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
@@ -39,33 +39,20 @@ class Case:
         return (pi - PHASE) / self.order
 
     def put(self, design: model.Design) -> model.Design:
-        if self.name == "cogging":
-            motor = replace(design.motor, cogging_Nm=A, cogging_periods=self.order, cogging_phase_rad=PHASE)
-            return replace(design, motor=motor)
-        load = replace(
-            design.load, gear_error_Nm=A * N, gear_error_periods=self.order * N, gear_error_phase_rad=PHASE
-        )
-        return replace(design, load=load)
+        part, key, N_ = ("motor", "cogging", 1.0) if self.name == "cogging" else ("load", "gear_error", N)
+        waves = {f"{key}_Nm": A * N_, f"{key}_periods": self.order * N_, f"{key}_phase_rad": PHASE}
+        return changed(design, **{part: waves})
 
 
 CASES = [Case("gear error", 24.0 / N), Case("cogging", 12.0)]
 each = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
 
-def rotor(
-    viscous: float = 0.0, load_coefficient: float = 0.0, path: str = "back-drivable", damping: float = 0.0
-) -> model.Design:
+def rotor(viscous=0.0, load_coefficient=0.0, path="back-drivable", damping=0.0) -> model.Design:
     """A torque source without a controller, so that the rotor coasts."""
-    return model.Design(
-        name="rotor",
-        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=1.0),
-        gears=(model.Gear(name="one", ratio=N),),
-        controller=model.Controller(period_s=Ts, computing_delay_s=0.0),
-        limits=model.Limits(voltage_V=10.0),
-        validation=model.Validation(full_deflection_rad=1.0),
-        load=model.Load(path=path, moment_damping_Nms_rad=damping),
-        friction=model.Friction(viscous_Nms_rad=viscous, load_coefficient=load_coefficient),
-    )
+    load, gears = {"path": path, "moment_damping_Nms_rad": damping}, (model.Gear(name="one", ratio=N),)
+    friction = {"viscous_Nms_rad": viscous, "load_coefficient": load_coefficient}
+    return source_drive(J, 1.0, Ts, 10.0, gears=gears, load=load, friction=friction)
 
 
 @each

@@ -10,7 +10,7 @@ from test_stacked import FILTERS, everything
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, delay_budget
-from actuator_lti.design.model import Encoder, Filter, Limits, PositionLoop
+from actuator_lti.design.model import Filter, Limits, PositionLoop
 from actuator_lti.drive.blocks import biquad, lag, tracking
 from actuator_lti.drive.signals import LIMITERS
 from analyses import survey_loops
@@ -161,11 +161,6 @@ def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() ->
     loop = assemble_loops(controlled(base, position=bare), "ideal").position
     plain, s = assemble_loops(base, "ideal").position, 1j * np.geomspace(1, 1000, 10)
     np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
-
-
-def test_encoder_tracking_needs_its_bandwidth() -> None:
-    with pytest.raises(InputError, match="bandwidth"):
-        assemble_loops(replace(drive_d(), encoder=Encoder(speed="tracking")))
 
 
 def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:

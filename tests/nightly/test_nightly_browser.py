@@ -159,30 +159,22 @@ CONTRAST = """() => {
 }"""
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_contrast_is_sufficient_in_light_and_dark(page, scheme: str) -> None:
-    page.emulate_media(color_scheme=scheme)
-    ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert (sum(int(v) for v in ground[4:-1].split(",")) < 200) == (scheme == "dark")
-    assert page.evaluate(CONTRAST) == []
-    open_design(page)
-    assert page.evaluate(CONTRAST) == []
-
-
-@pytest.mark.parametrize("which", ["index", "design"])
-def test_nothing_is_wider_than_a_phone_and_tables_have_captions_and_scopes(page, which: str) -> None:
-    if which == "design":
-        open_design(page)
-    for table in page.locator("table").all():
-        assert table.locator("caption").count() == 1
-        assert table.locator("th:not([scope])").count() == 0
-    page.set_viewport_size({"width": 360, "height": 740})
-    assert page.evaluate("document.documentElement.scrollWidth") <= 360
-
-
-def test_colour_is_never_alone(page) -> None:
+def test_every_page_has_contrast_captions_and_words_beside_colours_and_fits_a_phone(page) -> None:
     for mark in page.locator(".mark").all():
         assert len(mark.inner_text().split()) >= 2, mark.inner_text()
+    for opened in (lambda: None, lambda: open_design(page)):
+        opened()
+        for scheme in ("light", "dark"):
+            page.emulate_media(color_scheme=scheme)
+            ground = page.evaluate("getComputedStyle(document.body).backgroundColor")
+            assert (sum(int(v) for v in ground[4:-1].split(",")) < 200) == (scheme == "dark")
+            assert page.evaluate(CONTRAST) == []
+        for table in page.locator("table").all():
+            assert table.locator("caption").count() == 1
+            assert table.locator("th:not([scope])").count() == 0
+        page.set_viewport_size({"width": 360, "height": 740})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        page.set_viewport_size({"width": 1280, "height": 900})
 
 
 def test_it_prints_black_on_white_without_the_controls(page, tmp_path) -> None:

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 from site_checks import check_whole
 
-from reports.cli.main import main
 from reports.nightly.source import read_study
 from tests.refusals import refused
 
@@ -31,40 +30,31 @@ tolerance = { "*phase margin*" = "0.5 deg" }
 """
 
 
-@pytest.fixture(scope="module")
-def built(tmp_path_factory):
-    """A first night of a small study, on real worker processes."""
-    folder = tmp_path_factory.mktemp("cli")
-    (folder / "study.toml").write_text(STUDY)
-    command = [str(Path(sys.executable).with_name("actuator-lti")), "nightly", str(folder / "study.toml")]
-    command += ["--site", str(folder / "site"), "--no-validation"]
-    return folder, subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
-
-
-def test_the_first_night_names_the_broken_variant_and_builds_the_others(built) -> None:
-    folder, done = built
+def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli) -> None:
+    """The first one on worker processes; it names the broken variant and builds the others."""
+    (tmp_path / "study.toml").write_text(STUDY)
+    words = [tmp_path / "study.toml", "--site", tmp_path / "site", "--no-validation"]
+    command = [Path(sys.executable).with_name("actuator-lti"), "nightly", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     assert done.returncode == 1, done.stderr
     assert done.stdout.startswith("FAIL  night 1: 1 no result")
     said = " ".join(done.stdout.split())  # where a cell is wrapped depends on the length of the folder's name
     assert all(words in said for words in ("no <b>motor</b>", "motor.resistance = ", "allowed: above 0"))
-    summary = json.loads((folder / "site" / "summary.json").read_text())
+    summary = json.loads((tmp_path / "site" / "summary.json").read_text())
     names = {"ctms-motor-position", "slower", "no <b>motor</b>", "Comparison of all variants"}
     assert {d["name"] for d in summary["designs"]} == names
     assert summary["counts"]["broken"] == 1
-    check_whole(folder / "site")
-
-
-def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) -> None:
-    folder, _ = built
-    words = ["nightly", str(folder / "study.toml"), "--site", str(folder / "site"), "--no-validation"]
-    assert main([*words, "--workers", "1"]) == 1
-    assert "(3 unchanged)" in capsys.readouterr().out
-    main(["nightly", "approve", *words[1:], "--by", "A. Engineer", "--reason", "review 3"])
-    capsys.readouterr()
-    main([*words, "--json"])
-    summary = json.loads(capsys.readouterr().out)
-    good = [d for d in summary["designs"] if d["state"] != "broken"]
+    check_whole(tmp_path / "site")
+    assert "(3 unchanged)" in cli.text("nightly", *words, "--workers", 1, status=1)
+    cli("nightly", "approve", *words, "--by", "A. Engineer", "--reason", "review 3")
+    good = [d for d in cli("nightly", *words, "--json").data["designs"] if d["state"] != "broken"]
     assert {d["approved_by"] for d in good} == {"A. Engineer"}
+    # any report becomes a PDF
+    report = next((tmp_path / "site" / "reports").glob("slower-*/*/report.json"))
+    cli.text("pdf", report, "--out", tmp_path / "r.pdf")
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF")
+    (tmp_path / "no.json").write_text("{}")
+    cli.refused("pdf", tmp_path / "no.json")
 
 
 @pytest.mark.parametrize(
@@ -78,12 +68,9 @@ def test_the_second_night_is_unchanged_and_an_approval_is_kept(built, capsys) ->
         (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "inf"], "--time-limit"),
     ],
 )
-def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, words, expected) -> None:
+def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, cli, words, expected) -> None:
     monkeypatch.chdir(tmp_path)
-    assert main(words) == 2
-    line = capsys.readouterr().err
-    assert expected in line
-    assert line.count("\n") == 1
+    assert expected in cli.refused(*words)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -101,13 +88,3 @@ def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expecte
     path = tmp_path / "s.toml"
     path.write_text(f'{table}\n[study]\nbase = "emps"\n')
     refused(read_study, str(path), words=("s.toml", expected))
-
-
-def test_any_report_becomes_a_pdf(built, capsys) -> None:
-    folder, _ = built
-    report = next((folder / "site" / "reports").glob("slower-*/*/report.json"))
-    assert main(["pdf", str(report), "--out", str(folder / "r.pdf")]) == 0
-    assert (folder / "r.pdf").read_bytes().startswith(b"%PDF")
-    (folder / "no.json").write_text("{}")
-    assert main(["pdf", str(folder / "no.json")]) == 2
-    capsys.readouterr()

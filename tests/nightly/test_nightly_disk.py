@@ -34,13 +34,6 @@ def mount(*words: str) -> None:
         pytest.skip(f"no mount here: {error}")
 
 
-def fill(folder: Path, leave: int) -> Path:
-    """Fill a file system but for so many bytes."""
-    ballast, free = folder / "ballast", os.statvfs(folder)
-    ballast.write_bytes(b"\0" * max(0, free.f_bavail * free.f_frsize - leave))
-    return ballast
-
-
 def nightly(site: Path, margin: float, **more):
     return run_night(study(*(job(f"d{k}", margin) for k in range(5))), site, INLINE, code=CODE, **more)
 
@@ -50,7 +43,8 @@ def test_a_disk_that_fills_up_at_any_point_leaves_the_last_night(small_disk: Pat
     nightly(site, 10.0)
     refused = 0
     for step, leave in enumerate(range(0, 690_000, 23_000)):
-        ballast = fill(small_disk, leave)
+        ballast, free = small_disk / "ballast", os.statvfs(small_disk)
+        ballast.write_bytes(b"\0" * max(0, free.f_bavail * free.f_frsize - leave))
         before, words = (site / "index.html").read_bytes(), ""
         try:
             nightly(site, 11.0 + step)

@@ -3,7 +3,6 @@
 import re
 from pathlib import Path
 
-import pytest
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 
 from reports.nightly import changes
@@ -27,66 +26,46 @@ COMPARISON = Comparison(
 )
 
 
-def test_the_cause_comes_first_then_the_required_figure_in_words() -> None:
+PHRASES = (
+    (Cause(parameters=(("a", "1 V", "2 mV"),)), "a 1 V → 2 mV"),
+    (Cause(parameters=tuple((f"k{n}", "1", "2") for n in range(4))), "k0 1 → 2; k1 1 → 2; 2 more values"),
+    (Cause(commits=(("code", "abc fix"), ("code", "def more"))), "commit abc fix and 1 more"),
+    (Cause(libraries=(("numpy", "1", "2"),)), "numpy 1 → 2"),
+    (Cause(code=True), "sources of actuator-lti changed without a commit"),
+    (Cause(), "no input differs"),
+)
+
+
+def test_the_cause_comes_first_then_the_required_figure_in_words_and_distances_before_others() -> None:
     first = changes.main_changes(COMPARISON)[0]
     assert changes.cause_words(COMPARISON.cause) == "control.position.gain 90 → 120 1/s"
+    for cause, said in PHRASES:
+        assert changes.cause_words(cause) == said
     words = changes.change_words(first, COMPARISON, [PHASE])
     assert words == "phase margin of the position loop 62.10 → 55.30 deg"
     of_a_table = changes.change_words(COMPARISON.changes[0], COMPARISON, [])  # named by column and row
     assert of_a_table == "gain margin of Position loop 20.00 → 5.000 dB"
-
-
-def test_the_figures_to_read_first_are_distances_and_never_more_than_five() -> None:
     many = Comparison(changes=(*COMPARISON.changes, *(change(f"x{k}", 2.0, 1.0) for k in range(49))))
     assert [c.kind for c in changes.main_changes(many)] == ["distance", *["figure"] * 4]
 
 
-@pytest.mark.parametrize(
-    ("cause", "words"),
-    [
-        (Cause(parameters=(("a", "1 V", "2 mV"),)), "a 1 V → 2 mV"),
-        (Cause(parameters=tuple((f"k{n}", "1", "2") for n in range(4))), "k0 1 → 2; k1 1 → 2; 2 more values"),
-        (Cause(commits=(("code", "abc fix"), ("code", "def more"))), "commit abc fix and 1 more"),
-        (Cause(libraries=(("numpy", "1", "2"),)), "numpy 1 → 2"),
-        (Cause(code=True), "sources of actuator-lti changed without a commit"),
-        (Cause(), "no input differs"),
-    ],
-)
-def test_a_cause_in_one_phrase(cause: Cause, words: str) -> None:
-    assert changes.cause_words(cause) == words
-
-
-@pytest.fixture(scope="module")
-def nights(tmp_path_factory):
+def test_designs_with_the_same_cause_are_one_line_with_which_index_and_page_open(tmp_path) -> None:
     """Two nights: one gain falls in two designs alike, one rises, one stays."""
-    site, clock = tmp_path_factory.mktemp("headline") / "site", Calendar()
+    site, clock = tmp_path / "site", Calendar()
     for k in range(2):
         jobs = [job("one", 12.0 - 2 * k), job("two", 12.0 - 2 * k), job("better", 9.0 + k), job("same", 20.0)]
         night = run_night(study(*jobs), site, INLINE, code=CODE, clock=clock.next())
-    return night, site
-
-
-def test_designs_with_the_same_cause_are_one_line_and_the_worse_comes_first(nights) -> None:
-    night, _ = nights
     first, second = changes.headlines(night.designs)
     assert (len(first.designs), first.worse, len(second.designs), second.worse) == (2, True, 1, False)
     assert first.cause == "control.position.gain 12 → 10 1/s"
     assert first.effect == "gain margin 12.00 → 10.00 dB"
-
-
-def test_the_index_and_the_design_page_open_with_the_cause(nights) -> None:
-    _, site = nights
+    strips = {d.name: [state for _, state in d.strip] for d in night.designs}
+    closer, steady = ["pass", "regressed"], ["pass", "pass"]
+    assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
+    assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4
     index = (site / "index.html").read_text(encoding="utf-8")
     assert "control.position.gain 12 → 10 1/s" in index
     assert index.index("What changed since last night") < index.index('id="designs"')
     page = sorted(Path(site).glob("nights/*/one-*.html"))[-1]
     text = re.sub(r"<[^>]+>", "", page.read_text(encoding="utf-8"))
     assert "control.position.gain 12 → 10 1/s: gain margin 12.00 → 10.00 dB" in " ".join(text.split())
-
-
-def test_a_night_that_came_closer_to_a_limit_is_marked_and_counted(nights) -> None:
-    night, _ = nights
-    strips = {d.name: [state for _, state in d.strip] for d in night.designs}
-    closer, steady = ["pass", "regressed"], ["pass", "pass"]
-    assert strips == {"one": closer, "two": closer, "better": steady, "same": steady}
-    assert len(night.alone) == sum(night.count(s) for s in ("pass", "fail", "regression", "broken")) == 4

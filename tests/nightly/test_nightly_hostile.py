@@ -16,10 +16,8 @@ from site_checks import Page, check_whole
 
 from reports.nightly.night import approve, run_night
 from reports.nightly.pages import line_chart
-from reports.nightly.source import read_study
 from reports.nightly.text import one_line
 from reports.visible import visible
-from tests.refusals import refused
 
 HOSTILE = (
     "<script>window.hacked=1</script>",
@@ -63,7 +61,7 @@ def pages(site: Path) -> list[Path]:
     return [site / "index.html", *site.glob("nights/*/*.html")]
 
 
-def test_no_markup_of_a_name_becomes_markup_and_no_template_of_it_is_run(hostile_site) -> None:
+def test_no_name_becomes_markup_a_path_a_template_or_a_mark_of_direction(hostile_site) -> None:
     """Every page is whole and asks nobody."""
     assert "<script>window.hacked=1</script>" in check_whole(hostile_site).text
     texts = {path: path.read_text(encoding="utf-8") for path in pages(hostile_site)}
@@ -74,39 +72,27 @@ def test_no_markup_of_a_name_becomes_markup_and_no_template_of_it_is_run(hostile
         assert not {"img", "b", "iframe", "object", "embed"} & set(page.names), path
         assert "default-src 'none'" in unescape(text)
     assert "{{ 7*7 }}" in "".join(texts.values())
-
-
-def test_nothing_is_written_outside_of_the_site(hostile_site) -> None:
     assert sorted(p.name for p in hostile_site.parent.iterdir()) == ["site", "site.state"]
     assert all(path.name.isascii() and len(path.name) < 100 for path in hostile_site.rglob("*"))
+    for path in [*pages(hostile_site), hostile_site / "junit.xml", hostile_site / "summary.md"]:
+        assert not set(path.read_text(encoding="utf-8")) & set(OBEYED)
 
 
 OBEYED = "\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069\u200e\u200f\x00\x07\x1b"
 
 
-def test_direction_marks_and_control_signs_are_shown_not_obeyed(hostile_site) -> None:
-    for path in [*pages(hostile_site), hostile_site / "junit.xml", hostile_site / "summary.md"]:
-        assert not set(path.read_text(encoding="utf-8")) & set(OBEYED)
-
-
-def test_junit_and_summary_name_every_design(hostile_site) -> None:
+def test_junit_and_summary_name_every_design_no_cell_is_a_formula_and_no_line_a_link(hostile_site) -> None:
     suites = [s.get("name") for s in ElementTree.parse(hostile_site / "junit.xml").getroot()]
     assert len(suites) == len(HOSTILE) + 2
     assert {HOSTILE[0], "x" * 10_000} <= set(suites)
     names = {d["name"] for d in json.loads((hostile_site / "summary.json").read_text())["designs"]}
     assert set(HOSTILE) <= names
-
-
-def test_no_cell_of_a_table_for_spreadsheets_is_a_formula(hostile_site) -> None:
     tables = list(hostile_site.glob("nights/*/*.csv"))
     assert tables
     for path in tables:
         for row in csv.reader(io.StringIO(path.read_text(encoding="utf-8"), newline="")):
             assert len(row) == 4
             assert not row[0].lstrip().startswith(("=", "+", "-", "@", "|")), row[0][:60]
-
-
-def test_markdown_has_no_links_and_no_html_of_a_name(hostile_site) -> None:
     text = (hostile_site / "summary.md").read_text(encoding="utf-8")
     assert not [words for words in ("<script", "<img", "](http") if words in text]
     assert all(line.count("|") in (0, 6) or "\\|" in line for line in text.splitlines())
@@ -132,12 +118,3 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     root = ElementTree.fromstring(line_chart(visible(title), visible(title), nights, values, (), 1.5))
     drawn = {"svg", "path", "text", "tspan", "g", "rect", "clipPath", "use", "defs"}
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
-
-
-@pytest.mark.parametrize(
-    "data", [b"", b"\xff\xfe", b"[study", b"\x00" * 100, b"[study]\nbase='x'\n" * 2, b"#" * 2_000_000]
-)
-def test_what_is_no_study_is_refused_in_one_line(tmp_path, data: bytes) -> None:
-    path = tmp_path / "study.toml"
-    path.write_bytes(data)
-    refused(read_study, str(path))

@@ -16,6 +16,7 @@ from reports.nightly.figures import Figure
 from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
 from reports.nightly.night import approve, run_night
 from reports.nightly.source import Job
+from tests.refusals import refused
 
 
 class Nights:
@@ -63,9 +64,12 @@ def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) 
     assert [d.state for d in night.designs] == ["broken", "fail", "fail", "pass", "pass"]
     assert not night.passed
     assert nights(job("good", 12.0)).passed
+    nights(job("a", 7.0))
+    first = nights(job("a", 5.0)).designs[0].last_night.changes[0]
+    assert (first.kind, first.worse) == ("verdict", True)
 
 
-def test_a_change_is_told_with_the_parameter_behind_it(nights) -> None:
+def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -> None:
     nights(job("a", 10.0))
     (design,) = nights(job("a", 9.0)).designs
     first, cause = design.last_night.changes[0], design.last_night.cause
@@ -73,9 +77,6 @@ def test_a_change_is_told_with_the_parameter_behind_it(nights) -> None:
     assert cause.parameters == (("control.position.gain", "10 1/s", "9 1/s"),)
     assert not cause.code
     assert "parameter control.position.gain: 10 1/s → 9 1/s" in (nights.site / "summary.md").read_text()
-
-
-def test_libraries_and_code_behind_a_change_are_told(nights) -> None:
     nights(job("a", 10.0, limit=6.0))
     newer = replace(CODE, sources="t", libraries={"numpy": "3"})
     changed = replace(job("a", 10.0), payload={"name": "a", "margin": 9.0})
@@ -84,15 +85,20 @@ def test_libraries_and_code_behind_a_change_are_told(nights) -> None:
     assert design.last_night.cause.code
 
 
-def test_moves_within_the_tolerance_are_none(nights) -> None:
+def test_moves_within_the_tolerance_are_none_and_flapping_is_told_apart(nights) -> None:
     nights(job("a", 10.0))
     assert not nights(job("a", 10.005)).designs[0].last_night.changes
     wide = read_tolerances({"*": "5 dB"}, "t")
     assert not nights(job("a", 12.0), tolerances=wide).designs[0].last_night.changes
     assert nights(job("a", 14.0), tolerances=read_tolerances({"*": 1.0}, "t")).designs[0].last_night.changes
+    for k in range(6):
+        night = nights(job("flaps", 10.0 + k % 2), job("moves", 10.0 if k < 5 else 12.0))
+    result = {d.name: d.last_night.changes for d in night.designs}
+    assert {c.flapping for c in result["flaps"]} == {True}
+    assert {c.flapping for c in result["moves"]} == {False}
 
 
-def test_a_regression_counts_until_it_is_approved(nights) -> None:
+def test_a_regression_counts_until_it_is_approved_by_itself_however_slow_the_drift(nights) -> None:
     nights(job("a", 10.0))
     night = nights(job("a", 9.0))
     assert (night.designs[0].state, night.passed) == ("regression", False)
@@ -105,36 +111,26 @@ def test_a_regression_counts_until_it_is_approved(nights) -> None:
     assert (night.passed, night.designs[0].approval.by) == (True, "A. Engineer")
     assert not nights(job("a", 8.0)).passed
     assert nights(job("a", 9.5)).passed
-
-
-def test_a_slow_drift_within_each_night_is_still_a_regression(nights) -> None:
     for step in range(12):
-        night = nights(job("a", 10.0 - 0.008 * step))
+        night = nights(job("drifts", 10.0 - 0.008 * step))
         assert not night.designs[0].last_night.changes
     assert not night.passed
+    nights(job("one", 10.0), job("two", 10.0))
+    nights(job("one", 9.0), job("two", 9.0))
+    night = nights.approve(job("one", 9.0), job("two", 9.0), names=["one"])
+    assert {d.name: d.state for d in night.designs} == {"one": "pass", "two": "regression"}
 
 
-def test_one_design_can_be_approved_alone(nights) -> None:
-    nights(job("a", 10.0), job("b", 10.0))
-    nights(job("a", 9.0), job("b", 9.0))
-    night = nights.approve(job("a", 9.0), job("b", 9.0), names=["a"])
-    assert {d.name: d.state for d in night.designs} == {"a": "pass", "b": "regression"}
-
-
-def test_an_approval_needs_a_name_a_reason_and_a_result(nights) -> None:
-    with pytest.raises(InputError, match="no night has been built"):
-        nights.approve(job("a"))
+def test_an_approval_needs_a_name_a_reason_and_a_result_and_a_site_its_own_folder(nights, tmp_path) -> None:
+    refused(nights.approve, job("a"), words="no night has been built")
     nights(job("a"), job("b", mode="raise"))
-    with pytest.raises(InputError, match="needs a name and a reason"):
-        nights.approve(job("a"), reason=" ")
-    with pytest.raises(InputError, match="'b' has no result"):
-        nights.approve(job("a"), names=["b"])
-
-
-def test_a_requirement_that_fails_now_is_the_first_change(nights) -> None:
-    nights(job("a", 7.0))
-    first = nights(job("a", 5.0)).designs[0].last_night.changes[0]
-    assert (first.kind, first.worse) == ("verdict", True)
+    refused(nights.approve, job("a"), reason=" ", words="needs a name and a reason")
+    refused(nights.approve, job("a"), names=["b"], words="'b' has no result")
+    other = tmp_path / "other"
+    other.mkdir()
+    (other / "thesis.tex").write_text("x")
+    refused(run_night, study(job("a")), other, INLINE, code=CODE, words="not empty and no site")
+    assert sorted(p.name for p in other.iterdir()) == ["thesis.tex"]
 
 
 def test_missing_results_are_no_changes(nights) -> None:
@@ -149,14 +145,6 @@ def test_missing_results_are_no_changes(nights) -> None:
     assert nights(job("a", 10.0)).gone == ("b",)
 
 
-def test_flapping_is_told_apart_from_a_change(nights) -> None:
-    for k in range(6):
-        night = nights(job("flaps", 10.0 + k % 2), job("moves", 10.0 if k < 5 else 12.0))
-    result = {d.name: d.last_night.changes for d in night.designs}
-    assert {c.flapping for c in result["flaps"]} == {True}
-    assert {c.flapping for c in result["moves"]} == {False}
-
-
 def test_nights_without_a_run_are_shown_as_such(nights) -> None:
     for days in (1, 1, 1, 1, 4, 1):
         night = nights(job("a"), days=days)
@@ -165,19 +153,7 @@ def test_nights_without_a_run_are_shown_as_such(nights) -> None:
     assert not night.designs[0].last_night.changes
 
 
-def test_machine_files_say_what_the_page_says(nights) -> None:
-    nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"))
-    summary = json.loads((nights.site / "summary.json").read_text())
-    assert (summary["schema"], summary["exit_status"]) == ("actuator-lti/nightly", 1)
-    assert summary["counts"] == {"broken": 1, "fail": 1, "unproven": 0, "regression": 0, "pass": 1}
-    root = ElementTree.parse(nights.site / "junit.xml").getroot()
-    assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
-    failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
-    assert failed == ["GM gain margin"]
-    assert "✗ failing" in (nights.site / "summary.md").read_text()
-
-
-def test_what_is_not_proven_fails_the_night_unless_it_is_waived(nights) -> None:
+def test_machine_files_say_what_the_page_says_also_of_what_is_not_proven_or_waived(nights) -> None:
     waiver = {"unknown": True, "waiver": "waived 2026-11-22: bench"}
     night = nights(job("doubt", unknown=True), job("waived", **waiver))
     assert (night.passed, [d.state for d in night.designs]) == (False, ["unproven", "pass"])
@@ -191,6 +167,15 @@ def test_what_is_not_proven_fails_the_night_unless_it_is_waived(nights) -> None:
     assert cases["waived"].find("skipped").get("message") == f"not determined; {waiver['waiver']}"
     assert "not proven" in (nights.site / "index.html").read_text()
     assert nights(job("waived", **waiver)).passed
+    nights(job("good", 12.0), job("bad", 5.0), job("broken", mode="raise"))
+    summary = json.loads((nights.site / "summary.json").read_text())
+    assert (summary["schema"], summary["exit_status"]) == ("actuator-lti/nightly", 1)
+    assert summary["counts"] == {"broken": 1, "fail": 1, "unproven": 0, "regression": 0, "pass": 1}
+    root = ElementTree.parse(nights.site / "junit.xml").getroot()
+    assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
+    failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
+    assert failed == ["GM gain margin"]
+    assert "✗ failing" in (nights.site / "summary.md").read_text()
 
 
 def test_old_reports_go_and_old_figures_stay(nights) -> None:
@@ -203,13 +188,6 @@ def test_old_reports_go_and_old_figures_stay(nights) -> None:
     page = next((nights.site / "nights").glob("000008-*/a-*.html")).read_text()
     assert page.count('aria-label="Report of') == 3
     assert "between 10.00 and 17.00 over 8 nights" in page
-
-
-def test_a_folder_that_holds_something_else_is_refused(tmp_path) -> None:
-    (tmp_path / "thesis.tex").write_text("x")
-    with pytest.raises(InputError, match="not empty and no site"):
-        run_night(study(job("a")), tmp_path, INLINE, code=CODE)
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["thesis.tex"]
 
 
 @pytest.mark.parametrize(
@@ -228,23 +206,17 @@ def test_a_study_that_cannot_be_is_refused_with_the_limit(tmp_path, jobs: list[J
     assert not (tmp_path / "s").exists()
 
 
-def test_change_points_of_known_steps_are_found_to_the_night() -> None:
+def test_change_points_of_known_steps_are_found_to_the_night_and_noise_has_none() -> None:
     rng = np.random.default_rng(3)
     clean = np.concatenate([np.full(40, 9.4), np.full(30, 8.1), np.full(30, 8.6)])
     assert [p.index for p in change_points(clean, 0.05)] == [40, 70]
     for values, wanted in ((clean + 0.1 * rng.standard_normal(100), [40, 70]), (clean[:41], [40])):
         assert [p.index for p in change_points(values, 0.05)] == wanted
-
-
-def test_noise_and_small_steps_have_no_change_point() -> None:
     rng = np.random.default_rng(4)
     result = [change_points(rng.standard_normal(200), 0.05) for _ in range(20)]
     assert sum(map(len, result)) <= 4
     for values in ([1.0, 1.0, 1.04, 1.04], [np.nan, 1.0]):
         assert change_points(np.array(values), 0.05) == ()
-
-
-def test_a_single_step_does_not_flap_and_several_runs_a_day_are_no_missing_nights() -> None:
     courses = ([1.0] * 5 + [2.0] * 5, np.arange(10.0), [1.0, 2.0, 1.0, np.nan, 2.0, 1.0])
     assert [flaps(np.array(course), 0.1) for course in courses] == [False, False, True]
     assert missing_nights([f"2026-01-01T{h:02d}:0{m}:00Z" for h in range(3) for m in range(3)]) == ()

@@ -1,7 +1,6 @@
 """The parts of the nightly: texts, cache, tolerances, figures of a report, lock."""
 
 import subprocess
-from functools import partial
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from reports.nightly.state import hold
 from reports.nightly.text import csv_cell, one_line
 from reports.sections.margins import MARGIN_COLUMNS, RESPONSE_COLUMNS
 from reports.sections.validation import table
+from tests.refusals import refused
 
 
 @given(st.text())
@@ -62,14 +62,10 @@ def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     assert cache.read("cd34") is None
 
 
-def flipped(data: bytes, where: int) -> bytes:
-    return data[:where] + bytes([data[where] ^ 1]) + data[where:][1:]
-
-
 @pytest.mark.parametrize(
     "damage",
     [
-        *(partial(flipped, where=where) for where in (0, 10, 60, 120, -1)),
+        *(lambda data, k=k: data[:k] + bytes([data[k] ^ 1]) + data[k:][1:] for k in (0, 10, 60, 120, -1)),
         *(lambda data, size=size: data[:size] for size in (0, 1, 50, 200, -1)),
         lambda _: sealed("ab34", {}, {"report.html": b"x"}),
     ],
@@ -86,7 +82,7 @@ def test_an_entry_that_is_damaged_or_another_s_is_neither_read_nor_kept(tmp_path
     assert not (tmp_path / "other").exists()
 
 
-def test_digest_knows_verdicts_and_every_number_of_a_table() -> None:
+def test_digest_knows_verdicts_and_every_number_of_a_table_by_a_name_that_stays() -> None:
     made = digest(fake_document({"name": "a", "margin": 5.0}))
     assert made["failed"] == 1
     assert made["verdicts"][0]["relative"] == pytest.approx(-1 / 6)
@@ -95,6 +91,9 @@ def test_digest_knows_verdicts_and_every_number_of_a_table() -> None:
     assert values["GM: met"][0] == 0.0
     assert values["margins / Margins / velocity / phase margin"] == (46.0, "deg", 1)
     assert values["margins / Margins / position / crossover"] == (300.0, "rad/s", 0)
+    first, second = ([f.name for f in figures_of(fake_document({"name": "a", "margin": m}))] for m in (5, 9))
+    assert first == second
+    assert len(set(first)) == len(first)
 
 
 @pytest.mark.parametrize("night", [(9.9, 10.1), (0.02, 0.03), (30.0, 2.0)])
@@ -109,18 +108,6 @@ def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple
         made = figures_of({"sections": [{"id": "validation", "blocks": [block]}]})
         found += [(f.value, f.unit) for f in made if f.name.endswith("/ Predicted")]
     assert found == [(pytest.approx(value, rel=1e-12), "s") for value in night]
-
-
-def test_figures_keep_their_names_when_values_change() -> None:
-    first, second = ([f.name for f in figures_of(fake_document({"name": "a", "margin": m}))] for m in (5, 9))
-    assert first == second
-    assert len(set(first)) == len(first)
-
-
-@pytest.mark.parametrize("value", ["-1 deg", "much", "nan", True, [1]])
-def test_a_tolerance_that_is_none_is_refused(value: object) -> None:
-    with pytest.raises(InputError, match=r"study.toml: tolerance 'x'"):
-        read_tolerances({"x": value}, "study.toml")
 
 
 def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(tmp_path) -> None:
@@ -165,35 +152,27 @@ def test_no_program_of_a_foreign_work_tree_is_started(tmp_path) -> None:
     assert commits_between(tmp_path, "0" * 40, new) == ()
 
 
-@pytest.mark.parametrize("quantity", [q for q in QUANTITIES.values() if q.heading], ids=lambda q: q.name)
-def test_every_heading_is_a_column_of_the_report_with_its_tolerance(quantity) -> None:
-    (column,) = [c for c in (*MARGIN_COLUMNS, *RESPONSE_COLUMNS) if c["label"] == quantity.heading]
-    unit = column.get("unit") or ""
-    figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
-    absolute, relative = Tolerances().pair(figure)
-    factor = {"ms": 1e3}.get(unit, 1.0)
-    assert absolute == pytest.approx(quantity.tolerance * factor, rel=1e-12)
-    assert relative == 1e-3
+def test_every_heading_is_a_column_of_the_report_with_its_tolerance() -> None:
+    for quantity in (q for q in QUANTITIES.values() if q.heading):
+        (column,) = [c for c in (*MARGIN_COLUMNS, *RESPONSE_COLUMNS) if c["label"] == quantity.heading]
+        unit = column.get("unit") or ""
+        figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
+        factor = {"ms": 1e3}.get(unit, 1.0)
+        assert Tolerances().pair(figure) == (pytest.approx(quantity.tolerance * factor, rel=1e-12), 1e-3)
+    units = {"dB": 0.01, "deg": 0.05, "%": 0.05, "s": 1e-7, "samples": 0.01, "A": 1e-9}
+    for unit, absolute in units.items():  # a figure of another name has the tolerance of its unit
+        figure = Figure(name="drive / something else", value=1.0, unit=unit)
+        assert Tolerances().pair(figure) == (absolute, 1e-3)
+        allowed = Columns([figure], Tolerances()).allowed(np.array([1e6]), np.array([np.nan]))
+        assert allowed == pytest.approx([1e3])
 
 
-def test_quantities_of_loops_have_a_column_and_one_tolerance_a_unit() -> None:
+def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_first() -> None:
     assert all(q.heading for q in LOOP_QUANTITIES.values())
     pairs = {(quantity.unit, quantity.tolerance) for quantity in LOOP_QUANTITIES.values()}
     assert len(pairs) == len({unit for unit, _ in pairs}), pairs
-
-
-@pytest.mark.parametrize(
-    ("unit", "absolute"),
-    [("dB", 0.01), ("deg", 0.05), ("%", 0.05), ("s", 1e-7), ("samples", 0.01), ("A", 1e-9)],
-)
-def test_a_figure_of_another_name_has_the_tolerance_of_its_unit(unit: str, absolute: float) -> None:
-    figure = Figure(name="drive / something else", value=1.0, unit=unit)
-    assert Tolerances().pair(figure) == (absolute, 1e-3)
-    allowed = Columns([figure], Tolerances()).allowed(np.array([1e6]), np.array([np.nan]))
-    assert allowed == pytest.approx([1e3])
-
-
-def test_a_rule_of_the_study_comes_first() -> None:
     figure = Figure(name="margins / A table / Current loop / Gain margin", value=1.0, unit="dB")
+    for value in ("-1 deg", "much", "nan", True, [1]):
+        refused(read_tolerances, {"x": value}, "study.toml", words="study.toml: tolerance 'x'")
     assert read_tolerances({"*gain margin": "0.5 dB"}, "study.toml").pair(figure) == (0.5, 0.0)
     assert Tolerances().pair(Figure(name="x: met", value=1.0, kind="verdict")) == (0.5, 0.0)

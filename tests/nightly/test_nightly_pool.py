@@ -1,12 +1,9 @@
 """Processes of a night: who raises, dies or hangs stops no other; killed at any moment, it goes on."""
 
-import json
 import os
 import signal
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
@@ -21,32 +18,21 @@ from reports.nightly.night import run_night
 from reports.nightly.processes import Answer, Limits, Task, Warm, build_each
 
 
-@pytest.fixture(scope="module")
-def troubled(tmp_path_factory):
+def test_every_design_gets_its_own_end_and_the_page_says_why(tmp_path) -> None:
     """One night with every kind of trouble, on two worker processes."""
-    site = tmp_path_factory.mktemp("pool") / "site"
     raises = job("raises", mode="raise", words="gear <b>lost</b>\nin line two")
     modes = {"never ends": "hang", "is killed": "die", "leaves": "exit"}
     bad = [raises, *(job(name, mode=mode) for name, mode in modes.items()), job("fails", 5.0)]
     made = study(job("first"), *bad, *(job(f"good {k}") for k in range(4)))
-    settings, seen = Fakes(workers=2, time_limit_s=6.0), list[tuple[int, int]]()
+    settings, seen, site = Fakes(workers=2, time_limit_s=6.0), list[tuple[int, int]](), tmp_path / "site"
     how = {"code": CODE, "clock": Calendar(), "progress": lambda *pair: seen.append(pair)}
-    return site, run_night(made, site, settings, **how), seen
-
-
-def test_every_design_gets_its_own_end(troubled) -> None:
-    _, night, _ = troubled
-    ends = {d.name: d.result.status for d in night.designs}
+    night = run_night(made, site, settings, **how)
+    assert workers_left() == []
     took_s = {d.name: d.result.seconds for d in night.designs}
     assert 6.0 <= took_s["never ends"] < 15.0
-    bad = {"raises": "error", "never ends": "timeout", "is killed": "crash", "leaves": "crash"}
+    ends = {"raises": "error", "never ends": "timeout", "is killed": "crash", "leaves": "crash"}
     good = dict.fromkeys(("first", *(f"good {k}" for k in range(4))), "pass")
-    assert ends == {**bad, "fails": "fail", **good}
-    assert workers_left() == []
-
-
-def test_the_page_names_who_failed_and_why_and_progress_counts_to_the_end(troubled) -> None:
-    site, night, seen = troubled
+    assert {d.name: d.result.status for d in night.designs} == {**ends, "fails": "fail", **good}
     assert [seen[0], seen[-1]] == [(0, 10), (10, 10)]
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     assert not night.passed
@@ -68,14 +54,11 @@ def ends_of(build: str, tasks: list[Task]) -> dict[str, Answer]:
     return ends
 
 
-def test_a_build_that_cannot_be_imported_fails_every_task_and_ends() -> None:
+def test_a_build_that_cannot_be_imported_fails_and_a_process_goes_from_job_to_job(tmp_path) -> None:
     ends = ends_of("no_such_module:build", [Task(key=f"k{k}", payload={}) for k in range(3)])
     assert [d.status for d in ends.values()] == ["crash"] * 3
     assert all("could not start" in d.message and "no_such_module" in d.detail for d in ends.values())
     assert ends_of("no_such_module:build", []) == {}
-
-
-def test_a_process_goes_from_job_to_job(tmp_path) -> None:
     tasks = [Task(key=f"{k:064d}", payload=job(f"d{k}", mode="pid").payload) for k in range(6)]
     ends = ends_of(BUILD, tasks)
     assert {answer.status for answer in ends.values()} == {"done"}
@@ -83,7 +66,7 @@ def test_a_process_goes_from_job_to_job(tmp_path) -> None:
     assert 1 <= len(pids) <= 2
 
 
-def test_a_process_that_died_while_it_waited_is_replaced() -> None:
+def test_a_process_that_died_is_replaced_and_an_interrupted_night_ends_its_jobs() -> None:
     """By the system, short of memory, say: the next job does not pay for it."""
     with closing(Warm(Limits(build=BUILD, time_limit_s=60.0, memory_bytes=10**10))) as warm:
         assert warm.build(Task(key="0" * 64, payload=job("a").payload)).status == "done"
@@ -93,10 +76,7 @@ def test_a_process_that_died_while_it_waited_is_replaced() -> None:
         assert warm.build(Task(key="1" * 64, payload=job("b").payload)).status == "done"
     assert workers_left() == []
 
-
-def test_an_interrupted_night_ends_the_jobs_under_way() -> None:
-    """Ctrl-C beside a job that never ends: no wait for its time limit, no process left."""
-
+    # Ctrl-C beside a job that never ends: no wait for its time limit, no process left
     def interrupt(_task: Task, _answer: Answer) -> None:
         raise KeyboardInterrupt
 
@@ -110,30 +90,6 @@ def test_an_interrupted_night_ends_the_jobs_under_way() -> None:
 HERE = Path(__file__).parent
 PATHS = os.pathsep.join([str(HERE), *filter(None, [os.environ.get("PYTHONPATH")])])
 QUIET = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "PYTHONPATH": PATHS}
-KILLS = 60
-
-
-@pytest.fixture
-def fast_folder(tmp_path) -> Iterator[Path]:
-    """A folder in memory where there is one: a killed process leaves the same there, and waits are short."""
-    memory = Path("/dev/shm")
-    if not os.access(memory, os.W_OK):
-        yield tmp_path
-        return
-    with tempfile.TemporaryDirectory(prefix="nightly-", dir=memory) as folder:
-        yield Path(folder)
-
-
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="kills processes that were forked")
-def test_sixty_kills_at_random_moments_lose_nothing(fast_folder: Path) -> None:
-    site = fast_folder / "site"
-    command = [sys.executable, str(HERE / "kill_target.py"), str(site), str(KILLS), "20260101"]
-    done = subprocess.run(command, capture_output=True, text=True, env=QUIET, timeout=300, check=False)
-    assert done.returncode == 0, done.stderr[-3000:]
-    outcome = json.loads(done.stdout)
-    assert outcome["killed"] == KILLS
-    assert {"building", "publishing"} <= set(outcome["phases"])
-    assert outcome["leftovers"] == 0
 
 
 WITH_WORKERS = """

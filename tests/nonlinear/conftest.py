@@ -1,34 +1,30 @@
 """A run of `simulate` from the command line, read as its user reads it."""
 
-import json
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from reports.cli.main import main
+from tests.command_line import Command
 
 
-class Run(NamedTuple):
-    """Exit status, what is said on both streams, the facts of --json, the rows of --csv."""
+@dataclass(frozen=True)
+class Simulate:
+    """Run `simulate` with these words: the facts of --json, the rows of --csv."""
 
-    status: int
-    said: str
-    facts: dict[str, Any]
-    rows: np.ndarray
+    cli: Command
+    path: Path
+
+    def __call__(self, words: str) -> tuple[dict[str, Any], np.ndarray]:
+        facts = self.cli.data("simulate", *words.split(), "--csv", self.path)
+        return facts, np.genfromtxt(self.path, delimiter=",", names=True)
+
+    def refused(self, words: str) -> str:
+        return self.cli.refused("simulate", *words.split(), "--csv", self.path)
 
 
 @pytest.fixture
-def run(tmp_path, capsys) -> Callable[..., Run]:
-    """Run `simulate` with these words, its rows in ``run.csv``."""
-    path = tmp_path / "run.csv"
-
-    def call(words: str) -> Run:
-        path.unlink(missing_ok=True)
-        status = main(f"simulate {words} --csv {path} --json".split())
-        out, err = capsys.readouterr()
-        rows = np.genfromtxt(path, delimiter=",", names=True) if status == 0 else np.zeros(0)
-        return Run(status, out + err, json.loads(out) if status == 0 else {}, rows)
-
-    return call
+def run(tmp_path, cli) -> Simulate:
+    return Simulate(cli, tmp_path / "run.csv")

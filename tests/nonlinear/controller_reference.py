@@ -58,11 +58,11 @@ class Regulator:
     T: float
     integral: float = 0.0
 
-    def __call__(self, e: float, forward: float, limit: float) -> tuple[float, bool]:
+    def __call__(self, e: float, forward: float, limit: float) -> float:
         Kp = self.loop.gain if isinstance(self.loop, VelocityLoop) else self.loop.gain_V_A
         Tn = self.loop.integral_time_s
         if Tn is None:  # P: there is no integral that could wind up
-            return clamp(Kp * e + forward, limit), abs(Kp * e + forward) > limit
+            return clamp(Kp * e + forward, limit)
         new = self.integral + Kp * self.T / Tn * e
         if self.loop.anti_windup == "clamped":
             new = clamp(new, limit)
@@ -75,7 +75,7 @@ class Regulator:
             self.integral = new
         else:
             out = clamp(Kp * e + self.integral + forward, limit)
-        return out, clamp(v, limit) != v
+        return out
 
 
 class Profile:
@@ -136,8 +136,7 @@ class Speed:
             self.th, self.w = p + 2 * w0 * self.T * r, self.w + w0**2 * self.T * r
             w = self.w
         self.y += self.T / (self.encoder.filter_time_s + self.T) * (w - self.y)
-        out = self.y
-        return chained(self.filters, out)
+        return chained(self.filters, self.y)
 
 
 def chained(filters: list[Digital], x: float) -> float:
@@ -253,7 +252,7 @@ class Controller:
         if self.pi_v and self.k % self.n_v == 0:
             self.w_meas = self.speed(*self.sensed(w, th, y))
             limit = self.i_max if c.current else limits.voltage_V
-            out, _ = self.pi_v(self.w_ref - self.w_meas, self.i_ff, limit)
+            out = self.pi_v(self.w_ref - self.w_meas, self.i_ff, limit)
             out = clamp(chained(self.torque, out), limit)
             if c.current:
                 self.i_ref = self.slope(self.at("i_ref", out, self.k), self.n_v)
@@ -265,6 +264,6 @@ class Controller:
             wanted = clamp(self.i_ref, self.i_max)
             forward = c.current.back_emf_feedforward * m.back_emf_constant_Vs_rad * self.w_meas
             forward += c.current.resistance_feedforward * m.resistance_ohm * wanted
-            self.u, _ = self.pi_c(wanted - i, forward, limits.voltage_V)
+            self.u = self.pi_c(wanted - i, forward, limits.voltage_V)
         self.k += 1
         return self.u

@@ -1,6 +1,6 @@
 """Two-mass drives for the tests, and the event-driven plant under prescribed voltages and moments."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,14 @@ from nonlinear._kernels import layout
 from nonlinear.native import parameters, tick
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
-from tests.loops.two_mass import MOTOR
+from tests.loops.two_mass import MOTOR, drive_d
 
 SOURCE = model.Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=1.0)
 
 
 def drive_f() -> model.Design:
     """Drive F of the reference numbers: coupling with play and damping, three loops, limits."""
-    return model.Design(
-        name="F",
-        title="",
-        motor=MOTOR,
-        gears=(model.Gear(name="g", ratio=10.0),),
+    return drive_d(
         load=model.Load(inertia_kgm2=1e-3, path="back-drivable"),
         friction=model.Friction(viscous_Nms_rad=1e-4),
         coupling=model.Coupling(stiffness_Nm_rad=200.0, damping_Nms_rad=0.02, play_rad=0.02),
@@ -62,14 +58,12 @@ def stribeck(*points: tuple[float, float], direction: Any = "both") -> tuple[mod
 
 @dataclass
 class Run:
-    """States (i, w, W, th, phi) and coupling torque at the ticks, with what is left in the row."""
+    """States (i, w, W, th, phi) and ledgers at the ticks, events in each, how it ended."""
 
     states: np.ndarray
-    torque: np.ndarray
-    row: np.ndarray
-    events: list[int] = field(default_factory=list)
-    status: int = layout.OK
-    ledgers: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    ledgers: np.ndarray
+    events: list[int]
+    status: int
 
 
 PLACES = (layout.S_CURRENT, layout.S_SPEED, at.ES_LOAD_SPEED, layout.S_ANGLE)
@@ -105,19 +99,18 @@ def run_plant(
     p, s = parameters(open_drive(design, start, fraction_s, **options))
     io, count = np.zeros(layout.IO_SIZE), voltages.size
     moment = np.broadcast_to(moments, voltages.shape)
-    states, torque = np.empty((count + 1, 5)), np.empty(count + 1)
-    ledgers, events, status = np.empty((count + 1, layout.ENERGY_SIZE)), [], layout.OK
+    states, ledgers = np.empty((count + 1, 5)), np.empty((count + 1, layout.ENERGY_SIZE))
+    events, status = [], layout.OK
     for k in range(count + 1):
         states[k, :4], states[k, 4] = s[list(PLACES)], s[layout.S_OUTPUT] * design.ratio_behind_coupling
         ledgers[k] = s[layout.S_ENERGY : layout.S_ENERGY + layout.ENERGY_SIZE]
         io[layout.IN_COMMAND], io[layout.IN_LOAD] = (voltages[k], moment[k]) if k < count else (0.0, 0.0)
         before = s[layout.S_EVENTS]
         status = tick(p, s, io)
-        torque[k] = io[layout.IO_COUPLING_TORQUE]
         if status != layout.OK:
             break
         events.append(int(s[layout.S_EVENTS] - before))
-    return Run(states, torque, s, events[:count], status, ledgers)
+    return Run(states, ledgers, events[:count], status)
 
 
 def power_of_ten(rng: np.random.Generator, low: float, high: float) -> float:

@@ -1,4 +1,4 @@
-"""Many runs have the bits of single ones, reducers agree with histories; probes measure the loop."""
+"""Many runs have the bits of single ones, reducers agree with histories; gain and delay of probes."""
 
 import shutil
 from collections.abc import Callable
@@ -6,18 +6,17 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design
+from actuator_lti import load_design
 from actuator_lti.errors import InputError
-from nonlinear import Probe, Reducers, Rows, Run, State, commands, loads, simulate, simulate_many
+from nonlinear import Probe, Reducers, Rows, Run, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
 from nonlinear.bench.probe import fractional_delay
 from nonlinear.runs.reduced import whole_periods
 
 AMBER = load_design("ilr33-amber")
-BOTH_RATES = pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
 
 
-def mixed_runs() -> list[Run]:
+def test_bits_of_single_runs_for_any_number_of_threads() -> None:
     designs = [load_design(n) for n in ("ilr33-amber", "emps", "ilr33-amber-multirate")]
     table = commands.sampled([0.0, 0.1, 0.2], [0.0, 0.01, -0.01])
     runs, kept = [], Reducers(extremes=True)
@@ -25,11 +24,6 @@ def mixed_runs() -> list[Run]:
         command = commands.sine(0.002 * (k + 1), 2.0 + k) if k % 2 else table
         how = {"duration_s": 0.2 + 0.01 * k, "load_Nm": loads.proportional(3.0 * k, 1.0), "reducers": kept}
         runs.append(Run(design=designs[k % 3], command=command, **how))
-    return runs
-
-
-def test_bits_of_single_runs_for_any_number_of_threads() -> None:
-    runs = mixed_runs()
     batches = [simulate_many(runs, threads=n) for n in (1, 2, 5)]
     for batch in batches[1:]:
         assert np.array_equal(batch.outs, batches[0].outs)
@@ -58,7 +52,7 @@ def test_going_on_gives_the_bits_of_one_run(name: str) -> None:
     assert np.array_equal(on.final_output_rad, whole.final_output_rad)
 
 
-def test_windows_against_the_history() -> None:
+def test_windows_and_step_figures_against_the_history() -> None:
     Ts = AMBER.controller.period_s
     frequency, ticks, cycles = whole_periods(37.0, Ts)
     probe = Probe(point="w_ref", injection=commands.sine(20.0, frequency))
@@ -82,9 +76,6 @@ def test_windows_against_the_history() -> None:
                 e = np.exp(-2j * np.pi * frequency * harmonic * t)
                 expected = 2j * np.mean(x * e)
                 assert batch.phasor(name, harmonic, last)[0] == pytest.approx(expected, abs=1e-9)
-
-
-def test_step_figures_against_the_history() -> None:
     target, kept = 0.01, Reducers(step_target_rad=0.01)
     asked = Run(design=AMBER, command=commands.step(target), duration_s=0.2, reducers=kept)
     step, history = simulate_many([asked]).step, simulate(AMBER, commands.step(target), 0.2)
@@ -111,7 +102,7 @@ def test_rows_are_the_same_as_runs() -> None:
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc here")
-@BOTH_RATES
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
 @pytest.mark.parametrize("motion", [(5.0, 1.0, 4.0), (0.05, 10.0, 2.0), (10.0, 3.0, 0.0)])
 def test_the_simulator_agrees_with_it(name: str, motion: tuple[float, float, float]) -> None:
     from benchmarks.plain_servo import PlainServo
@@ -128,40 +119,6 @@ def test_the_simulator_agrees_with_it(name: str, motion: tuple[float, float, flo
         assert np.abs(history[:, k] - values).max() < 1e-9 * np.abs(values).max()
 
 
-CRUISE = 300.0
-INJECTION = {"u": 0.02, "i_ref": 0.3, "w_ref": 10.0, "output": 1e-4}
-
-
-@BOTH_RATES
-@pytest.mark.parametrize("point", list(INJECTION))
-@pytest.mark.parametrize("frequency_hz", [20.0, 150.0])
-def test_open_loop_at_every_break_point(name: str, point: str, frequency_hz: float) -> None:
-    design = load_design(name)
-    control = design.controller
-    if name.endswith("multirate"):
-        frequency_hz = frequency_hz / 4
-    frequency, ticks, cycles = whole_periods(frequency_hz, control.period_s, least_ticks=2000)
-    ticks, cycles = 10 * ticks, 10 * cycles  # whole position periods
-    moving = point != "output"  # a ramp has no steady phasor at the output: there, at rest without friction
-    ahead = -CRUISE / control.position.gain
-    start = State(motor_angle_rad=ahead, motor_speed_rad_s=CRUISE, speed_command_rad_s=CRUISE)
-    motion = {"bias": commands.ramp(CRUISE / design.total_ratio), "initial": start} if moving else {}
-    run = Run(
-        design=design, command=commands.hold(), friction_on=moving, **motion,
-        probes=(Probe(point=point, injection=commands.sine(INJECTION[point], frequency)),),
-        duration_s=(2 * ticks + 10_000) * control.period_s,
-        reducers=Reducers(window_ticks=ticks, cycles=cycles),
-    )  # fmt: skip
-    result = simulate_many([run])
-    before, after = (f"probe_{point}_{side}" for side in ("before", "after"))
-    measured = -result.phasor(before)[0] / result.phasor(after)[0]
-    assert result.unsteadiness(before)[0] < 1e-6
-    loop = assemble_loops(design).break_points[point]
-    # a held signal sampled at its own updates: sums over ticks carry the same hold on both sides
-    linear = complex(loop.open_loop(np.exp(2j * np.pi * frequency * loop.period_s)))
-    assert measured == pytest.approx(linear, rel=2e-3 if name.endswith("multirate") else 1e-6)
-
-
 def test_gain_and_delay_multiply_the_loop() -> None:
     u = np.sin(0.3 * np.arange(200.0)) * 0.1
     for delay, tolerance in ((3.0, 0.0), (2.4, 2e-6), (0.5, 2e-3)):
@@ -174,15 +131,12 @@ def test_gain_and_delay_multiply_the_loop() -> None:
         scale = np.abs(seen.before).max()
         assert np.abs(got - expected)[10:].max() <= (tolerance + 0.01 if tolerance else 1e-14) * scale
         assert np.array_equal(run.speed_command_rad_s, seen.after)
-
-
-@pytest.mark.parametrize("delay", [0.3, 1.6, 2.5, 7.25])
-def test_fractional_delay_has_the_phase_of_a_delay(delay: float) -> None:
-    whole, taps = fractional_delay(delay)
-    for wT in (0.01, 0.1, 0.3):
-        response = np.sum(taps * np.exp(-1j * wT * (whole + np.arange(taps.size))))
-        error = abs(response / np.exp(-1j * wT * delay) - 1.0)
-        assert error < (wT / 2.0) ** taps.size * 2.0
+    for delay in (0.3, 1.6, 2.5, 7.25):  # by its taps
+        whole, taps = fractional_delay(delay)
+        for wT in (0.01, 0.1, 0.3):
+            response = np.sum(taps * np.exp(-1j * wT * (whole + np.arange(taps.size))))
+            error = abs(response / np.exp(-1j * wT * delay) - 1.0)
+            assert error < (wT / 2.0) ** taps.size * 2.0
 
 
 def probed(*probes: Probe) -> object:

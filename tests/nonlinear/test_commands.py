@@ -13,6 +13,7 @@ from nonlinear import State, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
+from tests.refusals import refused
 
 AMBER = load_design("ilr33-amber")
 TS = 1e-3
@@ -45,12 +46,25 @@ def test_a_sine_is_right_to_its_last_digits(frequency_hz: float) -> None:
     assert np.max(np.abs(values - truth) / np.spacing(np.abs(truth))) <= 2.0
 
 
-def test_stepped_sine_joins_whole_periods() -> None:
+def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_seed() -> None:
     command = commands.stepped_sine(1.0, [5.0, 10.0], cycles=3, period_s=TS, settle_cycles=2)
     values = command.values(TS, 2000)
     np.testing.assert_allclose(values[:1000], np.sin(2 * np.pi * 5.0 * T[:1000]), atol=1e-12)
     np.testing.assert_allclose(values[1000:1500], np.sin(2 * np.pi * 10.0 * (T[1000:1500] - 1.0)), atol=1e-9)
     assert not values[1500:].any()
+    a, b, c = (commands.multisine(0.5, [3.0, 7.0], 2.0, TS, seed=s).values(TS, 2000) for s in (1, 1, 2))
+    assert np.array_equal(a, b)
+    assert not np.array_equal(a, c)
+    values = commands.multisine(0.3, [3.3, 7.1, 12.9], 1.0, 1e-4, seed=4).values(1e-4, 10_001)
+    assert abs(values[0]) < 1e-12
+    assert values[10_000] == pytest.approx(values[0], abs=1e-12)
+    assert values[1] > 0.0
+    lines = np.abs(np.fft.rfft(values[:10_000])) / 5000.0
+    assert set(np.flatnonzero(lines > 1e-9).tolist()) == {3, 7, 13}
+    assert np.abs(values).max() == pytest.approx(0.3, rel=1e-12)
+    for wrong, words in (([0.2], "less than one period"), ([3.1, 3.2], "same number of periods")):
+        with pytest.raises(InputError, match=words):
+            commands.multisine(0.3, wrong, 1.0, 1e-4)
 
 
 @pytest.mark.parametrize(
@@ -69,6 +83,7 @@ def test_stepped_sine_joins_whole_periods() -> None:
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
         (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
+        (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
     ],
 )
 def test_refusals(make: Callable[[], object], words: str) -> None:
@@ -79,35 +94,8 @@ def test_refusals(make: Callable[[], object], words: str) -> None:
 def test_cells_that_are_no_numbers(tmp_path) -> None:
     path = tmp_path / "r.csv"
     path.write_text("t,a\n0,1\n1,x\n")
-    with pytest.raises(InputError, match=r'line 3, column 2 = "x"'):
-        read_columns(path, ("t", "a"))
-    with pytest.raises(InputError, match='no column "b"; there are "t", "a"'):
-        read_columns(path, ("b",))
-
-
-def test_loads_act_as_friction_or_as_torque() -> None:
-    kM, CM = AMBER.motor.torque_constant_Nm_A, AMBER.friction.load_coefficient
-    free, six = changed(AMBER, load={"path": "back-drivable"}), np.full(11, 6.0)
-    held = ((AMBER, loads.series(np.linspace(0.0, 1.0, 11), six)), (free, loads.constant(6.0)), (AMBER, 0.0))
-    locked_A, driven_A, none_A = (
-        simulate(design, commands.ramp(0.15), 1.0, load).current_A[-1] for design, load in held
-    )
-    assert locked_A - none_A == pytest.approx(6.0 * CM / kM, rel=1e-6)
-    assert driven_A - none_A == pytest.approx((6.0 * CM - 6.0 / AMBER.total_ratio) / kM, rel=1e-6)
-    slope = simulate(AMBER, commands.step(0.02), 0.5, loads.proportional(-300.0))
-    still = simulate(AMBER, commands.step(0.02), 0.5)
-    assert slope.output_angle_rad[-1] == pytest.approx(0.02, rel=0.02)
-    assert slope.motor_speed_rad_s.max() < still.motor_speed_rad_s.max()
-
-
-def test_extra_torque_and_initial_state() -> None:
-    start, hold = State(motor_angle_rad=10.0), commands.hold(10.0 / AMBER.total_ratio)
-    run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=1e-3)
-    assert not run.motor_speed_rad_s.any()  # below the dry friction
-    run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=5e-3)
-    assert run.output_angle_rad.max() > 10.0 / AMBER.total_ratio
-    with pytest.raises(InputError, match="not finite"):
-        simulate(AMBER, hold, 0.3, disturbance_Nm=[0.0, np.nan])
+    refused(read_columns, path, ("t", "a"), words='line 3, column 2 = "x"')
+    refused(read_columns, path, ("b",), words='no column "b"; there are "t", "a"')
 
 
 def test_trajectory_carries_units_and_leaves_as_a_frame() -> None:
@@ -122,7 +110,7 @@ def test_trajectory_carries_units_and_leaves_as_a_frame() -> None:
     assert again.parameters_hash == run.parameters_hash
 
 
-def test_a_failure_is_said_and_never_passed_for_a_result() -> None:
+def test_a_failure_is_said_and_progress_can_interrupt() -> None:
     wild = changed(AMBER, controller={"velocity": {"gain": 50.0}})
     with pytest.raises(NumericalError, match=r"run stopped at .* s \(not finite\): .* unstable"):
         simulate(wild, commands.step(0.01), 1.0, limits_on=False)
@@ -130,9 +118,6 @@ def test_a_failure_is_said_and_never_passed_for_a_result() -> None:
     assert run.status == "not finite"
     assert np.isnan(run.output_angle_rad[-1])
     assert run.time_s.size == 10_000
-
-
-def test_progress_and_interruption() -> None:
     seen: list[tuple[int, int]] = []
     simulate(AMBER, commands.hold(), 1.0, progress=lambda done, total: seen.append((done, total)))
     assert seen[-1] == (10_000, 10_000)
@@ -144,7 +129,7 @@ def test_progress_and_interruption() -> None:
         simulate(AMBER, commands.hold(), 100.0, record_every=1000, progress=stop)
 
 
-def test_a_record_holds_the_whole_load() -> None:
+def test_a_record_holds_the_whole_load_and_extra_torque_moves_what_friction_does_not_hold() -> None:
     """Slope and gravity at the angle that the output has, by their formulas."""
     made = simulate("joint", commands.step(0.1), 0.05, loads.proportional(-3.0, 1.5))
     load = load_design("joint").load
@@ -152,20 +137,9 @@ def test_a_record_holds_the_whole_load() -> None:
     own = gravity.mass_kg * 9.80665 * gravity.arm_m * np.sin(angle + gravity.offset_rad)
     wanted = 1.5 + (load.moment_slope_Nm_rad - 3.0) * angle + own
     np.testing.assert_allclose(made.load_Nm, wanted, rtol=1e-12, atol=1e-12)
-
-
-def test_a_multisine_is_periodic_begins_at_zero_and_has_its_lines_and_its_seed() -> None:
-    """Twice its duration is it twice; every line a whole number of periods."""
-    a, b, c = (commands.multisine(0.5, [3.0, 7.0], 2.0, TS, seed=s).values(TS, 2000) for s in (1, 1, 2))
-    assert np.array_equal(a, b)
-    assert not np.array_equal(a, c)
-    values = commands.multisine(0.3, [3.3, 7.1, 12.9], 1.0, 1e-4, seed=4).values(1e-4, 10_001)
-    assert abs(values[0]) < 1e-12
-    assert values[10_000] == pytest.approx(values[0], abs=1e-12)
-    assert values[1] > 0.0
-    lines = np.abs(np.fft.rfft(values[:10_000])) / 5000.0
-    assert set(np.flatnonzero(lines > 1e-9).tolist()) == {3, 7, 13}
-    assert np.abs(values).max() == pytest.approx(0.3, rel=1e-12)
-    for wrong, words in (([0.2], "less than one period"), ([3.1, 3.2], "same number of periods")):
-        with pytest.raises(InputError, match=words):
-            commands.multisine(0.3, wrong, 1.0, 1e-4)
+    start, hold = State(motor_angle_rad=10.0), commands.hold(10.0 / AMBER.total_ratio)
+    run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=1e-3)
+    assert not run.motor_speed_rad_s.any()  # below the dry friction
+    run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=5e-3)
+    assert run.output_angle_rad.max() > 10.0 / AMBER.total_ratio
+    refused(simulate, AMBER, hold, 0.3, disturbance_Nm=[0.0, np.nan], words="not finite")

@@ -5,9 +5,8 @@ import pytest
 
 from actuator_lti.design.model import Design
 from nonlinear import commands, simulate
-from nonlinear._kernels import elastic_layout, layout
-from tests.changed import changed
-from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, stribeck, two_mass
+from nonlinear._kernels import layout
+from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, two_mass
 
 K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
 REDUCED = 1.0 / (1.0 / J_L + 1.0 / (J_M * N * N))  # inertia of the relative motion
@@ -36,12 +35,24 @@ def twist_of(run: Run) -> np.ndarray:
     return run.states[:, 3] / N - run.states[:, 4]
 
 
-def test_free_vibration_of_two_masses() -> None:
+def test_free_vibrations_of_both_masses_of_the_motor_and_of_the_load() -> None:
     design, ticks = two_mass(1e-3, source=True, coupling=TIGHT), np.arange(201)
     run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, 0.5, 0.0))
     np.testing.assert_allclose(twist_of(run), 0.05 * np.cos(RESONANCE * ticks * 1e-3), atol=1e-13)
     common = J_M * N * run.states[:, 3] + J_L * run.states[:, 4]
     np.testing.assert_allclose(common, common[0], rtol=1e-13)
+    # the load sticks
+    design = two_mass(1e-3, source=True, coupling=TIGHT, load_friction={"dry_torque_Nm": 50.0})
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
+    w0 = np.sqrt(K / (J_M * N * N))
+    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
+    assert not run.states[:, 4].any()
+    # behind a self-locking stage
+    design = two_mass(1e-3, coupling=TIGHT, path="self-locking", friction={"load_coefficient": 0.2})
+    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
+    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
+    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
+    assert np.abs(run.states[:, 3]).max() < 1e-18
 
 
 def bounce(t: np.ndarray, v: float) -> np.ndarray:
@@ -92,93 +103,6 @@ def test_damped_contact_parts_at_no_torque() -> None:
     assert run.states[90, 1] / N - run.states[90, 2] == pytest.approx(rate, rel=1e-11)
 
 
-def test_motor_swings_on_its_spring_while_the_load_sticks() -> None:
-    design = two_mass(1e-3, source=True, coupling=TIGHT, load_friction={"dry_torque_Nm": 50.0})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.2, 0.0))
-    w0 = np.sqrt(K / (J_M * N * N))
-    np.testing.assert_allclose(run.states[:, 3], 0.2 * np.cos(w0 * np.arange(101) * 1e-3), atol=1e-12)
-    assert not run.states[:, 4].any()
-
-
-def test_load_swings_behind_a_self_locking_stage() -> None:
-    design = two_mass(1e-3, coupling=TIGHT, path="self-locking", friction={"load_coefficient": 0.2})
-    run = run_plant(design, np.zeros(100), start=(0.0, 0.0, 0.0, 0.0, 0.02))
-    swing = 0.02 * np.cos(np.sqrt(K / J_L) * np.arange(101) * 1e-3)
-    np.testing.assert_allclose(run.states[:, 4], swing, atol=1e-13)
-    assert np.abs(run.states[:, 3]).max() < 1e-18
-
-
-def quarter(x: float, bends: list[tuple[float, float, float]]) -> list[tuple[float, ...]]:
-    """Free swing of the reduced inertia from rest at a twist to zero, by piece: (t, w, centre, size, phase).
-
-    On a piece T = T0 + k (x - x0) the twist is centre + amplitude cos(w (t - t0) + phase).
-    """
-    t, v, made = 0.0, 0.0, []
-    for x0, T0, k in reversed([piece for piece in bends if piece[0] < x]):
-        w, centre = np.sqrt(k / REDUCED), x0 - T0 / k
-        amplitude, phase = np.hypot(x - centre, v / w), np.arctan2(-v / w, x - centre)
-        made.append((t, w, centre, amplitude, phase))
-        ends = np.arccos((x0 - centre) / amplitude)
-        t, v, x = t + (ends - phase) / w, -amplitude * w * np.sin(ends), x0
-    return [*made, (t, 0.0, 0.0, 0.0, 0.0)]
-
-
-def test_free_swing_on_a_spring_of_three_pieces() -> None:
-    """K1 to T1, K2 to T2, K3 beyond, as data sheets of strain wave gears have it."""
-    T1, K2, T2, K3 = 3.0, 500.0, 8.0, 900.0
-    bends = {"torque_1_Nm": T1, "stiffness_2_Nm_rad": K2, "torque_2_Nm": T2, "stiffness_3_Nm_rad": K3}
-    design = two_mass(1e-3, source=True, coupling=TIGHT | bends)
-    start = 0.06
-    run = run_plant(design, np.zeros(200), start=(0.0, 0.0, 0.0, start * N, 0.0))
-    x1, x2 = T1 / K, T1 / K + (T2 - T1) / K2
-    pieces = quarter(start, [(0.0, 0.0, K), (x1, T1, K2), (x2, T2, K3)])
-    assert len(pieces) == 4
-    period, wanted = 4.0 * pieces[-1][0], []
-    for t in np.arange(201) * 1e-3:
-        turn = np.mod(t, period) / period
-        near = min(turn, 1.0 - turn)  # even about every extreme, odd about every zero
-        sign, near = (1.0, near) if near <= 0.25 else (-1.0, 0.5 - near)
-        t0, w, centre, amplitude, phase = next(p for p in reversed(pieces[:-1]) if near * period >= p[0])
-        wanted.append(sign * (centre + amplitude * np.cos(w * (near * period - t0) + phase)))
-    np.testing.assert_allclose(twist_of(run), wanted, atol=1e-13)
-
-
-def rms_differences(limit: dict[str, float] | None, couplings: list[dict[str, float]]) -> list[float]:
-    """Of the motor's angle after a step, behind couplings and behind that to which they tend."""
-    drives = (changed(drive_f(), coupling=coupling) for coupling in (limit, *couplings))
-    last, *angles = (simulate(one, commands.step(0.1), 0.05).motor_angle_rad for one in drives)
-    return [float(np.sqrt(np.mean((angle - last) ** 2))) for angle in angles]
-
-
-def test_stiff_coupling_tends_to_the_rigid_drive() -> None:
-    """The difference falls with 1/k, to where rounding of a vibration of 1e6 rad/s is."""
-    stiff = [{"stiffness_Nm_rad": k, "damping_Nms_rad": 1e-4 * k, "play_rad": 0.0} for k in (1e4, 1e5, 1e6)]
-    differences = rms_differences(None, stiff)
-    assert differences[0] < 1e-3
-    assert differences[1] == pytest.approx(differences[0] / 10, rel=0.1)
-    assert differences[2] == pytest.approx(differences[1] / 10, rel=0.1)
-
-
-def test_no_play_is_the_limit_of_little_play() -> None:
-    """Without damping; the difference falls with b."""
-    differences = rms_differences(TIGHT, [IDEAL | {"play_rad": play} for play in (1e-6, 1e-8)])
-    assert differences[0] < 1e-4
-    assert differences[1] < 0.02 * differences[0]
-
-
-def test_map_of_one_line_is_c0_and_cv() -> None:
-    points = stribeck((0.0, 0.02), (50.0, 0.02 + 50 * 1e-4))
-    plain = {"dry_torque_Nm": 0.02, "viscous_Nms_rad": 1e-4, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
-    mapped = {"points": points, "load_coefficient": 0.01, "breakaway_ratio": 1.2}
-    voltages = 4.0 * np.sign(np.sin(0.2 * np.arange(80) + 0.1))
-    rigid = two_mass(1e-3, coupling=None, friction=mapped)
-    with_map = run_plant(rigid, voltages, 0.5)
-    without = run_plant(changed(rigid, friction={"points": (), **plain}), voltages, 0.5)
-    seen, wanted = (run.states[:, [0, 1, 3]] for run in (with_map, without))
-    np.testing.assert_allclose(seen, wanted, atol=1e-11 * np.abs(without.states).max())
-    assert sum(with_map.events) == sum(without.events) >= 5
-
-
 SPENT = [getattr(layout, f"ENERGY_{name}") for name in (
     "COPPER", "DRY", "VISCOUS", "DAMPING", "PARTING", "LOAD_DRY", "LOAD_VISCOUS",
     "OFFSET", "LOAD", "CONVERSION", "LOAD_OFFSET")]  # fmt: skip
@@ -217,7 +141,3 @@ def test_balance_passivity_and_the_same_motion_without(seed: int) -> None:
         scale = np.abs(without.states).max(axis=0)
         assert np.all(np.abs(run.states - without.states) <= 1e-10 * scale)
         assert run.events == without.events
-
-
-def test_state_fits_its_place() -> None:
-    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE

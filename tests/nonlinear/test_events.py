@@ -74,22 +74,18 @@ def test_several_events_in_a_tick(friction: Friction, inductance: str, delay: fl
     assert_same(design, voltages, State(motor_speed_rad_s=40.0), 2)
 
 
-def test_ringing_faster_than_the_tick() -> None:
+def test_events_of_other_drives() -> None:
     """Electromechanical resonance above Nyquist: the speed crosses zero several times in a tick."""
     design = bare_drive(replace(DRY, dry_torque_Nm=5e-4), 0.2, inductance_H=6e-3, resistance_ohm=0.005)
     assert_same(design, np.array([0.5, 0.0, -0.3, 0.2, 0.0, 0.0]), State(), 4)
-
-
-def test_events_with_a_load_that_drives_back() -> None:
+    # a load that drives back; a torque source; a start from rest without friction
     design = changed(bare_drive(UNEVEN, LONG), load={"path": "back-drivable"})
     assert_same(design, 0.6 * np.sin(np.arange(24.0)), State(), 1, load_Nm=60.0)
-
-
-def test_torque_source() -> None:
     design = bare_drive(UNEVEN, LONG, 0.3 * LONG)
     motor = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=0.1)
     design = changed(design, motor=motor, controller={"current": None})
     assert_same(design, 0.5 * np.sin(0.9 * np.arange(60.0)), State(motor_speed_rad_s=5.0), 2)
+    assert_same(bare_drive(Friction(), 1e-4), np.sin(0.3 * np.arange(100.0)), State(), 0)
 
 
 def test_breakaway_at_the_edge_of_a_tick() -> None:
@@ -101,19 +97,12 @@ def test_breakaway_at_the_edge_of_a_tick() -> None:
         assert_same(design, np.full(30, u), State(), 1)
 
 
-def test_start_from_rest_without_friction() -> None:
-    assert_same(bare_drive(Friction(), 1e-4), np.sin(0.3 * np.arange(100.0)), State(), 0)
-
-
-def test_friction_above_the_stall_torque_never_moves() -> None:
+def test_friction_above_the_stall_torque_never_moves_and_a_coasting_drive_comes_to_rest() -> None:
     run = drive_open(bare_drive(Friction(dry_torque_Nm=2.0), 1e-4), np.full(2000, 12.0), State())
     assert run.current_A[-1] == pytest.approx(12.0 / 0.055, rel=1e-12)  # stall current, 1.29 N m
     assert not run.motor_speed_rad_s.any()
     assert not run.motor_angle_rad.any()
     assert (run.events, run.stick_fraction) == (0, 1.0)
-
-
-def test_comes_to_rest_and_stays() -> None:
     run = drive_open(bare_drive(DRY, 1e-4), np.zeros(3000), State(motor_speed_rad_s=300.0))
     assert run.motor_speed_rad_s[-1] == 0.0
     assert np.ptp(run.motor_angle_rad[-100:]) == 0.0
@@ -212,10 +201,7 @@ def events_of_agreeing(design: Design) -> float:
     return events
 
 
-@pytest.mark.parametrize("name", ["ilr33-amber-compliant", "joint", "ballscrew", "fin"])
-def test_guards_of_shipped_drives(name: str) -> None:
-    assert events_of_agreeing(load_design(name)) > 0
-
-
-def test_guards_of_random_drives() -> None:
+def test_guards_of_shipped_and_random_drives() -> None:
+    for name in ("ilr33-amber-compliant", "joint", "ballscrew", "fin"):
+        assert events_of_agreeing(load_design(name)) > 0, name
     assert sum(events_of_agreeing(random_drive(seed)[0]) for seed in range(40)) > 10_000

@@ -14,7 +14,6 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.compiled import emit_c
-from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from nonlinear import Probe, Rows, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh
@@ -37,34 +36,17 @@ def test_odd_symmetry(law: str) -> None:
     assert runs[0].events == runs[1].events
 
 
-def test_scaling_of_torque_current_and_voltage() -> None:
-    """Twice R and L, half of every inertia and torque: the same motion with half the current."""
-    base, c = AMBER, 2.0  # currents and torques become 1/c, voltages and speeds stay
-    gears = [f"gear.{gear.name}.{side}_inertia" for gear in base.gears for side in ("input", "output")]
-    friction = [f"friction.{name}" for name in ("dry_torque", "viscous", "load_coefficient")]
-    less = ["motor.rotor_inertia", *gears, "load.inertia", *friction, "control.velocity.gain"]
-    factors = dict.fromkeys([*less, "limits.peak_current"], 1.0 / c)
-    factors |= dict.fromkeys(("motor.resistance", "motor.inductance", "control.current.gain"), c)
-    values = {path: parameter_value(base, path) * factor for path, factor in factors.items()}
-    scaled = with_values(base, values, check=False)
-    a, b = (simulate(d, commands.sine(0.05, 3.0), 0.8, 6.0) for d in (base, scaled))
-    assert a.limits["current"].active
-    np.testing.assert_allclose(b.current_A * c, a.current_A, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(b.motor_speed_rad_s, a.motor_speed_rad_s, rtol=0, atol=1e-7)
-    np.testing.assert_allclose(b.voltage_V, a.voltage_V, rtol=0, atol=1e-9)
-
-
-def test_a_narrow_tanh_tends_to_coulomb() -> None:
+def test_a_narrow_tanh_tends_to_coulomb_knows_no_rest_and_is_of_fourth_order() -> None:
     drives = (AMBER, *map(smooth, (4.0, 0.4, 0.04)))
     exact, *runs = (simulate(one, commands.sine(0.01, 2.0), 0.5, 8.0).output_angle_rad for one in drives)
     errors = [np.abs(run - exact).max() for run in runs]
     assert errors[1] < errors[0] / 5.0
     assert errors[2] < errors[1] / 5.0
     assert errors[2] < 2e-7
-
-
-def test_fourth_order() -> None:
-    """Of runs with 2**level sub-steps in every tick."""
+    run = simulate(smooth(), commands.hold(), 0.01)
+    assert run.stick_fraction == 0.0
+    assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
+    # runs with 2**level sub-steps in every tick
     rows = Rows.of(smooth(2.0), 4)
     rows["ticks"], rows["tanh_level"] = 120, [7, 2, 3, 4]
     rows.sine("command", 0.002, 100.0)
@@ -100,12 +82,6 @@ def test_tanh_against_an_integrator(tolerance: float) -> None:
     assert np.abs(run.motor_speed_rad_s - speeds).max() < 10.0 * tolerance * f.smoothing_speed_rad_s + 1e-9
 
 
-def test_the_smoothed_law_knows_no_rest() -> None:
-    run = simulate(smooth(), commands.hold(), 0.01)
-    assert run.stick_fraction == 0.0
-    assert simulate(AMBER, commands.hold(), 0.01).stick_fraction == 1.0
-
-
 BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, seconds, load, what happens in it
     ("ilr33-amber", 0.0002, 3.0, 1.0, 8.0, "stick"),
     ("ilr33-amber", 0.0873, 1.0, 1.0, 4.0, "speed"),
@@ -116,9 +92,7 @@ BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, secon
 
 
 @pytest.mark.parametrize(("name", "size", "frequency", "seconds", "load", "what"), BALANCED)
-def test_balance(
-    name: str, size: float | None, frequency: float, seconds: float, load: float, what: str
-) -> None:
+def test_balance(name, size, frequency, seconds, load, what) -> None:
     """And what is asked of the energies does not change the motion."""
     design = load_design(name)
     size = size or design.validation.full_deflection_rad / 4
@@ -133,7 +107,7 @@ def test_balance(
         assert run.stick_fraction > 0.1 if what == "stick" else run.limits[what].fraction > 0.1
 
 
-def test_asymmetric_back_drivable_with_fractional_delay() -> None:
+def test_balance_with_every_feature_and_every_loss_of_a_steady_speed() -> None:
     friction = {
         "breakaway_ratio": 1.3, "dry_torque_reverse_Nm": 4e-3, "viscous_reverse_Nms_rad": 1e-5,
         "offset_torque_Nm": 5e-4,
@@ -147,9 +121,6 @@ def test_asymmetric_back_drivable_with_fractional_delay() -> None:
     assert abs(run.energy.conversion_J) > 1e-3
     assert abs(run.energy.output_work_J) > 1e-6
     assert run.events > 5
-
-
-def test_every_loss_of_a_steady_speed() -> None:
     run = simulate(AMBER, commands.ramp(600.0 / AMBER.total_ratio), 2.0, 8.0, energy=True)
     energy, turned = run.energy, run.final.motor_angle_rad
     assert energy.dry_friction_J == pytest.approx((2.25e-3 + 8 * 1.34e-3) * turned, rel=1e-9)
@@ -165,14 +136,11 @@ def points() -> list[float]:
     return np.concatenate([*drawn, *sides]).tolist()
 
 
-def test_it_is_within_an_ulp_of_the_hyperbolic_tangent() -> None:
+def test_it_is_within_an_ulp_of_the_hyperbolic_tangent_odd_and_rising() -> None:
     with mpmath.workprec(140):
         for x in points():
             exact = mpmath.tanh(x)
             assert abs(tanh(x) - exact) < 1.1 * math.ulp(float(exact)), x
-
-
-def test_it_is_odd_rises_and_is_its_argument_where_that_is_small() -> None:
     values = [tanh(x) for x in sorted(points())]
     assert all(after - before > -1.2e-16 for before, after in itertools.pairwise(values))  # an ulp
     assert all(tanh(-x) == -tanh(x) for x in points())

@@ -41,28 +41,24 @@ def test_a_worm_before_a_chain_is_accepted_and_the_last_gear_is_meant_where_noth
             with_overrides(AMBER, {**CHAIN, **wrong})
 
 
-@pytest.mark.parametrize("load_Nm", [4.0, -4.0])
-def test_the_motor_feels_the_load_as_friction_only(load_Nm: float) -> None:
-    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w."""
-    design = steering()
-    rate = radians(5.0)
+@pytest.mark.parametrize(("load_Nm", "point"), [(4.0, "driving"), (-4.0, "driven")])
+def test_the_motor_feels_the_load_as_friction_only(load_Nm: float, point: str) -> None:
+    """At a constant speed T_s = -M/N_r, and kM i = C0 + CM N_r |T_s| + Cv w = C0 + CM |M| + Cv w.
+
+    Of the linear one dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed.
+    """
+    design, rate = steering(), radians(5.0)
     run = simulate(design, commands.ramp(rate_rad_s=rate), 1.0, load_Nm=load_Nm)
     friction, kM = design.friction, design.motor.torque_constant_Nm_A
-    w = rate * design.total_ratio
-    wanted = (friction.dry_torque_Nm + friction.load_coefficient * 4.0 + friction.viscous_Nms_rad * w) / kM
+    w, CM = rate * design.total_ratio, friction.load_coefficient
+    wanted = (friction.dry_torque_Nm + CM * 4.0 + friction.viscous_Nms_rad * w) / kM
     assert np.mean(run.current_A[int(0.8 * len(run.time_s)) :]) == pytest.approx(wanted, rel=1e-6)
     twist = run.motor_angle_rad[-1] / 2376.0 - 2.0 * run.output_angle_rad[-1]
     assert twist == pytest.approx(-load_Nm / 2.0 / 50.0, rel=1e-6)
-
-
-@pytest.mark.parametrize(("point", "sign"), [("driving", 1.0), ("driven", -1.0)])
-def test_the_linear_motor_feels_the_spring_through_its_friction_only(point: str, sign: float) -> None:
-    """dw/dt = ... -+ CM N_r k twist/J_m, by the side on which the coupling is pressed."""
-    design = steering()
     system = plant(design, "ideal", operating_point=point)
     entry = system.A[system.state_labels.index("w"), system.state_labels.index("twist")]
-    J_m, CM = design.motor_side_inertia_kgm2, design.friction.load_coefficient
-    assert entry == pytest.approx(-sign * CM * 2.0 * 50.0 / J_m, rel=1e-12)
+    felt = np.sign(load_Nm) * CM * 2.0 * 50.0 / design.motor_side_inertia_kgm2
+    assert entry == pytest.approx(-felt, rel=1e-12)
 
 
 TICK = 1e-3
@@ -79,21 +75,21 @@ def _integrator(position: PositionLoop | None) -> Design:
     )  # fmt: skip
 
 
-def _sampled_motion(design: Design, voltage_V: np.ndarray) -> np.ndarray:
-    """Speed at the ticks under voltages held over them: the sum of what each tick adds."""
-    step = design.effective_motor.source_gain_Nm_V * TICK / design.inertia_kgm2
-    return np.concatenate([[0.0], step * np.cumsum(voltage_V)[:-1]])
-
-
-def test_the_bus_limits_the_voltage_at_each_tick() -> None:
+def test_the_bus_limits_the_voltage_at_each_tick_and_a_constant_one_changes_nothing() -> None:
     design = _integrator(None)
     wanted = 9.0 * np.sin(6.0 * TIME)
     run = simulate(design, commands.sampled(TIME, wanted), 1.0, supply=commands.sampled(TIME, BUS))
     applied = np.clip(wanted, -BUS, BUS)
     assert np.any(applied != wanted)
     np.testing.assert_allclose(run.voltage_V, applied, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(run.motor_speed_rad_s, _sampled_motion(design, applied), atol=1e-9)
+    step = design.effective_motor.source_gain_Nm_V * TICK / design.inertia_kgm2  # of a volt over a tick
+    speed = np.concatenate([[0.0], step * np.cumsum(applied)[:-1]])
+    np.testing.assert_allclose(run.motor_speed_rad_s, speed, atol=1e-9)
     assert run.limits["voltage"].fraction == pytest.approx(np.mean(applied != wanted))
+    command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
+    plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)
+    np.testing.assert_array_equal(plain.output_angle_rad, supplied.output_angle_rad)
+    np.testing.assert_array_equal(plain.limit_flags, supplied.limit_flags)
 
 
 def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> None:
@@ -113,16 +109,6 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     assert run.limits["voltage"].fraction > 0.0
     np.testing.assert_allclose(run.voltage_V, expected, rtol=0, atol=1e-9)
     assert run.final.motor_angle_rad == pytest.approx(angle, rel=1e-9)
-
-
-def test_a_constant_supply_at_the_nominal_voltage_changes_nothing() -> None:
-    command, nominal = commands.step(0.05), commands.sampled([0.0, 0.1], [AMBER.limits.voltage_V] * 2)
-    plain, supplied = simulate(AMBER, command, 0.1), simulate(AMBER, command, 0.1, supply=nominal)
-    np.testing.assert_array_equal(plain.output_angle_rad, supplied.output_angle_rad)
-    np.testing.assert_array_equal(plain.limit_flags, supplied.limit_flags)
-
-
-def test_a_supply_that_cannot_be_is_refused() -> None:
     series = commands.sampled([0.0, 0.1], [12.0, 11.0])
     with pytest.raises(InputError, match="without a current loop"):
         simulate(AMBER, commands.hold(0.0), 0.1, supply=series, supply_scales=True)

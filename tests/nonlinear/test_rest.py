@@ -1,5 +1,6 @@
 """The judge of rest, against closed forms, plain long runs, and drives described in words."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -7,16 +8,21 @@ import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design import Design, with_values
+from analyses.failures import Asked, failures
 from analyses.friction_effects import friction_effects
-from analyses.motion.settling import conduct, settle
+from analyses.limit_cycles.run import limit_cycles
+from analyses.motion.settling import Settling, conduct, counted, ending_of, settle, words
+from analyses.validation import validate
+from analyses.validation.settings import QUICK
 from nonlinear import Rows, State, commands, simulate
 from nonlinear._kernels import layout as at
 from nonlinear.bench.operating_motion import quiet
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.settling.drift import overload, ticks_until_it_acts
 from nonlinear.settling.rest import first_motion_s, judge
+from reports.sections.cycles import summary
+from reports.sections.names import fine_unit
 from tests.changed import changed
-from tests.nonlinear.rest_agreement import contradictions
 from tests.validation.random_drives import full_drive, is_stable
 
 HERE = Path(__file__).parent
@@ -34,7 +40,7 @@ def plain_run(design: Design, step: float, ticks: float, window: float, load_Nm:
     return rows.run()
 
 
-def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
+def test_pieces_of_a_run_are_the_run_and_the_same_state_has_the_same_end() -> None:
     whole = simulate(JOINT, commands.step(0.02), 0.1)
     rows = Rows.of(JOINT)
     rows.step("command", 0.02)
@@ -42,6 +48,10 @@ def test_pieces_of_a_run_are_the_run_bit_by_bit() -> None:
     pieces = [drive.advance(n) for n in (8, 1000, whole.time_s.size - 1008)]
     output = np.concatenate([piece.columns[1] for piece in pieces])
     assert (output == whole.output_angle_rad).all()
+    start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
+    rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
+    assert rest.comes_to_rest
+    assert rest.error == pytest.approx(0.0, abs=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -62,7 +72,7 @@ def test_only_what_stays_is_judged(command: commands.Command, held: bool) -> Non
         assert rest.verdict == "at rest"
 
 
-def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
+def test_a_slow_stick_slip_cycle_and_waiting_take_their_own_time_and_little_work() -> None:
     """Breakaway 1.5, an integral of 100 s: the closed form of the stick foresees some hours a period."""
     values = {"friction.breakaway_ratio": 1.5, "control.velocity.integral_time": 100.0}
     design = with_values(AMBER, values)
@@ -73,10 +83,7 @@ def test_a_slow_stick_slip_cycle_takes_its_own_time_and_little_work() -> None:
     assert rest.frequency_hz == pytest.approx(cycles.stick_slip.frequency_hz, rel=0.03)
     assert rest.amplitude == pytest.approx(cycles.stick_slip.output_amplitude_rad, rel=0.06)
     assert rest.work < 1e-3 * rest.after_s / design.controller.period_s
-
-
-def test_waiting_is_that_of_the_closed_form() -> None:
-    """A step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work."""
+    # a step of 0.1 of the threshold moves after Tn (1/0.1 - 1), an hour and a half; 1e5 ticks of work
     design = with_values(AMBER, {"control.velocity.integral_time": 600.0})
     threshold = friction_effects(AMBER).points[0].threshold
     size = 0.1 * threshold.static.forward_rad
@@ -95,33 +102,25 @@ def protected(current_A: float, memory: float, overloaded: float = 0.0) -> tuple
     return p, s
 
 
-def test_the_overload_memory_over_a_leap_is_its_own_recursion() -> None:
+def test_overload_over_a_leap_and_when_it_acts_are_those_of_its_own_recursion() -> None:
+    """It trips at 1, lets go below 0.9; one tick before it has not."""
     p, s = protected(-1.0, 0.3)
     x, n = 0.3, 5000
     for k in range(n):
         x += 3e-4 * (((-1.0 + 3.5 * k / n) / 5.0) ** 2 - x)
     assert overload(p, s, 2.5, n) == pytest.approx(x, rel=1e-9)
     assert overload(p, s, -1.0, 0) == 0.3
+    never = [(4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0)]  # the last values lie this side of it
+    for begin in [(6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0), *never]:
+        (current_A, x, overloaded), (p, s), ticks = begin, protected(*begin), 0
+        last = (current_A / 5.0) ** 2
+        acts = last < 0.9 if overloaded else last > 1.0
+        while acts and (x >= 0.9 if overloaded else x < 1.0):
+            x, ticks = x + 3e-4 * (last - x), ticks + 1
+        assert ticks_until_it_acts(p, s) == max(ticks - 1, 0), begin
 
 
-@pytest.mark.parametrize(
-    ("current_A", "start", "overloaded"),
-    [
-        (6.0, 0.0, 0.0), (5.5, 0.99, 0.0), (4.0, 1.3, 1.0), (0.0, 0.91, 1.0),
-        (4.9, 0.5, 0.0), (4.9, 1.3, 1.0), (5.0, 0.5, 0.0),  # never: the last values lie this side of it
-    ],
-)  # fmt: skip
-def test_overload_acts_when_its_own_recursion_does(current_A: float, start: float, overloaded: float) -> None:
-    """Trips at 1, lets go below 0.9; one tick before it has not."""
-    p, s = protected(current_A, start, overloaded)
-    x, last, ticks = start, (current_A / 5.0) ** 2, 0
-    acts = last < 0.9 if overloaded else last > 1.0
-    while acts and (x >= 0.9 if overloaded else x < 1.0):
-        x, ticks = x + 3e-4 * (last - x), ticks + 1
-    assert ticks_until_it_acts(p, s) == max(ticks - 1, 0)
-
-
-def test_overload_on_its_way_is_leapt_over() -> None:
+def test_overload_on_its_way_is_leapt_over_and_not_waited_for_where_it_stays() -> None:
     """The joint holds 60 N m for half a minute before the protection trips: the plain run says when."""
     rest, Ts = settle(QUIET, 60.0, 0.1309).rest, QUIET.controller.period_s
     assert rest.verdict == "at rest"
@@ -130,12 +129,14 @@ def test_overload_on_its_way_is_leapt_over() -> None:
     trips_s = Ts * float(run.outs[0, at.OUT_LIMIT_FIRST + at.LIMITERS.index("overload")])
     assert trips_s < rest.after_s < 1.1 * trips_s
     assert rest.work < 200_000
-
-
-def test_without_limits_an_unstable_drive_diverges() -> None:
-    loud = with_values(AMBER, {"control.position.gain": 4000.0})
-    run = simulate(loud, commands.step(0.01), 0.001, limits_on=False)
-    assert judge(run.running).verdict == "diverging"
+    # 60 N m ask for more than the continuous current: the protection trips and never releases
+    rest = settle(QUIET, 60.0, 1e-3 * FULL).rest
+    assert rest.verdict == "at rest"
+    assert "overload" in rest.limited
+    after = rest.after_s / QUIET.controller.period_s
+    run = plain_run(QUIET, 1e-3 * FULL, 2.0 * after, 1.2 * after, 60.0)
+    assert np.ptp(run.span("output_angle_rad")) < 1e-12
+    assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
 
 
 def test_a_drive_that_its_load_carries_off_diverges() -> None:
@@ -144,6 +145,9 @@ def test_a_drive_that_its_load_carries_off_diverges() -> None:
     rest = settle(JOINT, -most, 0.01).rest
     assert rest.verdict == "diverging"
     assert "current" in rest.limited
+    loud = with_values(AMBER, {"control.position.gain": 4000.0})
+    run = simulate(loud, commands.step(0.01), 0.001, limits_on=False)
+    assert judge(run.running).verdict == "diverging"
 
 
 def test_a_gimbal_with_a_spring_and_a_steering_motor_with_play_hunt() -> None:
@@ -175,31 +179,24 @@ def test_the_joint_crosses_its_friction_every_209_s() -> None:
     low, high = plain_run(JOINT, 0.1 * FULL, 440.0 / Ts, 215.0 / Ts).span("output_angle_rad")
     assert rest.amplitude == pytest.approx(0.5 * float(high[0] - low[0]), rel=0.02)
     assert rest.frequency_hz == pytest.approx(1.0 / 209.3, rel=0.01)
+    # from other starts slips minutes apart, several a cycle: figures of plain runs over 900 s
+    for part, period_s, amplitude_deg in ((0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)):
+        rest = settle(JOINT, 0.0, part * FULL).rest
+        assert rest.verdict == "limit cycle"
+        assert 1.0 / rest.frequency_hz == pytest.approx(period_s, rel=2e-3)
+        assert DEG * rest.amplitude == pytest.approx(amplitude_deg, rel=5e-3)
+        assert rest.work < 1_000_000
 
 
 PLAIN_TICKS = 300_000
 
 
-def test_a_filter_s_rounding_ends_no_leap() -> None:
+def test_a_filter_s_rounding_ends_no_leap_and_hops_of_a_billionth_are_rest() -> None:
     """A notch at 37 Hz sums up rounding at 8 kHz; errors are integrated for minutes between slips."""
     rest = settle(QUIET, 0.0, 1e-3 * FULL).rest
     assert rest.verdict == "limit cycle"
     assert rest.work < 1_800_000
-
-
-def test_overload_that_stays_is_not_waited_for() -> None:
-    """60 N m ask for more than the continuous current: the protection trips and never releases."""
-    rest = settle(QUIET, 60.0, 1e-3 * FULL).rest
-    assert rest.verdict == "at rest"
-    assert "overload" in rest.limited
-    after = rest.after_s / QUIET.controller.period_s
-    run = plain_run(QUIET, 1e-3 * FULL, 2.0 * after, 1.2 * after, 60.0)
-    assert np.ptp(run.span("output_angle_rad")) < 1e-12
-    assert run.window_limit_fraction("overload")[0] == pytest.approx(1.0, abs=0.15)
-
-
-def test_hops_of_a_billionth_of_the_step_are_rest() -> None:
-    """An integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands."""
+    # an integral that a count keeps from zero moves 4.6 mm by 3e-13 m a day: a plain run stands
     design = full_drive(2000019)
     step = design.validation.full_deflection_rad
     assert settle(design, 0.0, step).rest.verdict == "at rest"
@@ -230,27 +227,34 @@ def test_random_drives_against_a_plain_run(seed: int) -> None:
         assert span == pytest.approx(2.0 * rest.amplitude, rel=0.25)
 
 
+def ends_alike(design: Design, settlings: Iterable[Settling]) -> None:
+    """Whether steps end as runs of `simulate` of two lengths do."""
+    full, tick_s = design.validation.full_deflection_rad, design.controller.period_s
+    for one in settlings:
+        for ticks in (1_000, 20_000):
+            asked = (commands.step(one.amplitude_rad), ticks * tick_s, one.load_Nm)
+            run = simulate(design, *asked, raise_on_failure=False)
+            rest = None if run.running is None else judge(run.running)
+            verdict = "none" if rest is None else counted(rest, full).verdict
+            assert verdict == one.rest.verdict, (one, ticks)
+
+
 @pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
 def test_all_who_ask_get_one_answer(seed: int) -> None:
-    """`cycles`, `validate`, `failures`, `simulate` after two lengths."""
-    assert not list(contradictions(stable_position_drive(seed)))
-
-
-def test_the_same_state_has_the_same_end_however_it_is_reached() -> None:
-    start = State(motor_angle_rad=0.01 * AMBER.total_ratio)
-    rest = judge(simulate(AMBER, commands.hold(0.01), 0.01, initial=start).running)
-    assert rest.comes_to_rest
-    assert rest.error == pytest.approx(0.0, abs=1e-12)
-
-
-@pytest.mark.parametrize(("part", "period_s", "amplitude_deg"), [(0.05, 58.4, 0.01746), (0.5, 303.0, 0.0311)])
-def test_a_joint_that_hunts_for_minutes(part: float, period_s: float, amplitude_deg: float) -> None:
-    """Slips minutes apart, several a cycle, one cycle for each start: figures of plain runs over 900 s."""
-    rest = settle(JOINT, 0.0, part * FULL).rest
-    assert rest.verdict == "limit cycle"
-    assert 1.0 / rest.frequency_hz == pytest.approx(period_s, rel=2e-3)
-    assert DEG * rest.amplitude == pytest.approx(amplitude_deg, rel=5e-3)
-    assert rest.work < 1_000_000
+    """`cycles`, `validate`, `failures`, `simulate` after two lengths; the words of the report."""
+    design = stable_position_drive(seed)
+    waited, checked = limit_cycles(design), validate(design, QUICK)
+    assert checked.settlings == waited.rests
+    assert (waited.verdict, waited.hunting) == (checked.rest, checked.hunting)
+    ends_alike(design, waited.rests)
+    watched = 1_000 * design.controller.period_s
+    ends_alike(design, failures(design, Asked.of(design, watched_s=watched, detection_s=watched)).before)
+    swing, said = waited.hunting, (summary(waited), checked.words)
+    if swing is None:
+        assert not any("not come to rest" in text for text in said)
+    else:
+        wanted = (words(swing.rest, *fine_unit(design.axis)), ending_of(design, swing))
+        assert all(part in text for text, part in zip(said, wanted, strict=True))
 
 
 def test_a_stiff_drive_is_left_where_its_work_ends() -> None:

@@ -158,10 +158,6 @@ NAMED = [
 ]
 
 
-def kinds_of(drive: Drive) -> np.ndarray:
-    return state_kinds(drive._p)
-
-
 def drives() -> list[model.Design]:
     """Every shipped drive, random cascades, two masses with play, stick on both sides, a supply, noise."""
     rubbing = {"dry_torque_Nm": 0.02, "load_coefficient": 0.01}
@@ -179,22 +175,17 @@ def command(tick: int) -> float:
     return 0.3 * np.sin(0.2 * tick) + 0.01 * tick
 
 
-def test_every_number_has_a_kind() -> None:
+def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space() -> None:
+    """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
+    assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE
     assert all(name in part.__annotations__ for part, name in NAMED)
     for design in drives():
-        drive = Drive(design)
-        kinds = kinds_of(drive)
-        assert kinds.shape == drive.get().shape
-        assert set(kinds) <= set(KINDS)
-        lines = slice(layout.S_QUEUE, int(drive._p[layout.AT_WORK]))  # delay line, angles, average, rings
-        assert set(kinds[lines]) == {CONTINUOUS}
-
-
-def test_nothing_goes_on_from_notes_and_work_space() -> None:
-    """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
-    for design in drives():
         plain, spoilt = Drive(design), Drive(design)
-        kinds = kinds_of(plain)
+        kinds = state_kinds(plain._p)
+        assert kinds.shape == plain.get().shape
+        assert set(kinds) <= set(KINDS)
+        lines = slice(layout.S_QUEUE, int(plain._p[layout.AT_WORK]))  # delay line, angles, average, rings
+        assert set(kinds[lines]) == {CONTINUOUS}
         held = np.isin(kinds, (NOTE, WORK))
         held &= design.instruments == model.Instruments()  # noise goes on from what counts as a note
         for k in range(STATE_TICKS):
@@ -221,7 +212,7 @@ def test_something_goes_on_from_every_continuous_number() -> None:
     idle = {getattr(part, name): name for part, name in NAMED}
     for design in drives():
         drives_of_it = [Drive(design) for _ in range(3)]
-        kinds = kinds_of(drives_of_it[0])
+        kinds = state_kinds(drives_of_it[0]._p)
         idle = {place: name for place, name in idle.items() if kinds[place] == CONTINUOUS}
         for k in range(0, STATE_TICKS, 4):
             idle = {place: name for place, name in idle.items() if not moves(*drives_of_it, place, k)}

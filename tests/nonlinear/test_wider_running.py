@@ -52,10 +52,7 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
         x = solve_ivp(rate, (0.0, Ts), x, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
     for k, values in enumerate((run.current_A, run.motor_speed_rad_s, run.motor_angle_rad)):
         assert np.abs(values - result[:, k]).max() < 1e-9 * np.abs(result[:, k]).max()
-
-
-def test_j9_the_slope_of_the_design_acts_without_being_told() -> None:
-    """Without integrals a slope leaves th/(N ref) = g/(g - slope/N^2), g the torque per position error."""
+    # J9: without integrals a slope leaves th/(N ref) = g/(g - slope/N^2), g the torque per position error
     load = {"path": "back-drivable", "moment_slope_Nm_rad": -6000.0}
     control = {"velocity": {"integral_time_s": None}}
     design = changed(AMBER, load=load, friction=FREE, controller=control)
@@ -142,7 +139,7 @@ def test_the_overload_protection_is_not_called_the_current_limit(amperes: float,
     assert not (run.limit_active("current") & run.limit_active("overload")).any()
 
 
-def test_noise_resolution_and_their_seeds() -> None:
+def test_noise_resolution_jitter_and_their_seeds() -> None:
     """A torque drive that is commanded 0 shows its measured current as -u over its gain."""
     design = torque_drive(GAIN, None, voltage_V=inf)
     ticks, noises = 20_000, [model.Instruments(current_noise_A=0.1, seed=s) for s in (3, 3, 4)]
@@ -161,10 +158,7 @@ def test_noise_resolution_and_their_seeds() -> None:
     measured = run.reference_rad - run.voltage_V / GAIN
     assert np.abs(measured / 0.25 - np.round(measured / 0.25)).max() < 1e-9
     assert np.abs(measured - run.current_A).max() <= 0.125 + 1e-12
-
-
-def test_jitter_and_angle_noise() -> None:
-    """A source that cannot be felt, at constant speed: the position loop shows what it reads."""
+    # a source that cannot be felt, at constant speed: the position loop shows what it reads
     Ts, w, ticks = 1e-3, 40.0, 4000
     place = model.PositionLoop(gain=1.0)
     design = model.Design(
@@ -207,7 +201,7 @@ def test_profile_keeps_its_limits_and_arrives() -> None:
             assert np.abs(third).max() < 200.0 * (1 + 1e-4)
 
 
-def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
+def test_profile_leaves_a_command_within_its_limits_untouched_and_holds_that_of_a_speed() -> None:
     """A cosine from its crest, where the start keeps the limits as well."""
     slow = replace(AMBER, command=model.Command(rate_rad_s=0.06))
     shaped = replace(AMBER, command=model.Command(rate_rad_s=0.2, acceleration_rad_s2=4.0))
@@ -218,9 +212,6 @@ def test_profile_leaves_a_command_within_its_limits_untouched() -> None:
         assert np.array_equal(run.output_angle_rad, free.output_angle_rad)
         assert run.limits["profile"].fraction == 0.0
     assert simulate(shaped, commands.step(0.1), 0.3).limits["profile"].active
-
-
-def test_the_command_of_a_speed_drive_keeps_its_acceleration() -> None:
     design = changed(AMBER, friction=FREE, controller={"position": None})
     slow = replace(design, command=model.Command(acceleration_rad_s2=2.0))
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio

@@ -13,6 +13,7 @@ from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_survey import LoopSurvey
 from nonlinear import commands, simulate
 from reports.charts import paint, style
+from tests.refusals import refused
 
 
 @pytest.fixture(autouse=True)
@@ -40,18 +41,14 @@ def test_a_bode_figure_shows_the_loop_and_its_margins(form: str) -> None:
             assert x.max() <= 0.5 / loop.period_s
 
 
-def test_all_loops_in_one_figure_and_axes_of_ones_own() -> None:
+def test_all_loops_in_one_figure_axes_of_ones_own_and_steps_that_end_at_one() -> None:
     loops = assemble_loops("ilr33-amber")
     both = loops.plot_bode()
     assert [text.get_text() for text in both[0].get_legend().get_texts()] == list(loops.present)
     figure, own = plt.subplots(2, 1)
     assert loops.position.plot_bode(own)[0] is own[0]
     assert loops.velocity.plot_nyquist().figure is not figure
-    with pytest.raises(InputError, match="allowed: 2 of matplotlib's axes"):
-        loops.position.plot_bode(axes=own[0])
-
-
-def test_steps_of_sampled_and_continuous_loops_end_at_one() -> None:
+    refused(loops.position.plot_bode, axes=own[0], words="allowed: 2 of matplotlib's axes")
     for form in ("sampled", "continuous", "ideal"):
         line = assemble_loops("ilr33-amber", form=form).velocity.plot_step(0.1).lines[0]
         assert line.get_ydata()[-1] == pytest.approx(1.0, abs=2e-2)
@@ -90,11 +87,10 @@ def test_the_border_and_the_map() -> None:
     frame = map_.to_pandas()
     assert set(frame["cause"]) == present
     assert len(frame) == 20
-    with pytest.raises(InputError, match="nothing limits"):
-        LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map()
+    refused(LoopSurvey(design, loops, {"sampled": {}}, {}, (), {}, None).plot_map, words="nothing limits")
 
 
-def test_cells_keep_their_colours_when_some_are_missing() -> None:
+def test_cells_keep_their_colours_when_some_are_missing_and_pages_have_the_same() -> None:
     kind = np.array([[0, 2], [2, 3]])
     panel = plot_map(np.array([1.0, 10.0]), np.array([1.0, 2.0]), kind, ("none", "a", "b", "c"))
     drawn = panel.collections[0]
@@ -102,9 +98,6 @@ def test_cells_keep_their_colours_when_some_are_missing() -> None:
     assert [tuple(np.round(drawn.cmap(k)[:3], 2)) for k in (1, 2)] == [
         tuple(round(int(COLOURS[k][i : i + 2], 16) / 255, 2) for i in (1, 3, 5)) for k in (2, 3)
     ]
-
-
-def test_pages_and_notebooks_have_the_same_colours() -> None:
     assert set(COLOURS) == {paint.COLOURS[name] for name in (*style.SERIES, "ink", "muted")}
 
 
@@ -115,5 +108,4 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     with pytest.raises(InputError, match=told):
         run.to_pandas()
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
-    with pytest.raises(InputError, match=r"plotting needs matplotlib"):
-        plot_bode(assemble_loops("ilr33-amber").velocity.open_loop)
+    refused(plot_bode, assemble_loops("ilr33-amber").velocity.open_loop, words="plotting needs matplotlib")

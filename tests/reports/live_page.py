@@ -28,6 +28,13 @@ FIGURES = {  # of the page: of `margins --json`
     "overshoot": "overshoot_percent",
     "settling_time": "settling_time_s",
 }
+ON_CURVE = """(node) => { // of its middle part, and under nothing else
+    for (const part of [0.5, 0.6, 0.7, 0.8, 0.9, 0.4, 0.3]) {
+        const place = node.getPointAtLength(part * node.getTotalLength());
+        const at = place.matrixTransform(node.getScreenCTM());
+        if (document.elementFromPoint(at.x, at.y) === node) return [at.x, at.y];
+    }
+}"""
 RESPONSE = ("bandwidth", "overshoot", "settling_time")
 
 
@@ -108,6 +115,16 @@ class Live:
     def sliders(self) -> dict[str, dict[str, Any]]:
         """What its sliders move, by path."""
         return {one["path"]: one for one in self.evaluate(f"{LIVE}.keys")}
+
+    def spot(self, selector: str, across: float = 0.5, down: float = 0.5) -> tuple[float, float]:
+        """A place within a part of the page, which is scrolled to."""
+        self.locator(selector).scroll_into_view_if_needed()
+        box = self.locator(selector).bounding_box()
+        return box["x"] + across * box["width"], box["y"] + down * box["height"]
+
+    def grab(self, chart: str) -> tuple[float, float]:
+        """A place on the curve of a chart that can be taken hold of."""
+        return tuple(map(round, self.locator(f'[data-chart="{chart}"] path.grab').evaluate(ON_CURVE)))
 
     def saved(self, path: Path) -> Path:
         with self.expect_download() as waiting:

@@ -116,11 +116,8 @@ def test_a_limit_that_acts_is_shaded_where_it_acts(page: Page) -> None:
 
 
 def test_a_click_on_the_map_plays_that_sine(page: Page) -> None:
-    svg = page.locator('[data-chart="border"] .plot')
-    svg.scroll_into_view_if_needed()
-    box = svg.bounding_box()
     ask(page, "step", Duration=0.0)
-    at = (box["x"] + 0.35 * box["width"], box["y"] + 0.4 * box["height"])
+    at = page.spot('[data-chart="border"] .plot', 0.35, 0.4)
     page.settled(lambda: page.mouse.click(*at))
     assert page.input_value(".run-kind") == "sine"
     trial = page.evaluate(

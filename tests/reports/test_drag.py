@@ -12,13 +12,6 @@ from actuator_lti.design import with_values
 from actuator_lti.design.control import Filter
 from tests.changed import changed
 
-MIDDLE = """(node) => {
-    for (const part of [0.5, 0.6, 0.7, 0.8, 0.9, 0.4, 0.3]) {
-        const place = node.getPointAtLength(part * node.getTotalLength());
-        const at = place.matrixTransform(node.getScreenCTM());
-        if (document.elementFromPoint(at.x, at.y) === node) return [at.x, at.y];
-    }
-}"""
 # px on the screen to units of an axis of a panel: [per px along x (ratio if logarithmic), along y]
 SCALE = """([chart, k]) => {
     const svg = document.querySelector(`[data-chart="${chart}"] .plot`);
@@ -62,8 +55,8 @@ def decibels(page: Page, pixels: float) -> float:
 
 
 def test_the_magnitude_is_dragged_by_decibels_and_undone_in_one_step(page: Page) -> None:
-    before, grab = page.read()["velocity"], page.locator('[data-chart="bode"] path.grab')
-    drag(page, tuple(grab.evaluate(MIDDLE)), 0.0, -8.0)
+    before = page.read()["velocity"]
+    drag(page, page.grab("bode"), 0.0, -8.0)
     by = decibels(page, -8.0)
     assert by > 3.0
     assert page.field("control.velocity.gain") == pytest.approx(0.12 * 10.0 ** (by / 20.0), rel=2e-3)
@@ -97,8 +90,7 @@ def test_the_curve_that_moves_waits_for_no_run(page: Page) -> None:
 
 
 def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
-    grab = page.locator('[data-chart="nyquist"] path.grab')
-    x, y = grab.evaluate(MIDDLE)
+    x, y = page.grab("nyquist")
     origin = page.evaluate(
         """() => { const svg = document.querySelector('[data-chart="nyquist"] .plot');
         const told = svg.querySelector(".panel").dataset;
@@ -116,8 +108,7 @@ def test_the_nyquist_curve_is_dragged_outwards(page: Page) -> None:
 
 def test_the_corner_and_the_notch_are_moved_by_their_handles(page: Page) -> None:
     def middle(name: str) -> tuple[float, float]:
-        box = page.locator(f'[data-chart="bode"] circle[data-name="{name}"]').bounding_box()
-        return box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+        return page.spot(f'[data-chart="bode"] circle[data-name="{name}"]')
 
     low, high, apart = page.evaluate(SCALE, ["bode", 1])[0]
     ratio = (high / low) ** (15.0 / apart)

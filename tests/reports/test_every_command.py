@@ -27,24 +27,19 @@ def test_every_command_is_listed() -> None:
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_command_speaks_json_and_takes_changes(name: str) -> None:
+def test_every_command_speaks_json_takes_changes_and_shows_an_example_that_it_takes(name: str) -> None:
+    """Examples of its help are cut at the next sentence; click itself parses what is left."""
     command = COMMANDS[name]
     options = {option for parameter in command.params for option in parameter.opts}
     assert {"--json", *(["--set"] if name not in NO_DESIGN else [])} <= options
-    assert command.help
     for parameter in command.params:
         assert getattr(parameter, "help", None), f"{name}: {parameter.name} has no help"
-
-
-@pytest.mark.parametrize("name", sorted(COMMANDS))
-def test_every_help_has_an_example_that_the_command_takes(name: str) -> None:
-    """Cut at the next sentence; click itself parses what is left."""
-    text = COMMANDS[name].help.partition("Try: ")[2].partition("\n\n")[0]
+    text = command.help.partition("Try: ")[2].partition("\n\n")[0]
     tried = re.split(rf"actuator-lti {name}\b", text)[1:]
     assert tried, f"{name}: no example"
     for words in tried:
         line = re.split(r", or\b|: (?=actuator)|; ", words)[0].rstrip(",")
-        COMMANDS[name].make_context(name, shlex.split(line))
+        command.make_context(name, shlex.split(line))
 
 
 @pytest.mark.parametrize("words", [[], ["objects"], ["export"]])
@@ -79,6 +74,7 @@ def test_json_of_commands_that_write(tmp_path, cli) -> None:
         (["duty", "joint"], True),
         (["cycles", "ballscrew"], True),
         (["compare", "ilr33-amber", "--no-validate", "--set", "control.position.gain=1560 1/s"], False),
+        (["simulate", "--set", "control.position.gain=9000 1/s", "--no-limits", "--duration", "0.03"], False),
         (["tune", "--no-curve", "--require", "position.bandwidth>=2000 Hz"], False),
     ],
     ids=lambda value: " ".join(value[:1]) if isinstance(value, list) else str(value),
@@ -130,11 +126,10 @@ def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
 @pytest.mark.parametrize("columns", [1, 4, 12])
 def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, printed) -> None:
     named = [doc.column("name", "Loop"), *(doc.column(f"c{k}", f"Column {k}", "ms") for k in range(columns))]
-    rows = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
-    out = printed(
-        width, doc.table("A table", named, [{"name": f"row {r}", **row} for r, row in enumerate(rows)])
-    )
-    assert all(value in out for r, row in enumerate(rows) for value in (f"row {r}", *row.values()))
+    cells = [{f"c{k}": f"{WORDS[(r + k) % 5]}-{100 * r + k}" for k in range(columns)} for r in range(3)]
+    rows = [{"name": f"row {r}", **row} for r, row in enumerate(cells)]
+    out = printed(width, doc.table("A table", named, rows))
+    assert all(value in out for row in rows for value in row.values())
 
 
 @pytest.mark.parametrize("width", range(70, 140, 5))

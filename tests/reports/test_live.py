@@ -218,7 +218,7 @@ def test_a_tap_reads_and_two_fingers_zoom(page: Page) -> None:
     figure.locator(".readout tr").first.wait_for()
     assert read(figure)["frequency"] == pytest.approx(10.0, rel=0.05)
     x, y = spot(figure, 0.5, 0.5)
-    session = page.context.new_cdp_session(page)
+    session = page.context.new_cdp_session(page.page)
     for kind, gap in (("touchStart", 20.0), ("touchMove", 35.0), ("touchMove", 50.0), ("touchEnd", 0.0)):
         fingers = [{"x": x - gap, "y": y, "id": 0}, {"x": x + gap, "y": y, "id": 1}]
         points = fingers * (kind != "touchEnd")

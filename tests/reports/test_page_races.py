@@ -27,6 +27,8 @@ WATCHED = """window.IntersectionObserver = class {
 EARLY = """window.watched = () => new MutationObserver(() => seen(true)).observe(
     document.getElementById("hands-on"), { attributes: true, attributeFilter: ["data-count"] });"""
 SLOW = "const now = performance.now.bind(performance); performance.now = () => 1000 * now();"
+PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
+    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
 
 
 @pytest.fixture
@@ -105,13 +107,11 @@ def test_a_move_under_way_is_reset(page: Page) -> None:
 
 def test_a_slider_let_go_after_an_undo_holds_where_it_stands(page: Page) -> None:
     page.type_value(GAIN, 150.0)
-    slider = page.locator(f'.row[data-path="{GAIN}"] input[type=range]')
-    slider.scroll_into_view_if_needed()
-    box = slider.bounding_box()
-    x, y = box["x"], box["y"] + box["height"] / 2.0
-    page.mouse.move(x + 0.5 * box["width"], y)
+    row = f'.row[data-path="{GAIN}"] input[type=range]'
+    slider = page.locator(row)
+    page.mouse.move(*page.spot(row))
     page.mouse.down()
-    page.settled(lambda: page.mouse.move(x + 0.8 * box["width"], y))
+    page.settled(lambda: page.mouse.move(*page.spot(row, 0.8)))
     page.settled(lambda: page.keyboard.press("Control+z"))
     page.mouse.up()
     page.done()
@@ -180,8 +180,7 @@ def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     """Another loop is shown while the corner of this one is held: what was moved is a step of its own."""
     page.locator('[data-chart="bode"]').scroll_into_view_if_needed()
     page.settled(lambda: page.locator(".tabs button", has_text="Velocity").click())
-    box = page.locator('[data-chart="bode"] circle[data-name="corner of velocity"]').bounding_box()
-    x, y = box["x"] + box["width"] / 2.0, box["y"] + box["height"] / 2.0
+    x, y = page.spot('[data-chart="bode"] circle[data-name="corner of velocity"]')
     page.mouse.move(x, y)
     page.mouse.down()
     page.settled(lambda: page.mouse.move(x + 15.0, y))
@@ -191,20 +190,11 @@ def test_a_handle_that_vanishes_is_let_go(page: Page) -> None:
     page.wait_for_function("() => !document.querySelector('[data-do=\"undo\"]').disabled")
 
 
-PLACE = """() => { const node = document.querySelector('[data-chart="bode"] path.grab');
-    for (let part = 0.3; part < 0.9; part += 0.05) {
-      const at = node.getPointAtLength(part * node.getTotalLength()).matrixTransform(node.getScreenCTM());
-      if (document.elementFromPoint(at.x, at.y) === node) return [Math.round(at.x), Math.round(at.y)];
-    } }"""
-PAGE_UP = """find('[data-chart="bode"] .plots').dispatchEvent(
-    new KeyboardEvent("keydown", { key: "PageUp", bubbles: true }));"""
-
-
 @pytest.mark.parametrize("between", ["", PAGE_UP])
 def test_a_curve_that_is_held_moves_from_where_it_was_taken(page: Page, between: str) -> None:
     """Whatever else moved it meanwhile: there and back is where it was."""
     page.locator('[data-chart="bode"]').scroll_into_view_if_needed()
-    x, y = page.evaluate(PLACE)
+    x, y = page.grab("bode")
     page.mouse.move(x, y)
     page.mouse.down()
     page.mouse.move(x, y - 6)
@@ -237,3 +227,18 @@ def test_a_variant_s_figure_that_follows_later_is_not_said_before(opens) -> None
     assert "…" in words
     page.done()
     assert "…" not in page.inner_text("table.variants")
+
+
+def test_what_waits_is_not_started_once_a_value_moves(page: Page) -> None:
+    """Whatever is due when the next value comes was listed for the value before: it ran without its run."""
+    page.evaluate(SLOW)
+    page.type_value(GAIN, 101.0)  # by this clock its run took long: the next is late
+    at_once(
+        page,
+        f"""const wait = (ms) => new Promise((go) => setTimeout(go, ms));
+        type("{GAIN}", "102");
+        await wait(30); // listed, not started
+        for (const end = Date.now() + 300; Date.now() < end;); // due by now
+        type("{GAIN}", "103");
+        while (root.dataset.behind !== "done") await wait(10);""",
+    )

@@ -1,7 +1,5 @@
 """Two places of a report that speak of one thing say the same."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from math import pi
 
@@ -34,6 +32,8 @@ from reports.terminal import print_blocks
 
 SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
 SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
+INCLUDED = {"": {}, ": feed-forward included": {"control.position.feedforward": 1.0}}
+INCLUDED |= {": mean of its profile and filter included": SHAPED}
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
@@ -100,16 +100,9 @@ def test_a_bandwidth_says_by_its_name_of_which_response_it_is() -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("changes", "parts"),
-    [
-        ({}, ""),
-        ({"control.position.feedforward": 1.0}, ": feed-forward included"),
-        (SHAPED, ": mean of its profile and filter included"),
-    ],
-)
-def test_a_response_to_the_command_names_what_the_drive_has(changes: dict[str, float], parts: str) -> None:
-    design = with_values(load_design("ilr33-amber"), changes)
+@pytest.mark.parametrize("parts", INCLUDED)
+def test_a_response_to_the_command_names_what_the_drive_has(parts: str) -> None:
+    design = with_values(load_design("ilr33-amber"), INCLUDED[parts])
     said = which_response("bandwidth", "position", "command", design)
     assert said == f"of the response to the command{parts}"
 

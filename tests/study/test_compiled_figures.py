@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
-from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_overrides, with_values
-from actuator_lti.errors import InputError
 from analyses.linear.loop_survey import MOST_STATES, survey_loops
+from tests.refusals import refused
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
 
@@ -62,18 +62,6 @@ def test_every_crossover_is_that_of_the_margin_engine(name):
             assert figures.quantity(quantity, loop)[k] == pytest.approx(getattr(truth, name), rel=1e-6)
 
 
-def of_response(system) -> dict[str, float | None]:
-    width, step = closed_loop_bandwidth(system), step_figures(system)
-    return {
-        "bandwidth": width.minus3db_hz,
-        "bandwidth_90deg": width.minus90deg_hz,
-        "resonance_peak": width.resonance_peak_db,
-        "overshoot": step.overshoot_percent,
-        "rise_time": step.rise_time_s,
-        "settling_time": step.settling_time_s,
-    }
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     population = scattered(name, 5, seed=8)
@@ -81,21 +69,22 @@ def test_bandwidths_peaks_and_steps_are_those_of_the_loops(name):
     for k, loop, own in each(population, figures):
         if not figures.stable(loop)[k] or (name, loop) == ("emps", "velocity"):
             continue  # emps: its speed measurement has a zero at Nyquist, where phase has no meaning
-        for quantity, truth in of_response(own.closed_loop).items():
+        width, step = closed_loop_bandwidth(own.closed_loop), step_figures(own.closed_loop)
+        truths = {
+            "bandwidth": width.minus3db_hz,
+            "bandwidth_90deg": width.minus90deg_hz,
+            "resonance_peak": width.resonance_peak_db,
+            "overshoot": step.overshoot_percent,
+            "rise_time": step.rise_time_s,
+            "settling_time": step.settling_time_s,
+        }
+        for quantity, truth in truths.items():
             mine = figures.quantity(quantity, loop)[k]
             expected = np.nan if truth is None else truth
             assert mine == pytest.approx(expected, rel=1e-6, abs=1e-6, nan_ok=True), (loop, quantity, k)
 
 
-@pytest.mark.parametrize("share", [0.3, 0.9])
-def test_feed_forward_is_in_the_figures_of_the_command(share):
-    design = with_values(load_design("ilr33-amber-multirate"), {"control.position.feedforward": share})
-    figures = linear_figures(Population(design, {}, 1))
-    for quantity, truth in of_response(assemble_loops(design).reference_to_output).items():
-        assert figures.quantity(quantity, "position")[0] == pytest.approx(truth, rel=1e-6, abs=1e-6), quantity
-
-
-def test_the_angle_under_an_elastic_load_is_no_instability():
+def test_an_unstable_loop_is_called_so_and_what_cannot_vary_refused():
     """With a hinge moment that follows the angle, the velocity loop keeps an eigenvalue at 1."""
     changes = {"load.path": "back-drivable", "load.moment_slope": "-20 N*m/rad"}
     design = with_overrides(load_design("ilr33-amber"), changes)
@@ -108,6 +97,16 @@ def test_the_angle_under_an_elastic_load_is_no_instability():
     width = closed_loop_bandwidth(loops.velocity.closed_loop)
     # T at DC is read off at the lowest angle here, not at zero
     assert figures.quantity("bandwidth", "velocity")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
+    design = load_design("ilr33-amber")
+    population = Population(design, {"control.current.gain": np.array([0.02, 0.2])}, 2)
+    figures = linear_figures(population)
+    assert figures.stable("current").tolist() == [True, False]
+    assert figures.quantity("delay_margin", "current")[1] == 0.0
+    assert figures.quantity("gain_margin", "current")[1] < 0.0
+    assert np.isnan(figures.quantity("bandwidth", "current")[1])
+    design = load_design("ilr33-amber")
+    refused(Population, design, {"motor.color": np.ones(2)}, 2, words="motor.color")
+    refused(Population, design, {"motor.resistance": np.array([np.nan])}, 1, words="finite")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant", "ballscrew"])
@@ -120,16 +119,6 @@ def test_a_current_loop_with_an_integrator_has_a_gain_of_one_at_rest_behind_the_
     assert width.dc_gain == pytest.approx(1.0, abs=1e-9)
     figures = linear_figures(Population(design, {}, 1), time_figures=False)
     assert figures.quantity("bandwidth", "current")[0] == pytest.approx(width.minus3db_hz, rel=1e-9)
-
-
-def test_an_unstable_loop_is_called_so_and_takes_no_delay():
-    design = load_design("ilr33-amber")
-    population = Population(design, {"control.current.gain": np.array([0.02, 0.2])}, 2)
-    figures = linear_figures(population)
-    assert figures.stable("current").tolist() == [True, False]
-    assert figures.quantity("delay_margin", "current")[1] == 0.0
-    assert figures.quantity("gain_margin", "current")[1] < 0.0
-    assert np.isnan(figures.quantity("bandwidth", "current")[1])
 
 
 def test_bits_do_not_depend_on_threads_neighbours_or_order():
@@ -150,22 +139,6 @@ def test_rest_and_describing_function_change_the_slope_as_the_loops_do(point, ex
     mine = linear_figures(Population(design, {}, 1), **at).quantity("phase_margin", "velocity")[0]
     truth = stability_margins(assemble_loops(design, **at).velocity.open_loop)
     assert mine == pytest.approx(truth.phase_margin_deg, rel=1e-6)
-
-
-def test_drive_figures_of_the_paper():
-    """The speed limit is 22.7 deg/s at the canard (paper); at 8 N m friction takes 17.9 mN m, 3.04 A."""
-    population = Population(load_design("ilr33-amber"), {}, 1)
-    assert drive_figures(population, "output_rate", 8.0)[0] == pytest.approx(22.73, abs=0.01)
-    torque = 2.25e-3 + 1.34e-3 * 8 + 5.25e-6 * 942.5
-    assert drive_figures(population, "motor_current", 8.0)[0] == pytest.approx(torque / 5.9e-3)
-
-
-@pytest.mark.parametrize(("path", "values", "message"), [
-    ("motor.color", [1.0, 1.0], r"motor\.color"), ("motor.resistance", [np.nan], "finite"),
-])  # fmt: skip
-def test_what_cannot_vary_is_refused(path, values, message):
-    with pytest.raises(InputError, match=message):
-        Population(load_design("ilr33-amber"), {path: np.array(values)}, len(values))
 
 
 @pytest.mark.parametrize("above", [1e-2, 1.0, 1e3, 1e5])

@@ -23,11 +23,6 @@ COUNT = 3_000
 FAILING = "variant 1717"
 
 
-@pytest.fixture(scope="module")
-def one() -> Comparison:
-    return compare(study_of(load_design("ilr33-amber")))
-
-
 def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
     of = verdict.requirement
     value = of.maximum - distance if of.minimum is None else of.minimum + distance
@@ -35,9 +30,9 @@ def moved(verdict: RequirementVerdict, distance: float) -> RequirementVerdict:
 
 
 @pytest.fixture(scope="module")
-def many(one) -> Comparison:
+def many() -> Comparison:
     """Thousands of designs with the figures of one, scaled at random; one of them fails a requirement."""
-    draw, variants = random.Random(18), []
+    draw, variants, one = random.Random(18), [], compare(study_of(load_design("ilr33-amber")))
     for k in range(COUNT):
         name, factor, own = f"variant {k}", draw.uniform(0.9, 1.1), one.base.figures
         figures = {key: None if v is None else v * draw.uniform(0.5, 2.0) for key, v in own.items()}
@@ -49,13 +44,10 @@ def many(one) -> Comparison:
     return replace(one, variants=tuple(variants))
 
 
-def test_few_designs_are_all_shown(many) -> None:
+def test_few_are_all_shown_and_of_many_best_and_worst_of_everything_with_their_marks(many) -> None:
     few = replace(many, variants=many.variants[:MANY])
     assert choice(few) is few
     assert few.everything is few
-
-
-def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> None:
     shown = choice(many)
     assert 2 * len(many.base.verdicts) <= len(shown.variants) <= MANY
     assert shown.everything is many
@@ -68,10 +60,6 @@ def test_best_and_worst_of_everything_are_among_those_that_are_shown(many) -> No
             assert {min(distances, key=distances.get), max(distances, key=distances.get)} <= names
     order = [one.variant.name for one in many.variants if one.variant.name in names]
     assert order == [one.variant.name for one in shown.variants]
-
-
-def test_marks_of_best_and_worst_are_those_of_all_designs(many) -> None:
-    shown = choice(many)
     for name in many.names:
         assert shown.ends(name) == many.ends(name)
     values = [one.figures["position.gain_margin"] for one in many.all]

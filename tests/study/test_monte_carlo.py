@@ -32,13 +32,7 @@ def study(design, tmp_path_factory):
     return monte_carlo(design, tmp_path_factory.mktemp("study"), replace(PLAIN, chunk=400))
 
 
-@pytest.fixture(scope="module")
-def searched(design, tmp_path_factory):
-    """The same with its worst cases, which take most of the time."""
-    return monte_carlo(design, tmp_path_factory.mktemp("searched"), replace(PLAIN, worst_cases=True))
-
-
-def test_odds_of_a_current_limit_are_the_closed_form(study):
+def test_odds_of_a_current_limit_are_the_closed_form(study, design):
     """i = (C0 + CM M + Cv w)/kM is linear in the uniform CM: P(i <= 4 A) by hand."""
     largest = (4.0 * 5.9e-3 - 2.25e-3 - 5.25e-6 * 942.5) / 8.0
     truth = (largest / 1.34e-3 - 0.4) / 1.2
@@ -46,16 +40,10 @@ def test_odds_of_a_current_limit_are_the_closed_form(study):
     assert 0.5 < truth < 0.95
     assert odds.low <= truth <= odds.high
     assert odds.probability == pytest.approx(truth, abs=2e-3)
-
-
-def test_requirements_are_counted_as_all_verdicts_count_them(study, design):
     judged = [odds.id for odds in study.odds if odds.id != "all"]
     assert judged == [verdict.id for verdict in evaluate_requirements(design)]
     assert study.tally.total == len(judged)
-
-
-def test_a_tolerance_drives_what_it_is_in_the_formula_of(study):
-    """i = (C0 + CM M + Cv w)/kM: the coefficient moves the current between its ends; resistance does not."""
+    # the coefficient moves the current between its ends; resistance does not
     first, *rest = [one for one in study.drivers if one.column == "drive.motor_current@8"]
     assert (first.path, first.low_value, first.high_value) == (
         "friction.load_coefficient", pytest.approx(0.4 * 1.34e-3), pytest.approx(1.6 * 1.34e-3)
@@ -67,7 +55,9 @@ def test_a_tolerance_drives_what_it_is_in_the_formula_of(study):
     assert all(one.swing <= first.swing for one in rest)
 
 
-def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(searched, design):
+def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(design, tmp_path):
+    settings = replace(PLAIN, worst_cases=True)
+    searched = monte_carlo(design, tmp_path / "searched", settings)
     case = next(w for w in searched.worst if w.requirement == "motor-current")
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3
     assert case.sampled < case.value == pytest.approx(corner, rel=1e-9)
@@ -77,6 +67,10 @@ def test_the_worst_case_lies_beyond_the_worst_sample_in_the_corner(searched, des
     assert saved.friction.load_coefficient == pytest.approx(1.6 * 1.34e-3)
     margin = next(w for w in searched.worst if w.requirement == "gain-margin/position")
     assert margin.value <= margin.sampled
+    other = monte_carlo(design, tmp_path / "other", replace(settings, chunk=77), engine=Engine(threads=1))
+    assert other.columns == searched.columns
+    assert other.odds == searched.odds
+    assert [w.parameters for w in other.worst] == [w.parameters for w in searched.worst]
 
 
 @pytest.mark.parametrize(("passed", "count", "at_least", "verdict", "says"), [
@@ -98,29 +92,21 @@ def test_what_samples_alone_prove(passed, count, at_least, verdict, says, study)
     assert says in item["reason"]
 
 
-def test_what_samples_do_not_prove_can_be_waived(study, design):
+def test_what_samples_do_not_prove_can_be_waived(study):
     waiver = Waiver(requirement=study.odds[0].id, reason="prototype", date="2026-01-31")
     odds = replace(study.odds[0], passed=3, count=3, low=0.0, high=1.0, waiver=waiver)
     assert replace(study, odds=(odds,)).tally.words("requirements") == "0 of 1 requirements met, 1 waived"
 
 
-def test_the_terminal_says_verdict_and_reason(searched):
-    made = brief(searched)
+def test_the_terminal_says_verdict_and_reason(study):
+    made = brief(study)
     rows = {row["label"]: row["verdict"] for row in made.blocks[0]["rows"]}
     assert rows["motor current, at 8 N m"] == "not met"
     reason = next(note for note in made.notes if note.startswith("Motor current, at 8 N m: "))
     assert "samples fail, worst is number" in reason
 
 
-def test_same_bits_whatever_the_chunks_and_threads(searched, design, tmp_path):
-    settings = replace(PLAIN, chunk=77, worst_cases=True)
-    other = monte_carlo(design, tmp_path, settings, engine=Engine(threads=1))
-    assert other.columns == searched.columns
-    assert other.odds == searched.odds
-    assert [w.parameters for w in other.worst] == [w.parameters for w in searched.worst]
-
-
-def test_a_single_sample_is_replayed_by_its_number(study, design):
+def test_a_single_sample_is_replayed_by_its_number_and_another_study_does_not_mix_in(study, design):
     sampler = sampler_of(design, seed=3)
     result = replay(design, sampler, 617)
     row = pq.read_table(study.folder / "samples-0000000400-400.parquet").slice(217, 1).to_pylist()[0]
@@ -128,6 +114,8 @@ def test_a_single_sample_is_replayed_by_its_number(study, design):
     assert result.friction.load_coefficient == row["parameter.friction.load_coefficient"]
     alone = SampleTask(design, sampler)((617, 1))
     assert alone["position.phase_margin"][0] == row["position.phase_margin"]
+    with pytest.raises(InputError, match="another study"):
+        monte_carlo(design, study.folder, replace(PLAIN, seed=4))
 
 
 def in_parts(monkeypatch, **sizes):
@@ -155,11 +143,6 @@ def test_an_interrupted_study_goes_on(study, design, tmp_path):
     resumed = monte_carlo(design, tmp_path, settings)
     assert resumed.columns == study.columns
     assert left[1].stat().st_mtime_ns == stamp
-
-
-def test_another_study_does_not_mix_into_a_folder(study, design):
-    with pytest.raises(InputError, match="another study"):
-        monte_carlo(design, study.folder, replace(PLAIN, seed=4))
 
 
 @pytest.mark.parametrize("engine", [Engine(threads=2), Engine(workers=1)])

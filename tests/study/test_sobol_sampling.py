@@ -14,45 +14,38 @@ from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.batch import Population
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.model import Tolerance
-from actuator_lti.errors import InputError
 from analyses.monte_carlo.result import MOST, SHARES, Sketch, clopper_pearson, column_statistics
 from analyses.monte_carlo.task import StepCheck, step_columns, step_rows, step_units
 from analyses.studies.sampling import Factor, Sampler, read_table, sampler_of
 from nonlinear import Reducers, Run, commands, simulate_many
+from tests.refusals import refused
 
 R, L = "motor.resistance", "motor.inductance"
 BOX, BELL = uniform(R, 10.0, 2.0), normal(L, 5.0)
 
 
-def sampler(*factors, correlation=None, seed=0, table=None):
+def sampler(*factors, correlation=None, seed=0):
     size = len(factors)
     matrix = np.eye(size) if correlation is None else np.array([[1.0, correlation], [correlation, 1.0]])
-    return Sampler(tuple(factors), matrix, table, seed)
+    return Sampler(tuple(factors), matrix, seed=seed)
 
 
-def test_a_sample_is_the_same_alone_and_in_any_chunk():
+def test_a_sample_is_the_same_alone_and_in_any_chunk_and_seed_zero_is_a_seed():
     study = sampler(BOX, BELL, correlation=0.5, seed=7)
     whole = study.draw(0, 1000)
     assert np.array_equal(np.vstack([study.draw(0, 1), study.draw(1, 332), study.draw(333, 667)]), whole)
     assert np.array_equal(study.draw(777, 1)[0], whole[777])
-
-
-def test_seed_zero_is_a_seed():
     zero, again, one = (sampler(BOX, seed=s).draw(0, 8) for s in (0, 0, 1))
     assert np.array_equal(zero, again)
     assert not np.array_equal(zero, one)
-    with pytest.raises(InputError, match="seed"):
-        sampler(BOX, seed=-1)
+    refused(sampler, BOX, seed=-1, words="seed")
 
 
-def test_uniform_fills_its_width_evenly():
+def test_uniform_is_even_and_normals_have_their_moments_and_coefficient():
     values = sampler(BOX).draw(0, 4096)[:, 0]
     assert 8.0 <= values.min() < values.max() <= 12.0
     counts, _ = np.histogram(values, bins=64, range=(8, 12))
     assert np.all(counts == 64)  # what a Sobol sequence promises and random numbers do not
-
-
-def test_normal_and_truncated_normal_have_their_moments():
     values = sampler(BELL).draw(0, 8192)[:, 0]
     assert values.mean() == pytest.approx(5.0, abs=1e-3)
     assert values.std() == pytest.approx(1.0, abs=2e-3)
@@ -62,14 +55,11 @@ def test_normal_and_truncated_normal_have_their_moments():
     # variance of a standard normal cut at +-1: 1 - 2 phi(1)/(2 Phi(1) - 1)
     phi, mass = np.exp(-0.5) / np.sqrt(2 * np.pi), 0.6826894921370859
     assert kept.var() == pytest.approx(1 - 2 * phi / mass, rel=2e-3)
-
-
-def test_correlated_normals_have_their_coefficient():
     pair = sampler(normal(R, 5.0), normal(L, 5.0), correlation=-0.8).draw(0, 8192)
     assert np.corrcoef(pair.T)[0, 1] == pytest.approx(-0.8, abs=2e-3)
 
 
-def test_identified_samples_keep_their_rows_together(tmp_path):
+def test_identified_samples_keep_their_rows_and_impossible_tolerances_are_refused(tmp_path):
     path = tmp_path / "friction.csv"
     path.write_text("friction.viscous,friction.dry_torque\n1e-6,1e-3\n2e-6,2e-3\n4e-6,4e-3\n8e-6,8e-3\n")
     design = load_design("ilr33-amber")
@@ -79,26 +69,14 @@ def test_identified_samples_keep_their_rows_together(tmp_path):
     viscous, dry = (drawn[:, study.paths.index(p)] for p in table.paths)
     assert np.array_equal(dry, viscous * 1000)
     assert np.unique(viscous, return_counts=True)[1].tolist() == [1024] * 4
-
-
-@pytest.mark.parametrize(("text", "message"), [
-    ("motor.colour\n1\n", "motor.colour"), ("motor.resistance\nnan\n", "finite"),
-    ("motor.resistance\nred\n", "number"),
-])  # fmt: skip
-def test_bad_tables_are_refused(tmp_path, text, message):
-    path = tmp_path / "t.csv"
-    path.write_text(text)
-    with pytest.raises(InputError, match=message):
-        read_table(path, ["motor.resistance"])
-
-
-def test_tolerances_that_are_none_or_reach_a_negative_inertia_are_refused():
-    with pytest.raises(InputError, match="tolerance"):
-        sampler_of(load_design("ctms-motor-position"))
+    bad = {"motor.colour\n1\n": "motor.colour", "motor.resistance\nnan\n": "finite"}
+    for text, words in (bad | {"motor.resistance\nred\n": "number"}).items():
+        path.write_text(text)
+        refused(read_table, path, ["motor.resistance"], words=words)
+    refused(sampler_of, load_design("ctms-motor-position"), words="tolerance")
     wide = 'tolerance = { kind = "normal", std = "50 %" }'
     text = write_design(load_design("ilr33-amber")).replace('tolerance = "50 %"', wide)
-    with pytest.raises(InputError, match="truncated-normal"):
-        sampler_of(read_design_text(text))
+    refused(sampler_of, read_design_text(text), words="truncated-normal")
 
 
 def merged(parts):

@@ -13,11 +13,11 @@ from actuator_lti import assemble_loops, load_design, read_design_text, stabilit
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Controller, Design, Friction, Limits, Motor, PositionLoop, Validation
 from actuator_lti.design.objects import export_objects
-from actuator_lti.errors import InputError
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
 from analyses.tuning.start import magnitude_optimum, rule_gains, symmetric_optimum
+from tests.refusals import refused
 
 PERIOD, DELAY = 1e-3, 3e-3
 
@@ -32,14 +32,9 @@ def integrator(*requirements):
     )  # fmt: skip
 
 
-def integrator_gain(margin_deg):
-    """Of K T z^-q/(z - 1) with L = q T: crossover at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
-    omega = math.radians(90.0 - margin_deg) / (DELAY + 0.5 * PERIOD)
-    return 2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD
-
-
 @pytest.mark.parametrize("margin", [30.0, 45.0, 60.0])
 def test_an_integrator_with_delay_gets_its_known_gain(margin):
+    """Of K T z^-q/(z - 1) with L = q T: crossover at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
     design = integrator(need("phase_margin", margin, loop="position"))
     problem = problem_of(design, loop_requirements(design), {"control.position.gain": 20.0})
     corners = problem.all_corners
@@ -48,15 +43,8 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
         lambda x: problem.distances(np.exp(x), corners).reshape(len(x), -1),
         lambda x: np.exp(x) / 100.0,
     )  # fmt: skip
-    assert gains[0] == pytest.approx(integrator_gain(margin), rel=1e-3)
-
-
-def test_the_closed_form_of_the_integrator_is_the_margin_engine_s():
-    gain = integrator_gain(60.0)
-    design = integrator()
-    changed = replace(design, controller=replace(design.controller, position=PositionLoop(gain=gain)))
-    result = stability_margins(assemble_loops(changed).position.open_loop)
-    assert result.phase_margin_deg == pytest.approx(60.0, abs=1e-4)
+    omega = math.radians(90.0 - margin) / (DELAY + 0.5 * PERIOD)
+    assert gains[0] == pytest.approx(2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, rel=1e-3)
 
 
 def test_what_cannot_be_met_is_refused_with_its_distance():
@@ -79,28 +67,20 @@ def pi_behind(gain, time, plant, s):
     return gain * (1 + 1 / (time * s)) * plant(s)
 
 
-def test_magnitude_optimum_has_a_damping_of_0_707():
+def test_rules_of_gains_are_their_closed_forms():
     s = 3.0j
     loop = pi_behind(*magnitude_optimum(2.0, 0.05, 0.01), lambda s: 2.0 / (1 + 0.05 * s) / (1 + 0.01 * s), s)
     assert loop == pytest.approx(1 / (2 * 0.01 * s * (1 + 0.01 * s)))
-
-
-@pytest.mark.parametrize(("a", "margin"), [(2.0, 36.8699), (2 + math.sqrt(3), 60.0)])
-def test_symmetric_optimum_has_its_margin_at_its_crossover(a, margin):
-    loop = pi_behind(*symmetric_optimum(4.0, 0.01, a), lambda s: 4.0 / s / (1 + 0.01 * s), 1j / (a * 0.01))
-    assert abs(loop) == pytest.approx(1.0)
-    assert 180 + math.degrees(cmath.phase(loop)) == pytest.approx(margin, abs=1e-4)
-
-
-def test_the_rules_of_the_baseline():
-    """R/(2 T_sigma) L/R = 20 mohm with T_sigma 150 us: the current gain that the baseline has."""
+    for a, margin in ((2.0, 36.8699), (2 + math.sqrt(3), 60.0)):  # symmetric optimum: at its crossover
+        gains, crossover = symmetric_optimum(4.0, 0.01, a), 1j / (a * 0.01)
+        loop = pi_behind(*gains, lambda s: 4.0 / s / (1 + 0.01 * s), crossover)
+        assert abs(loop) == pytest.approx(1.0)
+        assert 180 + math.degrees(cmath.phase(loop)) == pytest.approx(margin, abs=1e-4)
+    # R/(2 T_sigma) L/R = 20 mohm with T_sigma 150 us: the current gain that the baseline has
     rules = rule_gains(load_design("ilr33-amber")).values
     assert rules["control.current.gain"] == pytest.approx(0.02)
     assert rules["control.current.integral_time"] == pytest.approx(6e-6 / 0.055)
-
-
-def test_the_rule_of_a_position_controller_that_drives_the_current():
-    """|K (1 + j w Td) kM/(j w (Cv + j w J))| = 1, at w = 2/Td, or without Td at the corner Cv/J."""
+    # |K (1 + j w Td) kM/(j w (Cv + j w J))| = 1, at w = 2/Td, or without Td at the corner Cv/J
     base = load_design("ilr33-amber")
     kM, Cv, J = base.motor.torque_constant_Nm_A, base.friction.viscous_Nms_rad, base.inertia_kgm2
     for Td, w in ((0.02, 100.0), (None, Cv / J)):
@@ -111,13 +91,9 @@ def test_the_rule_of_a_position_controller_that_drives_the_current():
         assert abs(loop) == pytest.approx(1.0)
 
 
-@pytest.fixture(scope="module")
-def tuned():
+def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
     asked = need("bandwidth", 60.0, loop="position", unit="Hz"), need("phase_margin", 60.0, loop="every")
-    return tune(load_design("ilr33-amber"), TuningSettings(asked))
-
-
-def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
+    tuned = tune(load_design("ilr33-amber"), TuningSettings(asked))
     assert (tuned.feasible, tuned.corners) == (True, 17)
     figures = {"every-phase_margin": "phase_margin_deg", "gain-margin": "gain_margin_db"}
     asked = {r.id: r for r in tuned.requirements}
@@ -126,25 +102,16 @@ def test_every_corner_of_the_tolerances_meets_the_requirements(tuned):
         loops = assemble_loops(with_values(tuned.design, dict(corner)) if corner else tuned.design)
         margins = (stability_margins(loop.open_loop) for loop in loops.present.values())
         assert min(getattr(m, figure) for m in margins) == pytest.approx(asked[name].value, rel=1e-6)
-
-
-def test_gains_are_whole_steps_of_the_controller_s_objects(tuned):
     exported, gains = export_objects(tuned.design), {g.object: g for g in tuned.gains}
     written = {item.label: item.value for item in exported.objects.values}
     assert {label: written[label] for label in gains} == {label: g.steps for label, g in gains.items()}
     assert not {r.label for r in exported.rounded} & set(gains)
     assert 1 <= gains["0x2348.01"].steps <= 250
     assert gains["0x2342.02"].steps >= 150
-
-
-def test_bandwidth_is_paid_for_in_phase_margin(tuned):
     curve = [(p.bandwidth_hz, -p.phase_margin_deg) for p in tuned.trade_off if p.feasible]
     assert len(curve) >= 4
     for values in zip(*curve, strict=True):
         assert list(values) == sorted(values)
-
-
-def test_the_nonlinear_check_settles(tuned):
     assert len(tuned.checks) == 4
     assert all(c.settling_time_s is not None for c in tuned.checks)
     assert any(c.limited for c in tuned.checks)
@@ -156,24 +123,13 @@ def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
     gains = {row["path"]: row["rounded"] for row in made["sections"][0]["blocks"][1]["rows"]}
-    assert load_design(tmp_path / "tuned.toml").controller.position.gain == gains["control.position.gain"]
+    tuned = load_design(tmp_path / "tuned.toml")
+    assert tuned.controller.position.gain == gains["control.position.gain"]
+    asked = {item.id: item.minimum for item in tuned.requirements if item.quantity == "bandwidth"}
+    assert asked["position-bandwidth-wanted"] == 2000.0
 
 
-@pytest.mark.parametrize(("words", "message"), [
-    ("bandwidth>30", "allowed"), ("tail.bandwidth>=3 Hz", "current, velocity, position"),
-    ("position.colour>=3 Hz", "bandwidth"), ("position.bandwidth>=3 kg", "kg"),
-])  # fmt: skip
-def test_wishes_that_make_no_sense_are_refused(words, message):
-    with pytest.raises(InputError, match=message):
-        read_requirement(words, load_design("ilr33-amber"))
-
-
-def test_a_design_without_requirements_on_loops_is_refused():
-    with pytest.raises(InputError, match="no requirement"):
-        tune(integrator())
-
-
-def test_of_many_tolerances_the_strongest_make_the_corners():
+def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense():
     motor = dict.fromkeys(("resistance", "inductance", "rotor_inertia"), 10)
     friction = dict.fromkeys(("viscous", "dry_torque", "load_coefficient"), 30)
     design = read_design_text(toleranced(motor=motor, friction=friction, limits={"voltage": 5}))
@@ -181,3 +137,10 @@ def test_of_many_tolerances_the_strongest_make_the_corners():
     kept = {f.path for f in problem.factors}
     assert (len(problem.toleranced), len(kept), "motor.resistance" in kept) == (11, 10, True)
     assert problem.all_corners.shape == (1025, 10)
+    refused(tune, integrator(), words="--require")
+    for wish, words in (
+        ("bandwidth>30", "allowed"), ("tail.bandwidth>=3 Hz", "current, velocity, position"),
+        ("position.colour>=3 Hz", "bandwidth"), ("position.bandwidth>=3 kg", "kg"),
+        ("position.bandwith>=3 Hz", 'known: "bandwidth"'), ("every.phase_margin>=40", "unit like deg"),
+    ):  # fmt: skip
+        refused(read_requirement, wish, design, words=words)

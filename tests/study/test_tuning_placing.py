@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
 from analyses.tuning.start import allowed_range, place, step_of_gain
+from tests.changed import changed
 
 
 def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
@@ -35,12 +36,8 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
 
 
 RESONANT = 0.5e-4 * (2 * np.pi * 700.0) ** 2  # 700 Hz, where the delay turns by more than 90 deg
+DIRECT = changed(servo(), controller={"velocity": None, "position": PositionLoop(gain=1.0)})
 WIDE = (need("gain_margin", 6.0, unit="dB"), need("phase_margin", 30.0), need("bandwidth", 60.0, unit="Hz"))
-
-
-def direct():
-    control = replace(servo().controller, velocity=None, position=PositionLoop(gain=1.0))
-    return replace(servo(), controller=control)
 
 
 def seen(design):
@@ -113,14 +110,11 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
     assert (phase >= 62.0, width >= 50.0) == (True, True)
 
 
-def test_a_design_that_meets_all_is_left_as_it_is():
+def test_what_meets_all_is_left_neutral_elements_are_neutral_and_ranges_are_of_the_drive():
     design = servo(need("phase_margin", 30.0))
     tuned = tune(design, replace(QUICK, place=("notch", "lowpass")))
     assert (tuned.feasible, tuned.placed, tuned.design.controller) == (True, (), design.controller)
-
-
-def test_neutral_elements_change_nothing():
-    """A notch of depth 1 is a factor 1; feed-forward starts at what the design has."""
+    # a notch of depth 1 is a factor 1; feed-forward starts at what the design has
     design = servo(stiffness=RESONANT, position=PositionLoop(gain=20.0, feedforward=0.4))
     placed, variables = place(design, ("notch", "feedforward"))
     starts = {v.path: v.start for v in variables}
@@ -129,6 +123,13 @@ def test_neutral_elements_change_nothing():
         loops = (getattr(assemble_loops(one), name).open_loop for one in (design, placed))
         before, after = ((m.gain_margin_db, m.phase_margin_deg) for m in map(stability_margins, loops))
         assert after == pytest.approx(before, rel=1e-9)
+    # 0x2348.01 holds 1 to 250 1/s in whole steps; another drive may have any gain
+    baseline = load_design("ilr33-amber")
+    assert baseline.objects.named
+    assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
+    other = replace(baseline, objects=model.ControllerObjects())
+    assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
+    assert step_of_gain(load_design("joint"), "control.position.gain") is None
 
 
 def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
@@ -143,20 +144,10 @@ def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
     assert position.feedforward > 0.0 or position.acceleration_feedforward > 0.0
 
 
-def test_ranges_of_objects_hold_only_for_the_drive_that_has_them():
-    """0x2348.01 holds 1 to 250 1/s in whole steps; another drive may have any gain."""
-    baseline = load_design("ilr33-amber")
-    assert baseline.objects.named
-    assert allowed_range(baseline, "control.position.gain") == (1.0, 250.0)
-    other = replace(baseline, objects=model.ControllerObjects())
-    assert allowed_range(other, "control.position.gain") == (0.0, np.inf)
-    assert step_of_gain(load_design("joint"), "control.position.gain") is None
-
-
 @pytest.mark.parametrize(("words", "design", "message"), [
     (("filter",), servo(), "notch, lowpass, feedforward"),
     (("feedforward",), servo(), "no control.position"),
-    (("notch",), direct(), "no control.velocity"),
+    (("notch",), DIRECT, "no control.velocity"),
 ])  # fmt: skip
 def test_what_has_no_place_is_refused(words, design, message):
     asked = replace(design, requirements=(need("gain_margin", 6.0, loop="every", unit="dB"),))

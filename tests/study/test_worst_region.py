@@ -22,7 +22,7 @@ def _cube(region: Region, count: int = 4000) -> np.ndarray:
     return np.random.default_rng(1).uniform(size=(count, region.dimensions))
 
 
-def test_without_correlations_it_is_the_box_and_its_corners() -> None:
+def test_without_correlations_it_is_the_box_and_samples_of_a_table_are_taken_whole() -> None:
     sampler = Sampler((normal("a", 1.0, 0.1), uniform("b", 5.0, 2.0)), np.eye(2))
     region = Region(sampler)
     assert region.dimensions == 2
@@ -30,6 +30,15 @@ def test_without_correlations_it_is_the_box_and_its_corners() -> None:
     drawn = sampler.draw(0, 50)
     inside = np.clip(drawn, *sampler.box)
     np.testing.assert_allclose(region.values(region.cube(inside)), inside, rtol=1e-12)
+    # a table whose columns sum to one: no point of the region breaks that
+    first = np.random.default_rng(3).uniform(size=40)
+    table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
+    region = Region(Sampler((normal("a"),), np.eye(1), table))
+    assert region.dimensions == 2
+    values = region.values(_cube(region, 500))
+    np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)
+    rows = np.column_stack([np.zeros(40), table.rows])
+    np.testing.assert_allclose(region.values(region.cube(rows)), rows, atol=1e-12)
 
 
 @pytest.mark.parametrize("r", [-0.97, -0.4, 0.2, 0.8, 0.999])
@@ -73,18 +82,6 @@ def test_tied_parameters_move_as_one_and_reach_the_edges(sign: float) -> None:
         assert sorted(ends) == pytest.approx([2.0 - width[0], 2.0 + width[0]], rel=1e-9)
 
 
-def test_samples_of_a_table_are_taken_whole() -> None:
-    """A table whose columns sum to one: no point of the region breaks that."""
-    first = np.random.default_rng(3).uniform(size=40)
-    table = Table(("x", "y"), np.column_stack([first, 1.0 - first]))
-    region = Region(Sampler((normal("a"),), np.eye(1), table))
-    assert region.dimensions == 2
-    values = region.values(_cube(region, 500))
-    np.testing.assert_allclose(values[:, 1] + values[:, 2], 1.0, atol=1e-12)
-    rows = np.column_stack([np.zeros(40), table.rows])
-    np.testing.assert_allclose(region.values(region.cube(rows)), rows, atol=1e-12)
-
-
 def test_a_worst_case_of_correlated_parameters_is_one_that_occurs(tmp_path) -> None:
     """The friction and inertia of a drive, correlated at -0.95: the search does not leave their ellipse."""
     base = load_design("ilr33-amber")
@@ -121,16 +118,7 @@ def test_one_constant_is_drawn_as_one_and_opposite_ones_opposite(sign: float) ->
     assert np.std(draws[KM]) == pytest.approx(1e-4, rel=0.05)
 
 
-def test_three_that_are_one_and_what_contradicts() -> None:
-    """L L' gives the matrix back for singular ones; an indefinite one is refused."""
-    for matrix in (np.ones((3, 3)), np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 1.0]])):
-        root = semidefinite_root(matrix)
-        assert root @ root.T == pytest.approx(matrix, abs=1e-12)
-    with pytest.raises(InputError, match="contradict"):
-        semidefinite_root(np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5], [0.5, -0.5, 1.0]]))
-
-
-def test_tuning_looks_at_no_corner_where_one_constant_is_two() -> None:
+def test_three_that_are_one_what_contradicts_and_no_corner_where_one_constant_is_two() -> None:
     design = _tied()
     problem = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
     names = [factor.path for factor in problem.factors]
@@ -139,9 +127,15 @@ def test_tuning_looks_at_no_corner_where_one_constant_is_two() -> None:
     assert corners[:, i] == pytest.approx(corners[:, j], rel=1e-12)
     assert len(corners) == 1 + 2 ** (len(names) - 1)
     assert {float(v) for v in np.round(corners[:, i], 8)} == {5.6e-3, 5.9e-3, 6.2e-3}
+    # L L' gives the matrix back for singular ones; an indefinite one is refused
+    for matrix in (np.ones((3, 3)), np.array([[1.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.5, 0.5, 1.0]])):
+        root = semidefinite_root(matrix)
+        assert root @ root.T == pytest.approx(matrix, abs=1e-12)
+    with pytest.raises(InputError, match="contradict"):
+        semidefinite_root(np.array([[1.0, 1.0, 0.5], [1.0, 1.0, -0.5], [0.5, -0.5, 1.0]]))
 
 
-def test_an_identified_covariance_comes_out_of_the_samples() -> None:
+def test_an_identified_covariance_comes_out_of_the_samples_cut_off_where_no_drive_is() -> None:
     """Three values with a nearly singular covariance: written, read, drawn, and found again."""
     paths = ("friction.dry_torque", "friction.viscous", "friction.load_coefficient")
     values = np.array([2.25e-3, 5.25e-6, 1.34e-3])
@@ -154,10 +148,7 @@ def test_an_identified_covariance_comes_out_of_the_samples() -> None:
     sampler = sampler_of(design)
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
     assert np.cov(draws.T) == pytest.approx(covariance, rel=0.03)
-
-
-def test_a_value_poorly_known_is_cut_off_where_no_drive_is() -> None:
-    """A friction of 2 +- 1.5 would be negative in one draw of eleven: its distribution ends at zero."""
+    # a friction of 2 +- 1.5 would be negative in one draw of eleven: its distribution ends at zero
     fit = Fit(names=("friction.viscous",), values=np.array([2e-6]), covariance=np.array([[2.25e-12]]))
     design = read_design_text(write_design(design_with_fit(load_design("ilr33-amber"), fit, "test")))
     tolerance = design.parameters["friction.viscous"].tolerance

@@ -29,7 +29,5 @@ def uniform(path: str, nominal: float, half: float) -> Factor:
     return Factor(path, nominal, Tolerance(kind="uniform", half_width=half))
 
 
-def need(quantity, minimum=None, maximum=None, loop="velocity", unit="deg") -> Requirement:
-    return Requirement(
-        id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, maximum=maximum, loop=loop
-    )
+def need(quantity, minimum, loop="velocity", unit="deg") -> Requirement:
+    return Requirement(id=f"{loop}-{quantity}", quantity=quantity, unit=unit, minimum=minimum, loop=loop)

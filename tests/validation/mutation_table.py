@@ -1,4 +1,3 @@
-# ruff: noqa: T201 - a script that writes a table for people
 """Which row of a validation sees a change of each key of a design file.
 
 The model is changed by 1 %, the drive that is simulated is not; the first row that is not met is told.  Where
@@ -9,7 +8,6 @@ as a script it writes docs/validation_keys.md::
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from operator import attrgetter
 from pathlib import Path
 
@@ -38,16 +36,6 @@ CHOICES: dict[str, tuple[object, ...]] = {
 }
 
 
-@dataclass(frozen=True)
-class Seen:
-    """A changed key: by what, and the row that sees it, or why none does."""
-
-    key: str
-    change: str
-    row: Row | None
-    why: str = ""
-
-
 def chosen(design: Design) -> dict[str, object]:
     """What a design has of the keys whose choice another of `CHOICES` can take."""
     there: dict[str, object] = {}
@@ -63,19 +51,15 @@ def keys_of(design: Design) -> tuple[str, ...]:
     return (*design.parameters, *chosen(design))
 
 
-def seen(design: Design, key: str) -> Seen:
-    """The smallest change of a key that a row sees."""
-    if why := NO_RUN.get(key) or why_idle(design, key):
-        return Seen(key, "", None, why)
-    refused = ""
-    for words, model in changed(design, key):
+def seen(design: Design, key: str) -> tuple[str, str, str]:
+    """The smallest change of a key that a row sees, the row, and where; or why none does."""
+    why = NO_RUN.get(key) or why_idle(design, key)
+    for words, model in () if why else changed(design, key):
         if isinstance(model, str):
-            refused = model
-            continue
-        row = first_row(design, model)
-        if row is not None:
-            return Seen(key, words, row)
-    return Seen(key, "", None, f"refused: {refused}" if refused else "")
+            why = f"refused: {model}"
+        elif (row := first_row(design, model)) is not None:
+            return words, f"{row.loop} {row.name}", row.condition or row.because
+    return "", "", why or "NOT SEEN"
 
 
 def why_idle(design: Design, key: str) -> str:
@@ -112,34 +96,25 @@ def changed(design: Design, key: str) -> Iterator[tuple[str, Design | str]]:
             yield words, str(error).splitlines()[0]
 
 
+def rows(design: Design, model: Design) -> Iterator[Row]:
+    yield from design_value_rows(design, model)
+    for place in Bench(design, model).places():
+        yield from small_signal(place)
+
+
 def first_row(design: Design, model: Design) -> Row | None:
     """The first row that is not met, the numbers of the design first; None: the model passes."""
     try:
-        for row in design_value_rows(design, model):
-            if row.verdict is Verdict.NOT_MET:
-                return row
-        for place in Bench(design, model).places():
-            for row in small_signal(place):
-                if row.verdict is Verdict.NOT_MET:
-                    return row
+        return next((row for row in rows(design, model) if row.verdict is Verdict.NOT_MET), None)
     except (InputError, NumericalError) as error:
         return Row(name="refused", loop="drive", because=str(error), verdict=Verdict.NOT_MET)
-    return None
 
 
-def lines(name: str) -> Iterator[str]:
-    yield f"## {name}"
-    yield ""
-    yield "| key | change | seen by | where |"
-    yield "|---|---|---|---|"
-    design = load_design(name)
-    for key in keys_of(design):
-        found = seen(design, key)
-        if found.row is None:
-            yield f"| `{key}` | | | {found.why or 'NOT SEEN'} |"
-        else:
-            row = found.row
-            yield f"| `{key}` | {found.change} | {row.loop} {row.name} | {row.condition or row.because} |"
+def table(name: str) -> Iterator[str]:
+    yield f"## {name}\n\n| key | change | seen by | where |\n|---|---|---|---|"
+    for key in keys_of(design := load_design(name)):
+        change, row, where = seen(design, key)
+        yield f"| `{key}` | {change} | {row} | {where} |" if row else f"| `{key}` | | | {where} |"
     yield ""
 
 
@@ -156,13 +131,5 @@ Made by `python -m tests.validation.mutation_table`; tests/validation/test_desig
 """
 
 
-def main() -> None:
-    page = [HEAD]
-    for name in DRIVES:
-        page += lines(name)
-        print(name, flush=True)
-    PAGE.write_text("\n".join(page), encoding="utf-8")
-
-
 if __name__ == "__main__":
-    main()
+    PAGE.write_text("\n".join([HEAD, *(line for name in DRIVES for line in table(name))]), encoding="utf-8")

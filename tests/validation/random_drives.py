@@ -72,9 +72,7 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
     return changed(design, load={"path": "back-drivable", "moment_slope_Nm_rad": slope})
 
 
-def _plant(
-    dice: Dice, delay: float, axis: str
-) -> tuple[model.Motor, float, tuple[model.Gear, ...], model.Load]:
+def _plant(dice: Dice, delay: float, axis: str):
     R, k = dice.decades(0.05, 50.0), dice.decades(0.005, 2.0) * (20.0 if axis == "linear" else 1.0)
     L = R * delay * dice.decades(2.0, 60.0)
     inertia = dice.decades(1.0, 300.0) * (L / R) * k**2 / R
@@ -90,9 +88,7 @@ def _plant(
     return motor, inertia, gears, model.Load(inertia_kgm2=inertia * share * prod(ratios) ** 2)
 
 
-def _controller(
-    dice: Dice, motor: model.Motor, inertia: float, period: float, delay: float, current: bool, velocity: bool
-) -> model.Controller:
+def _controller(dice, motor, inertia, period, delay, current, velocity) -> model.Controller:
     """A cascade whose crossovers are fractions of each other."""
     R, L, k = motor.resistance_ohm, motor.inductance_H, motor.torque_constant_Nm_A
     inner = dice.rng.uniform(0.1, 0.5) / (period + delay)
@@ -117,9 +113,8 @@ def _controller(
     else:
         slow = min(k**2 / (R * inertia), R / L)
         position = model.PositionLoop(gain=k * slow / dice.decades(2.5, 20.0), every=n_v)
-    return model.Controller(
-        period_s=period, computing_delay_s=delay, position=position, velocity=velocities, current=currents
-    )
+    stages = {"position": position, "velocity": velocities, "current": currents}
+    return model.Controller(period_s=period, computing_delay_s=delay, **stages)
 
 
 def _limits(dice: Dice, motor: model.Motor, control: model.Controller) -> model.Limits:
@@ -127,13 +122,12 @@ def _limits(dice: Dice, motor: model.Motor, control: model.Controller) -> model.
     volts = dice.decades(3.0, 600.0)
     short, fastest = volts / motor.resistance_ohm, volts / motor.back_emf_constant_Vs_rad
     speed = fastest * dice.rng.uniform(0.2, 1.0) if control.velocity and dice.chance(0.7) else inf
-    acceleration = inf
+    limits = {"voltage_V": volts, "speed_rad_s": speed}
     if control.velocity is not None and dice.chance(0.3):
-        acceleration = fastest * control.position_loop.gain * dice.decades(0.3, 30.0)
-    peak = short * dice.decades(0.05, 1.0) if control.current is not None and dice.chance(0.8) else inf
-    return model.Limits(
-        voltage_V=volts, speed_rad_s=speed, acceleration_rad_s2=acceleration, peak_current_A=peak
-    )
+        limits["acceleration_rad_s2"] = fastest * control.position_loop.gain * dice.decades(0.3, 30.0)
+    if control.current is not None and dice.chance(0.8):
+        limits["peak_current_A"] = short * dice.decades(0.05, 1.0)
+    return model.Limits(**limits)
 
 
 def _friction(dice: Dice, torque: float, speed: float) -> model.Friction:
@@ -141,13 +135,11 @@ def _friction(dice: Dice, torque: float, speed: float) -> model.Friction:
     if dice.chance(0.15):
         return model.Friction()
     dry = 0.0 if dice.chance(0.2) else torque * dice.decades(1e-3, 0.2)
-    return model.Friction(
-        law=dice.one_of("coulomb", "coulomb", "coulomb", "tanh"),
-        dry_torque_Nm=dry,
-        viscous_Nms_rad=0.0 if dice.chance(0.2) else torque / speed * dice.decades(1e-4, 0.3),
-        breakaway_ratio=dice.one_of(1.0, 1.0, 1.3),
-        smoothing_speed_rad_s=1e-2 * speed,
-    )
+    law = dice.one_of("coulomb", "coulomb", "coulomb", "tanh")
+    viscous = 0.0 if dice.chance(0.2) else torque / speed * dice.decades(1e-4, 0.3)
+    torques = {"dry_torque_Nm": dry, "viscous_Nms_rad": viscous}
+    torques["breakaway_ratio"] = dice.one_of(1.0, 1.0, 1.3)
+    return model.Friction(law=law, smoothing_speed_rad_s=1e-2 * speed, **torques)
 
 
 def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
@@ -157,12 +149,8 @@ def _encoder(dice: Dice, control: model.Controller, axis: str) -> model.Encoder:
         counts = int(dice.decades(1e3, 1e6)) * (100 if axis == "linear" else 1)
     inner = control.velocity.every if control.velocity else 1
     band = 0.2 / (control.period_s * inner) if source == "tracking" else None
-    return model.Encoder(
-        counts_per_rev=counts,
-        speed=source,
-        bandwidth_rad_s=band,
-        filter_time_s=inner * control.period_s * dice.one_of(0.0, 0.0, 0.5),
-    )
+    lag = inner * control.period_s * dice.one_of(0.0, 0.0, 0.5)
+    return model.Encoder(counts_per_rev=counts, speed=source, bandwidth_rad_s=band, filter_time_s=lag)
 
 
 def full_drive(seed: int) -> model.Design:

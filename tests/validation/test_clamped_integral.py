@@ -20,6 +20,7 @@ from analyses.large_signal.map import amplitude_map
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 from nonlinear import Rows, commands, simulate
+from tests.loops.loop_designs import source_drive
 
 T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 
@@ -27,15 +28,8 @@ T, k, J, Kp, Tn, Kv, LIMIT = 5e-4, 0.5, 0.02, 6.0, 0.05, 12.0, 30.0
 def drive(law: str, feedforward: float = 3.0) -> model.Design:
     velocity = model.VelocityLoop(gain=Kp, integral_time_s=Tn, anti_windup=law)
     place = model.PositionLoop(gain=Kv, acceleration_feedforward=feedforward)
-    return model.Design(
-        name="clamped",
-        title="Clamped integral",
-        motor=model.Motor(rotor_inertia_kgm2=J, source_gain_Nm_V=k),
-        load=model.Load(path="back-drivable"),
-        controller=model.Controller(period_s=T, computing_delay_s=0.0, position=place, velocity=velocity),
-        limits=model.Limits(voltage_V=LIMIT),
-        validation=model.Validation(full_deflection_rad=1.0),
-    )
+    stages = {"position": place, "velocity": velocity}
+    return source_drive(J, k, T, LIMIT, load={"path": "back-drivable"}, controller=stages)
 
 
 def sizes(hertz: Any, feedforward: float = 3.0) -> tuple[np.ndarray, np.ndarray]:

@@ -23,6 +23,7 @@ from analyses.validation import QUICK, validate
 from nonlinear import commands, simulate
 from reports.sections.beyond import large_commands as section
 from tests.changed import changed
+from tests.loops.loop_designs import source_drive
 from tests.validation.random_drives import full_drive
 
 DESIGN = load_design(Path(__file__).with_name("conditional.toml"))
@@ -157,16 +158,10 @@ def unstable(slope_Nm_rad: float, volts: float = 10.0, full_rad: float = 3.0) ->
     """A torque source with P controllers on a load that pushes away from the middle."""
     velocity = model.VelocityLoop(gain=1.6, integral_time_s=None)
     loops = {"position": model.PositionLoop(gain=30.0), "velocity": velocity}
-    return model.Design(
-        name="inverted",
-        motor=model.Motor(rotor_inertia_kgm2=1e-3, source_gain_Nm_V=0.5),
-        gears=(model.Gear(name="g", ratio=10.0),),
-        load=model.Load(inertia_kgm2=0.1, path="back-drivable", moment_slope_Nm_rad=slope_Nm_rad),
-        controller=model.Controller(period_s=2e-4, computing_delay_s=0.0, **loops),
-        limits=model.Limits(voltage_V=volts),
-        command=model.Command(rate_rad_s=0.2),
-        validation=model.Validation(full_deflection_rad=full_rad),
-    )
+    load = {"inertia_kgm2": 0.1, "path": "back-drivable", "moment_slope_Nm_rad": slope_Nm_rad}
+    more = {"command": {"rate_rad_s": 0.2}, "validation": {"full_deflection_rad": full_rad}}
+    gears = (model.Gear(name="g", ratio=10.0),)
+    return source_drive(1e-3, 0.5, 2e-4, volts, gears=gears, load=load, controller=loops, **more)
 
 
 @pytest.mark.parametrize("slope", [20.0, 40.0])

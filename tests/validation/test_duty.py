@@ -123,3 +123,10 @@ def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
     made = section(duty(AMBER, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
     assert "it is not followed as asked, limited by" in made["result"]
     assert made["status"] == "warn"
+
+
+def test_the_current_of_an_ac_motor_is_told_in_the_model_s_amperes(cli) -> None:
+    first, *rest = cli.text("duty", "ballscrew").splitlines()
+    assert " A dc, rms over time, limit " in first
+    assert any("current, rms over time" in line and " A dc " in line for line in rest)
+    assert " A dc" not in cli.text("duty", "joint")

@@ -26,7 +26,6 @@ from tests.validation.random_drives import full_drive
 AMBER, FIN = load_design("ilr33-amber"), load_design("fin")
 FILTERED = {"speed": "difference", "difference_samples": 4, "filter_time_s": 1e-3}
 TRACKING = {"speed": "tracking", "bandwidth_rad_s": 1500.0}
-every_estimate = pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
 
 
 def counting(per_rev: int, **encoder: object) -> Design:
@@ -64,30 +63,23 @@ def test_beyond_the_linear_amplitude_the_gain_is_one_within_5_percent() -> None:
     assert max(abs(counted_gain(r, d) - 1.0) for r in below for d in offsets) > 0.045
 
 
-@every_estimate
-def test_a_counted_speed_has_its_cycle_at_the_border(encoder: dict[str, object]) -> None:
-    """The gain 2 q/(pi A) on the speed alone brings a pole of the closed loop to the unit circle."""
+@pytest.mark.parametrize("encoder", [FILTERED, TRACKING], ids=["difference", "tracking"])
+def test_a_counted_speed_has_its_cycle_at_the_border_and_from_rest(encoder: dict[str, object]) -> None:
+    """The gain 2 q/(pi A) on the speed alone brings a pole of the closed loop to the unit circle.
+
+    Without friction, pushed off the edge a little, it swings so within a fifth (first harmonic).
+    """
     design = counting(4000, **encoder)
     (cycle,) = cycles_of_quantisation(design)
-    gain = 2.0 * design.angle_quantum_rad / (pi * cycle.inner_rad)
-    free = without_nonlinearities(design)
-    louder = Filter(kind="biquad", on="speed", b=(gain,), a=(0.0,))
+    q, free = design.angle_quantum_rad, without_nonlinearities(design)
+    louder = Filter(kind="biquad", on="speed", b=(2.0 * q / (pi * cycle.inner_rad),), a=(0.0,))
     loop = assemble_loops(changed(free, controller={"velocity": {"filters": (louder,)}})).position
     poles = loop.closed_loop.poles()
     pole = poles[np.argmin(np.abs(poles - np.exp(2j * pi * cycle.frequency_hz * loop.period_s)))]
     assert abs(pole) == pytest.approx(1.0, abs=1e-6)
     assert np.abs(poles).max() < 1.0 + 1e-6
-
-
-@every_estimate
-def test_the_cycle_of_a_counted_speed_is_there_from_rest(encoder: dict[str, object]) -> None:
-    """Without friction, pushed off the edge a little; size and frequency within a fifth (first harmonic)."""
-    design = counting(4000, **encoder)
-    (cycle,) = cycles_of_quantisation(design)
-    q, free = design.angle_quantum_rad, without_nonlinearities(design)
     run = simulate(free, commands.hold(-1e-3 * q / design.total_ratio), 2.0, limits_on=False)
-    tail = run.motor_angle_rad[-6000:]
-    tail = tail - tail.mean()
+    tail = run.motor_angle_rad[-6000:] - run.motor_angle_rad[-6000:].mean()
     crossings = np.flatnonzero((tail[:-1] < 0.0) & (tail[1:] >= 0.0))
     hertz = (crossings.size - 1) / ((crossings[-1] - crossings[0]) * design.controller.period_s)
     assert 0.5 * np.ptp(tail) == pytest.approx(cycle.inner_rad, rel=0.2)

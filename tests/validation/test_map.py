@@ -12,20 +12,10 @@ from actuator_lti import NumericalError, assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs, with_values
 from actuator_lti.design.model import Command, Design, Friction
 from analyses.friction_effects.breakaway import static_threshold
+from analyses.large_signal import tones
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, waveforms
 from analyses.large_signal.map import AmplitudeMap, amplitude_bode, amplitude_map
 from analyses.large_signal.result import ROUNDS, limit_shift
-from analyses.large_signal.tones import (
-    LEAST_UPDATES,
-    LEFT_AT_REST,
-    PLACES,
-    amplitudes,
-    linear_steady_state,
-    run_tones,
-    tone,
-    without_value,
-    work_ticks,
-)
 from tests.changed import changed
 from tests.nonlinear.elastic_drive import drive_f
 
@@ -44,18 +34,18 @@ def amber_map() -> AmplitudeMap:
 @pytest.mark.parametrize("hz", [0.3, 7.77, 100.0, 389.0])
 def test_tones_pass_as_many_phases_as_they_have_updates(hz: float) -> None:
     design = load_design("ilr33-amber-multirate")
-    result, every = tone(hz, design), design.controller.position.every
+    result, every = tones.tone(hz, design), design.controller.position.every
     updates = result.ticks // every
     assert result.ticks == updates * every
     assert math.gcd(result.cycles, updates) == 1
-    assert updates >= LEAST_UPDATES
+    assert updates >= tones.LEAST_UPDATES
     span_s = result.ticks * design.controller.period_s
     assert result.cycles / span_s == pytest.approx(result.frequency_hz, rel=1e-12)
     assert result.frequency_hz == pytest.approx(hz, rel=2.0 / updates)
 
 
 def test_amplitudes_hold_those_that_the_design_asks_for() -> None:
-    values, full = amplitudes(AMBER, 25, 1e-5), AMBER.validation.full_deflection_rad
+    values, full = tones.amplitudes(AMBER, 25, 1e-5), AMBER.validation.full_deflection_rad
     assert len(values) == 25
     assert np.all(np.diff(values) > 0.0)
     for fraction in AMBER.validation.amplitude_fractions:
@@ -81,14 +71,14 @@ def test_friction_of_nothing_shifts_nothing() -> None:
 
 def test_without_friction_the_linear_response_holds_below_the_border() -> None:
     loops = assemble_loops(AMBER)
-    tones = tuple(tone(f, AMBER) for f in (1.0, 8.0, 30.0, 120.0))
-    omega = np.array([t.omega_rad_s for t in tones])
-    start, border = linear_steady_state(loops, omega), onset(loops, omega)
+    sines = tuple(tones.tone(f, AMBER) for f in (1.0, 8.0, 30.0, 120.0))
+    omega = np.array([t.omega_rad_s for t in sines])
+    start, border = tones.linear_steady_state(loops, omega), onset(loops, omega)
     which = np.arange(4)
     for share, everything in ((0.95, True), (1.1, False)):
         amplitude = share * border.amplitude_rad
         begin = np.minimum(amplitude, 0.9 * border.amplitude_rad)
-        result = run_tones(AMBER, tones, which, amplitude, start, begin, friction_on=False)
+        result = tones.run_tones(AMBER, sines, which, amplitude, start, begin, friction_on=False)
         linear = result.phasor("output_angle_rad") / amplitude / start.output
         names = [CAUSES[k] for k in causes(result, start.output, amplitude)]
         if everything:
@@ -102,7 +92,7 @@ def test_the_linear_response_is_that_of_the_loops() -> None:
     loops, omega = assemble_loops(AMBER), 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
     system = loops.reference_to_output
     expected = system(np.exp(1j * omega * system.dt))
-    np.testing.assert_allclose(linear_steady_state(loops, omega).output, expected, rtol=1e-9)
+    np.testing.assert_allclose(tones.linear_steady_state(loops, omega).output, expected, rtol=1e-9)
 
 
 def test_what_the_map_shows(amber_map: AmplitudeMap) -> None:
@@ -126,10 +116,10 @@ def test_limits_act_above_the_lowest_line_only(amber_map: AmplitudeMap) -> None:
 
 def test_a_command_below_the_threshold_moves_nothing() -> None:
     design = load_design("emps")
-    loops, tones = assemble_loops(design), (tone(5.0, design),)
-    start = linear_steady_state(loops, np.array([tones[0].omega_rad_s]))
+    loops, sines = assemble_loops(design), (tones.tone(5.0, design),)
+    start = tones.linear_steady_state(loops, np.array([sines[0].omega_rad_s]))
     small = np.array([0.5 * static_threshold(design).smallest_rad])
-    result = run_tones(design, tones, np.array([0]), small, start, 0.0 * small)
+    result = tones.run_tones(design, sines, np.array([0]), small, start, 0.0 * small)
     assert WAVEFORMS[waveforms(result)[0]] == "no motion"
     assert CAUSES[causes(result, start.output, small)[0]] == "stiction"
 
@@ -146,13 +136,13 @@ def test_a_drive_without_limits_has_no_border_and_an_unstable_loop_has_a_map() -
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_every_state_of_a_shipped_drive_is_known(name: str) -> None:
-    assert not without_value(assemble_loops(name).tick_system.states, PLACES, LEFT_AT_REST)
+    assert not tones.without_value(assemble_loops(name).tick_system.states, tones.PLACES, tones.LEFT_AT_REST)
 
 
 def test_every_start_has_a_state_of_the_linear_drive() -> None:
     """A name that no drive has would be passed over, and the run would begin at rest."""
-    multirate = ("ilr33-amber", "ilr33-amber-multirate")
-    assert set(PLACES) <= {state for name in multirate for state in assemble_loops(name).tick_system.states}
+    loops = (assemble_loops(name) for name in ("ilr33-amber", "ilr33-amber-multirate"))
+    assert set(tones.PLACES) <= {state for each in loops for state in each.tick_system.states}
 
 
 def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
@@ -161,7 +151,7 @@ def test_a_start_refuses_a_state_that_it_does_not_know() -> None:
     kept = {name: getattr(system, name) for name in ("outputs", "ticks", "matrices")}
     strange = SimpleNamespace(states=("flux", *system.states[1:]), **kept)
     with pytest.raises(NumericalError, match="state flux of the linear drive"):
-        linear_steady_state(replace(loops, tick_system=strange), np.array([10.0]))
+        tones.linear_steady_state(replace(loops, tick_system=strange), np.array([10.0]))
 
 
 def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(amber_map, monkeypatch) -> None:
@@ -171,7 +161,7 @@ def test_a_drive_that_settles_slowly_has_a_coarser_grid_and_says_so(amber_map, m
     assert not amber_map.coarser
     assert not whole.coarser
     monkeypatch.setattr("analyses.large_signal.map.MOST_TICKS", amber_map.ticks // 9)
-    two_thirds = (ROUNDS + 2) * work_ticks(AMBER, loops, 6) * 2 // 3 + 1
+    two_thirds = (ROUNDS + 2) * tones.work_ticks(AMBER, loops, 6) * 2 // 3 + 1
     monkeypatch.setattr("analyses.large_signal.result.MOST_TICKS", two_thirds)
     shift = limit_shift(AMBER, loops, count=6)
     assert shift.coarser

@@ -174,17 +174,10 @@ def test_points_without_motion_are_left_out_without_a_warning() -> None:
     assert "not compared" in described(replace(sweep, measured=nothing, described=expected))
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"control.velocity.gain": 1.01 * 0.12},
-        {"motor.rotor_inertia": 1.01 * 9.2e-7},
-        {"control.computing_delay": 1.01e-4},
-    ],
-)
-def test_a_wrong_model_is_seen(change: dict[str, float]) -> None:
+@pytest.mark.parametrize("key", ["control.velocity.gain", "motor.rotor_inertia", "control.computing_delay"])
+def test_a_wrong_model_is_seen(key: str) -> None:
     """One per cent of a gain, of the inertia, of the delay: rows are not met, and say which."""
     design = load_design("ilr33-amber")
-    bench = Bench(design, design.with_values(change))
+    bench = Bench(design, design.with_values({key: 1.01 * design.parameters[key].value}))
     verdicts = {row.name: row.verdict for row in small_signal(bench.place("position"))}
     assert verdicts["response"] == verdicts["gain_margin"] == "not met"

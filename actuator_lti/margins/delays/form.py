@@ -7,7 +7,8 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.given import Given
-from actuator_lti.margins.loop import Mask, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
+from actuator_lti.types import Mask, Real
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,9 @@ from actuator_lti.margins.exact.decided import ACROSS, Shared, hidden_notes, sha
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.exact.roots import within
 from actuator_lti.margins.given import ULP, Given
-from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
+from actuator_lti.types import Complex, Mask, Real
 
 _METHOD = "roots of exact polynomials, isolated in certified intervals; no grid"
 _GIVEN = "exact arithmetic on the given doubles"

@@ -18,10 +18,11 @@ from actuator_lti.margins.exact.decided import ACROSS, hidden_notes, shared
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop, neighbours
 from actuator_lti.margins.factored import with_delay
 from actuator_lti.margins.given import ULP, Given
-from actuator_lti.margins.loop import Complex, RationalLoop, Real
+from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful, in_double_precision
+from actuator_lti.types import Complex, Real
 
 _BITS = 160  # of the roots
 

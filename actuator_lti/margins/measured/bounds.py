@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.margins.loop import Complex, Mask, Real
 from actuator_lti.systems.measured_response import at_once
+from actuator_lti.types import Complex, Mask, Real
 
 _LARGE_TURN = np.radians(60.0)
 _LARGE_STEP = np.log(10.0) / 2.0  # 10 dB

@@ -12,11 +12,11 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.loop import Complex, Real
 from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds, distance_ranges
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement, DiskMargin, GainMargin, PhaseMargin
 from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
+from actuator_lti.types import Complex, Real
 
 _MOST_UNRESOLVED = 0.5
 _TOLD = 6

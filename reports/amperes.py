@@ -1,0 +1,29 @@
+"""Which amperes: the simulated current of an AC motor is that of its DC equivalent, not the data sheet's."""
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from actuator_lti.design.model import Design
+
+_OTHER = r"\bA\b(?! ?(?:dc|rms|pe?a?k|phase)|\()"
+_WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), r"(?<=\d )")}
+_WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
+
+
+def in_amperes(value: Any, design: Design | None, key: str = "") -> Any:
+    """Plain data of a design's results with ``A dc`` for A, where its file has several amperes.
+
+    Examples
+    --------
+    >>> from actuator_lti import load_design
+    >>> in_amperes({"result": "A limit of 2 A, 3 A rms", "unit": "A"}, load_design("ballscrew"))
+    {'result': 'A limit of 2 A dc, 3 A rms', 'unit': 'A dc'}
+    """
+    if design is None or design.motor.constants == "dc":
+        return value
+    if isinstance(value, str):
+        return _WORDS[key].sub("A dc", value) if key in _WORDS else value
+    if isinstance(value, Mapping):
+        return {name: in_amperes(one, design, name) for name, one in value.items()}
+    return [in_amperes(one, design, key) for one in value] if isinstance(value, list | tuple) else value
