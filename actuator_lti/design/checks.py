@@ -106,22 +106,28 @@ def _requirements(design: Design) -> Iterator[Refusal]:
             yield from readable(check(design, number, item))
 
 
+def _path_of(design: Design, number: int, item: Requirement) -> str:
+    """A requirement by its id; by its number where an earlier one has the same."""
+    again = any(item.id == other.id for other in design.requirements[:number])
+    return f"requirement[{number + 1}]" if again else f"requirement.{item.id}"
+
+
 def _named_once(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
-    if any(item.id == other.id for other in design.requirements[:number]):
-        yield f"requirement.{item.id}.id", shown(item.id), "allowed: each id once"
+    if (path := _path_of(design, number, item)) != f"requirement.{item.id}":
+        yield f"{path}.id", shown(item.id), "allowed: each id once"
 
 
-def _limit(_design: Design, _number: int, item: Requirement) -> Iterator[Refusal]:
-    path = f"requirement.{item.id}"
+def _limit(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
+    path = _path_of(design, number, item)
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
     elif item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
         yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
 
 
-def _asked_of(design: Design, _number: int, item: Requirement) -> Iterator[Refusal]:
+def _asked_of(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
     """The loop, the rotor and the response that it is of."""
-    path, quantity = f"requirement.{item.id}", QUANTITIES[item.quantity]
+    path, quantity = _path_of(design, number, item), QUANTITIES[item.quantity]
     present = {"every", *design.controller.stages}
     if quantity.scope == "loop" and item.loop not in present:
         given = "missing" if item.loop is None else shown(item.loop)

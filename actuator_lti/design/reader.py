@@ -410,7 +410,7 @@ class Reader:
         if not key:
             return f"{section.path}.{index}"
         if section.label or not isinstance(table, dict):
-            return path if isinstance(name, str) else numbered
+            return path if isinstance(name, str) and path not in before else numbered
         if name is None:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):

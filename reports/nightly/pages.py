@@ -192,12 +192,13 @@ def line_chart(
     panel.x.days, panel.x.grid, panel.x.name = True, False, "night"
     panel.x.limits(first - 0.03 * max(span, 1.0), last + 0.03 * max(span, 1.0))
     ends = [(first + 0.1 * span, nights[0][:10]), (last - 0.1 * span, nights[-1][:10])]
-    panel.x.ticks = ends if len(nights) > 1 else ends[1:]
+    panel.x.ticks = ends if span >= 1.0 else [(0.5 * (first + last), nights[-1][:10])]  # of one day, once
     panel.y.name = f"value, {one_line(unit, 20)}" if unit else "value"
     if limit is not None:
         panel.rule_y(limit, "limit", seen=True, colour=style.RED, dash=1)
     for point in points:
-        panel.rule_x(float(days[point.index]), "▼", colour=style.ORANGE, dash=2)
+        sign = "▲" if point.after > point.before else "▼"
+        panel.rule_x(float(days[point.index]), sign, colour=style.ORANGE, dash=2)
     corners = _corners(values)
     up = np.repeat(values[corners], 2)[:-1]
     up[1::2][np.isnan(values[corners[1:]])] = np.nan  # no step into a gap

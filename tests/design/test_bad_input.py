@@ -70,7 +70,7 @@ CASES = {
     "no name": ([('name = "ilr33-amber"', 'name = " "')], ["design.name", "allowed: a text"]),
     "name for paths": ([('name = "worm"', 'name = "../x"')], ["gear[2].name", "letters, digits"]),
     "duplicate gear": ([('name = "worm"', 'name = "planetary"')], ["gear[2].name", "each name once"]),
-    "duplicate requirement": ([('id = "phase-margin"', 'id = "gain-margin"')], ["requirement.gain-margin.id", "each id once"]),
+    "duplicate requirement": ([('id = "phase-margin"', 'id = "gain-margin"')], ["requirement[2].id", "each id once"]),
     "unknown quantity": ([('"gain_margin"', '"gain_margn"')], ["gain_margn", 'nearest known: "gain_margin"']),
     "loop that is not there": ([('loop = "position"', 'loop = "spin"')], ['.loop = "spin"', "velocity"]),
     "limit in a wrong unit": ([('"15 Hz"', '"15 dB"')], ["requirement.position-bandwidth.minimum", "Hz"]),

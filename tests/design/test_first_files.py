@@ -376,3 +376,15 @@ def test_a_load_of_the_command_line_beyond_the_largest_is_warned_of(cli) -> None
     said = cli("margins", "ilr33-amber", "--load", "1e9 N*m").err
     assert "--load: 1e+09 N*m lies above load.moment_max = 8 N*m" in said
     assert "--load" not in cli("margins", "ilr33-amber", "--load", "8 N*m").err
+
+
+def test_a_repeated_requirement_is_told_in_its_own_lines() -> None:
+    before = write_design(load_design("ilr33-amber"))
+    again = (
+        '[[requirement]]\nid = "gain-margin"\nquantity = "gain_margin"\nloop = "spede"\nminimum = "6 dB"\n'
+    )
+    lines = (before + again).splitlines()
+    first, second = told(before + again).splitlines()
+    for said, key in ((first, 'id = "gain-margin"'), (second, 'loop = "spede"')):
+        last = len(lines) - lines[::-1].index(key)
+        assert f"line {last}: requirement[" in said

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from nightly_fakes import CODE, INLINE, Calendar, job, study
 from site_checks import Page, check_whole
 
+from reports.nightly.moves import change_points
 from reports.nightly.night import approve, run_night
 from reports.nightly.pages import line_chart
 from reports.nightly.text import one_line
@@ -118,3 +119,11 @@ def test_a_chart_is_well_formed_whatever_it_is_called(title: str) -> None:
     root = ElementTree.fromstring(line_chart(visible(title), visible(title), nights, values, (), 1.5))
     drawn = {"svg", "path", "text", "tspan", "g", "rect", "clipPath", "use", "defs"}
     assert {e.tag.rpartition("}")[2] for e in root.iter()} <= {"div", *drawn}
+
+
+@pytest.mark.parametrize(("before", "after", "sign"), [(1.0, 2.0, "▲"), (2.0, 1.0, "▼")])
+def test_nights_of_one_day_have_its_date_once_and_a_change_its_direction(before, after, sign) -> None:
+    nights = [f"2026-01-31T0{hour}:00:00Z" for hour in range(5)]
+    values = np.array([before, before, after, after, after])
+    drawn = line_chart("bandwidth", "Hz", nights, values, change_points(values, 0.1))
+    assert (drawn.count(">2026-01-31<"), drawn.count(f">{sign}<")) == (1, 1)
