@@ -135,7 +135,9 @@ ANALYSES = (
         """,
     ),
     Analysis("corners", LINEAR, CornersAsked, also=True),
-    Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
+    Analysis(
+        "simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating", warns=True
+    ),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),
     Analysis(

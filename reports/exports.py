@@ -9,7 +9,8 @@ from pathlib import Path
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
-from analyses.linear.code_check import CodeCheck
+from actuator_lti.files.atomic import write_bytes, write_together
+from analyses.linear.code_check import CodeCheck, check_code
 from reports.cli.options import folder_for_results, refuse_existing
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 
@@ -58,7 +59,6 @@ def export_controller(design: Design, asked: AskedController) -> Exported:
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
     """Write what `AskedFmu` says; refused where there is such a file, for an unknown version or platform."""
-    from actuator_lti.files.atomic import write_bytes
     from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
     from reports.export_documents import export_documents
     from reports.model_picture import model_png
@@ -84,7 +84,6 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
     """Write what `AskedLinear` says; refused where there is such a file already."""
-    from actuator_lti.files.atomic import write_bytes
     from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
 
     target = asked.target or Path(f"{design.name}-linear{SUFFIXES[asked.to]}")
@@ -102,14 +101,11 @@ def _refuse_any(folder: Path, names: Iterable[str], force: bool) -> None:
 
 
 def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None) -> Exported:
-    from actuator_lti.files.atomic import write_together
-
     write_together({folder / name: text.encode() for name, text in texts.items()})
     return Exported(tuple(str(folder / name) for name in texts), f"{folder}: {', '.join(texts)}", check)
 
 
 def _checked(design: Design) -> CodeCheck:
-    from analyses.linear.code_check import check_code
     from nonlinear.runs.watch import told_if_slow
 
     with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):

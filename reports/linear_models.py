@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-from actuator_lti.loops import Form, Loop, Loops
+from actuator_lti.loops import Form, Loop, Loops, exact_margins
 
 SCHEMA = "actuator-lti/linear"
 SUFFIXES = {"json": ".json", "mat": ".mat", "python": ".py"}
@@ -52,7 +53,6 @@ def system(entry):
 def linear_models(design: Design) -> Tree:
     """The tree of a design at its usual operating point: per form its loops, break points and responses."""
     from actuator_lti import assemble_loops
-    from actuator_lti.design import design_hash
 
     about = {"name": design.name, "revision": design.revision or "", "hash": design_hash(design)}
     tree: Tree = {"schema": SCHEMA, "version": 1, "design": about}
@@ -84,8 +84,6 @@ def _form(loops: Loops) -> Tree:
 
 def _loop(loop: Loop, loops: Loops) -> Tree:
     """Open loop, closed loop, sensitivity, and margins: of a periodic loop those of its whole period."""
-    from actuator_lti.loops import exact_margins
-
     if loop.periodic:  # the open loop of the fundamental is not all of it
         exact = asdict(exact_margins(loops, loop.break_point))
         margins = {name: value for name, value in exact.items() if value is not None and isfinite(value)}

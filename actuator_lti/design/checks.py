@@ -69,7 +69,7 @@ def contradictions(design: Design) -> Iterator[Refusal]:
         design = replace(design, **dict.fromkeys(unsure, UNREAD))
     with suppress(UnreadError):
         design = with_stand_ins(design)
-    for check in (*RELATIONS, _requirements, _waivers, _correlations):
+    for check in (*RELATIONS, _cogging, _requirements, _waivers, _correlations):
         yield from readable(check(design))
 
 
@@ -90,6 +90,14 @@ def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design:
 FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)  # of inertia, constants
 RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 """Between the numbers of a drive; an exported one checks them again when they are changed."""
+
+
+def _cogging(design: Design) -> Iterator[Refusal]:
+    """The order of the cogging has no usual value per metre; that is a period of 6.28 m."""
+    periods, given = design.motor.cogging_periods, "motor.cogging_periods" in design.parameters
+    if design.axis == "linear" and design.motor.cogging_Nm > 0.0 and periods == 1.0 and not given:
+        allowed = 'a magnet pitch, as "24 mm", or with a [screw] periods of a revolution, as 20'
+        yield "motor.cogging_periods", "", f"missing; motor.cogging needs it; allowed: {allowed}"
 
 
 def _requirements(design: Design) -> Iterator[Refusal]:

@@ -63,12 +63,15 @@ def check_motor(design: Design) -> Iterator[Refusal]:
     kM, kE = _constants(design)
     if kM is not None and kE is not None and _apart(kM, kE):
         key, wanted = "back_emf_constant", given["back_emf_constant"] * kM / kE
+        over = _TORQUE_OVER_VOLTAGE[design.motor.constants][1]
+        same = f'with motor.constants = "{design.motor.constants}" kE is kM over {over} in SI'
+        same = "in SI the two are one constant" if over == "1" else same
         allowed = (
             f"allowed: within 10 % of {wanted:g}{_as_written(design, key, kM / kE)}, as "
-            f"motor.torque_constant = {_stated(design, 'torque_constant')} has it (in SI the two are one "
-            f"constant){_warm(design, kM / kE)}"
+            f"motor.torque_constant = {_stated(design, 'torque_constant')} has it ({same})"
         )
-        yield f"motor.{key}", _stated(design, key), f"{allowed}{_ratio(design, kE / kM)}"
+        causes = f"{_ratio(design, kE / kM)}{_warm(design, kM / kE)}"
+        yield f"motor.{key}", _stated(design, key), f"{allowed}{causes}"
 
 
 def _constants(design: Design) -> tuple[Any, Any]:
@@ -83,7 +86,7 @@ def _apart(kM: Any, kE: Any) -> Any:
 
 def _warm(design: Design, ratio: Any) -> str:
     """The other cause of a kM below kE, and what follows from either."""
-    if not 0.7 < ratio < 1.0:
+    if not 0.8 <= ratio <= 0.95:
         return ""
     kM = f"{design.motor.torque_constant_Nm_A / ratio:g}{_as_written(design, 'torque_constant', 1.0 / ratio)}"
     taken = f"take one and write the other as it follows, kE as said or kM = {kM}"

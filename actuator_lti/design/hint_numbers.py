@@ -21,21 +21,36 @@ _TAKES = re.compile(r', which takes "([^"]*)"( too)?')
 _AT_MOTOR = re.compile(
     r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise"
 )
+_TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?)\s*")
+_BARE = re.compile(r"\s*[0-9.]+\s*\Z")
+ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
 _COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
 
 
 def with_numbers(
-    word: str, path: str, key: str, table: Tree, tree: Tree, takes: Callable[[str, str], bool]
+    word: str,
+    path: str,
+    key: str,
+    table: Tree,
+    tree: Tree,
+    frame: Frame,
+    takes: Callable[[str, str], bool],
 ) -> str:
     """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``.
 
     ``takes`` tells whether a key reads a text as it stands.
     """
+    if path == "motor" and ROOT_OF_WATTS.search(f"{_plain(table[key])}"):
+        return _motor_constant(_plain(table[key]), tree, frame)
+    if word.startswith("counts_per_rev") and ", which takes" not in word:
+        return word + _lines(_plain(table[key]), word, takes) + _over_step(_plain(table[key]), path, frame)
     if example := _TAKES.search(word):
         to = f"{path}.{word.partition(',')[0]}"
         own = next((one for one in (_with_unit(table[key]), example[1]) if one and takes(to, one)), "")
         too = f", which takes {shown(own)}{example[2] or ''}" if own else ""
-        word = f"{word[: example.start()]}{too}{word[example.end() :]}"
+        pitch_m = _si(_plain(table[key]), "m") if word.startswith("cogging_periods") and own else 0.0
+        order = f": {2.0 * pi / pitch_m:.6g} rad/m" if pitch_m > 0.0 else ""
+        word = f"{word[: example.start()]}{too}{order}{word[example.end() :]}"
     if word.startswith(("integral_time =", "derivative_time =")):
         return word + _time(word, table, key)
     if word.startswith("every,"):
@@ -52,7 +67,26 @@ def with_numbers(
     return word
 
 
-def per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
+def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str:
+    """What a refused value of a key is in this file: ticks of a time or a time of ticks, counts, a step."""
+    if field.key == "every":
+        ticks = ticks_of(path.removesuffix(".every"), text, tree)
+        here = f", here {ticks}" if ticks else ""
+        return f"; write the ticks of control.period{here}" if _period_s(text) > 0.0 else ""
+    if field.key == "counts_per_rev":
+        linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
+        over = _over_step(text, field.section, frame)
+        return over.replace("here", f"a {'metre' * linear or 'revolution'} over it is")
+    if field.path == "motor.torque_constant" and ROOT_OF_WATTS.search(f"{text}"):
+        return f"; it is {_motor_constant(text, tree, frame)}"
+    if (ticks_said := _TICKS.fullmatch(f"{text}")) and (
+        period_s := _period_s(_of(tree, "control", "period"))
+    ) > 0.0:
+        return f"; here {float(ticks_said[1]) * period_s:.6g} s"
+    return _per_count(text, field, frame, tree)
+
+
+def _per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
     """What a value in counts of the encoder is in rad or m, where the file says how many there are."""
     if not isinstance(text, str) or not _COUNT.search(text) or not _AT_MOTOR.match(field.path):
         return ""
@@ -73,6 +107,37 @@ def per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
         kind = "".join(f" {one}" for one in CONVENTION.findall(text))
         return f"; of {counts:g} counts {size:.4g} {re.sub(r'(?<=A)(?=[*/ ]|$)', kind, unit)}"
     return ""
+
+
+def _over_step(text: Any, section: str, frame: Frame) -> str:
+    """A revolution, or a metre of a linear axis, over the step of an encoder."""
+    screw = frame.travel_m_rad if section == "encoder" else None
+    linear = frame.structure.axis == "linear"
+    turns = {"m": 2.0 * pi * screw if screw else 1.0} if linear else {}
+    turns |= {"rad": 2.0 * pi} if screw or not linear else {}
+    over = next((turn / step for unit, turn in turns.items() if (step := _si(text, unit)) > 0.0), 0.0)
+    return f"; here {over:.10g} counts" if over else ""
+
+
+def _lines(value: Any, word: str, takes: Callable[[str, str], bool]) -> str:
+    """A number of lines or counts, as a file says which."""
+    number = re.match(r"\s*[0-9]+", f"{value}")
+    if "some makers" not in word or number is None:
+        return ""
+    if isinstance(value, str) and not _BARE.match(value) and takes("encoder.counts_per_rev", value):
+        return f", which takes {shown(value)} too"
+    n = int(number[0])
+    return f': "{n} lines" ({4 * n} counts) or "{n} counts"'
+
+
+def _motor_constant(text: str, tree: Tree, frame: Frame) -> str:
+    """Km in N m/sqrt(W): losses of one winding (dc), or of three with R line-line or of a phase."""
+    factor = 1.0 if frame.constants == "dc" else 1.5
+    linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
+    Km = _si(ROOT_OF_WATTS.sub("", text), "N" if linear else "N*m")
+    kM = Km * (factor * _si(_of(tree, "motor", "resistance"), "ohm")) ** 0.5
+    here = f": {kM:.4g} {'N/A' if linear else 'N*m/A'}" if kM > 0.0 else ""
+    return f"the motor constant Km: torque_constant is Km sqrt({'' if factor == 1.0 else '1.5 '}R){here}"
 
 
 def _plain(value: Any) -> Any:

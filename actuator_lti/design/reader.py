@@ -18,7 +18,7 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
-from actuator_lti.design.hint_numbers import per_count, ticks_of, with_numbers
+from actuator_lti.design.hint_numbers import hint_of, ticks_of, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
@@ -36,7 +36,7 @@ from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.stated import Frame
 from actuator_lti.design.tolerances import read_tolerance
-from actuator_lti.design.units import ampere_unit, parse_limit, si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
@@ -48,6 +48,7 @@ _ENTRY = ("value", "source", "grade", "tolerance")
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 _FORMULA = re.compile(r"= [^,;]*")  # integral_time = gain/integral gain
 _BARE = re.compile(r"\s*[0-9.]+\s*\Z")
+_OF_COUNTS = ("a number without a unit", 'counts, as 4096, "1024 lines" or "12 bit"')
 _VERY_NEAR = 0.85  # of a misspelled key whose value is checked
 _ASIDE = re.compile(r", (?:which takes|in|with) ")  # what a hint says beside the one key that it names
 Per = Callable[[model.Design], Any]  # what a gain is per unit of what is stated
@@ -134,7 +135,7 @@ class Reader:
         meant: dict[str, str] = {}
         for key in (key for key in table if key not in known):
             word = key_for(path, key, known)
-            word = with_numbers(word, path, key, table, self.tree, self.takes)
+            word = with_numbers(word, path, key, table, self.tree, self.frame, self.takes)
             said = f" ({word})" if word.startswith("not ") else f" (it is {word})"
             hint = said if word else nearest(key, known)
             where = f"{path}.{key}" if path else key
@@ -319,8 +320,10 @@ class Reader:
         try:
             value = self.frame.quantity(raw, field)
         except InputError as error:
-            counts = per_count(raw, field, self.frame, self.tree)
-            return self.refuse(path, raw, f"{error.message}{self.frame.other_axis(raw, field)}{counts}")
+            other = self.frame.other_axis(raw, field)
+            hint = hint_of(raw, field, path, self.frame, self.tree)
+            message = error.message.replace(*_OF_COUNTS) if field.key == "counts_per_rev" else error.message
+            return self.refuse(path, raw, f"{message}{other}{hint}")
         if field.kind == "integer" and value != int(value):
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
@@ -336,7 +339,7 @@ class Reader:
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")
         try:
-            return UNREAD if known is None else parse_limit(raw, known.unit_for(self.structure.axis))
+            return UNREAD if known is None else self.frame.limit(raw, known.unit_for(self.structure.axis))
         except (InputError, ValueError) as error:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 
@@ -412,7 +415,9 @@ class Reader:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):
             plain = re.sub(r"[^A-Za-z0-9 _/:+()-]+", "-", f"{name}").strip(" _/:+()-")[:60].strip(" /:(")
-            allowed = "allowed: 1 to 64 letters, digits, spaces and - _ / : + ( ), no dot, as"
+            strange = ", ".join(dict.fromkeys(re.findall(r"[^\w /:+()-]", f"{name}"))) or "."
+            none = strange.replace(".", "dot")
+            allowed = f"allowed: 1 to 64 letters, digits, spaces and - _ / : + ( ), no {none}, as"
             self.refuse(f"{numbered}.name", name, f'{allowed} "{plain or "first"}"')
         elif path in before:
             self.refuse(f"{numbered}.name", name, "allowed: each name once")

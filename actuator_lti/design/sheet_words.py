@@ -9,10 +9,16 @@ _STALL = (
 _MULTIPLE = "every, so many ticks of control.period"
 _PERIOD = 'period, which takes "16 kHz" too'
 _VOLTAGE = "nominal_voltage rated_voltage supply_voltage bus_voltage vbus un"
-_CONTINUOUS = "nominal_current rated_current continuous_current_at_standstill"
-_PEAK = "max_current current_max current_peak"
+_CONTINUOUS = (
+    "nominal_current rated_current continuous_current_at_standstill continuous_stall_current rms_current"
+)
+_PEAK = "max_current current_max current_peak peak_stall_current"
+_RATED = "rated_torque nominal_torque continuous_torque continuous_stall_torque"
+_OF_PHASE = ', as it stands with motor.constants = "peak-phase" or of a stepper, else twice it'
+_FACT = "not needed; it may stand as a [[fact]]"
 _FRICTION = "friction friction_force friction_torque frictional_torque"
-_LINES = "lines lines_per_revolution ppr pulses_per_revolution pulses_per_rev cpt counts_per_turn"
+_LINES = "lines lines_per_revolution counts_per_turn"
+_PULSES = "cpr cpt ppr ppt pulses pulses_per_revolution pulses_per_rev"
 _INTEGRAL = "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)"
 _SPEED = "nominal_speed rated_speed max_speed"
 _WORDS: dict[str, dict[str, str]] = {
@@ -28,15 +34,19 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "motor": {
         "km kt torque_sensitivity": "torque_constant",
+        "motor_constant": "not needed: it follows from R and kM",
         "ki current_constant": "torque_constant, one over it",
         "ke back_emf backemf bemf voltage_constant ac_voltage_constant emf_constant": "back_emf_constant",
         "flux_linkage psi lambda": "back_emf_constant, times the pole pairs, and torque_constant, "
         '1.5 times that, of constants = "peak-phase"',
         "kn speed_constant": 'back_emf_constant, which takes "317 rpm/V" too',
         "kv": 'back_emf_constant, which takes "480 KV"',
-        "r rm ra phase_resistance terminal_resistance": "resistance",
-        "l lm la phase_inductance terminal_inductance": "inductance",
+        "r rm ra terminal_resistance": "resistance",
+        "l lm la terminal_inductance": "inductance",
+        "phase_resistance resistance_phase resistance_per_phase": f"resistance{_OF_PHASE}",
+        "phase_inductance inductance_phase inductance_per_phase": f"inductance{_OF_PHASE}",
         "j jm inertia moment_of_inertia": "rotor_inertia",
+        "brake_inertia": "added to rotor_inertia",
         "mass moving_mass": "rotor_inertia, in kg on a linear axis",
         "moment_of_inertia_output_side output_inertia": "rotor_inertia, at the motor: over ratio^2",
         "force_constant": "torque_constant, in N/A on a linear axis",
@@ -46,18 +56,22 @@ _WORDS: dict[str, dict[str, str]] = {
         "kvisc damping damping_constant viscous friction_torque_dynamic": "viscous of [friction]",
         f"voltage {_VOLTAGE}": "voltage of [limits]",
         f"continuous_current {_CONTINUOUS}": "continuous_current of [limits]",
-        "peak_current max_current": "peak_current of [limits]",
+        "peak_current max_current peak_stall_current": "peak_current of [limits]",
+        _RATED: "continuous_current of [limits], the torque over torque_constant",
         "torque": "peak_current of [limits], the torque over torque_constant",
         "type motor_type": "constants, of an AC motor rms-line or peak-phase, else dc",
-        "weight power": "not needed; it may stand as a [[fact]]",
+        "weight power": _FACT,
+        "step_angle": "counts_per_rev of [encoder], one revolution over it",
+        "magnet_pitch pole_pitch": 'cogging_periods, which takes "24 mm" too',
         "stall_current stall_torque": f"not asked for, but what follows: {_STALL}",
         f"speed {_SPEED}": "speed of [limits]",
-        "cogging_torque torque_ripple": "cogging",
+        "cogging_torque": "cogging",
+        "torque_ripple": "not in the model; motor.cogging is a torque in N*m, without a current too",
         "detent_torque": 'cogging, with cogging_phase = "180 deg", as a stepper rests at its angle 0',
         "holding_torque": "torque_constant, over the current that holds",
         "thermal_resistance": "thermal_resistance of [temperature], the sum of a sheet's two",
         "thermal_time_constant": "thermal_time of [temperature]",
-        "motor_constant speed_torque_gradient": "not needed: it follows from R and kM",
+        "speed_torque_gradient": "not needed: it follows from R and kM",
         "mechanical_time_constant electrical_time_constant": "not needed: it follows from R, L, J and kM",
         "pole_pairs poles pole_number": "not needed: constants are per mechanical radian",
     },
@@ -67,7 +81,11 @@ _WORDS: dict[str, dict[str, str]] = {
         "type model part_number": "name",
         "backlash lost_motion play": "play of [coupling], beside its stiffness; without one left out",
         "stiffness rigidity": "stiffness of [coupling]",
-        "starting_torque no_load_starting_torque running_torque": "dry_torque of [friction], at the motor",
+        "starting_torque no_load_starting_torque running_torque no_load_torque back_driving_torque": (
+            "dry_torque of [friction], at the motor: what is stated at the output over ratio"
+        ),
+        f"max_torque peak_torque {_RATED}": _FACT,
+        "transmission_error": "gear_error of [load], a torque at the output: the angle times the stiffness",
         "self_locking": 'path = "self-locking" of [load]',
     },
     "screw": {
@@ -106,17 +124,20 @@ _WORDS: dict[str, dict[str, str]] = {
         "counts": "counts_per_rev",
         f"{_LINES} sin_cos_periods": "counts_per_rev, in counts, four of each line, "
         'which takes "1024 lines" too',
-        "resolution cpr bits": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
+        "resolution bits step_angle": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
         "(linear axis without a screw: one metre over a step)",
+        _PULSES: "counts_per_rev, in counts, of some makers four of each line",
+        "type interface accuracy poles pole_pairs": _FACT,
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
     },
     "limits": {
-        f"supply {_VOLTAGE}": "voltage",
-        f"i_cont i_rms {_CONTINUOUS}": "continuous_current",
-        f"i_peak i_max current {_PEAK} current_limit current_lim stall_current": "peak_current",
+        f"supply {_VOLTAGE} dc_bus": "voltage",
+        f"i_cont i_rms {_CONTINUOUS} stall_current": "continuous_current",
+        f"i_peak i_max current {_PEAK} current_limit current_lim": "peak_current",
+        "i2t": "peak_time, for which peak_current may flow before continuous_current is the limit",
         "velocity velocity_limit vel_limit speed_limit": "speed",
         "accel accel_limit": "acceleration",
-        "rated_torque continuous_torque": "continuous_current, the torque over torque_constant and ratio",
+        _RATED: "continuous_current, the torque over torque_constant and ratio",
         "torque max_torque peak_torque": "peak_current, the torque over torque_constant and ratio",
         _SPEED: "speed",
         "rate max_rate slew_rate": "speed, at the motor: that of the output times ratio",
@@ -138,6 +159,7 @@ _WORDS: dict[str, dict[str, str]] = {
         "notch lowpass low_pass": "a [[control.velocity.filter]] with its kind",
         "frequency period cycle cycle_time sample_rate sample_time ts": _MULTIPLE,
         "bandwidth": 'gain, which takes "40 Hz" too',
+        "observer": 'encoder.speed = "tracking", or a law of one\'s own, [control.velocity.law]',
     },
     ".filter": {
         "bandwidth": "width",
@@ -151,7 +173,9 @@ _WORDS: dict[str, dict[str, str]] = {
         "of the stage",
     },
 }
-_AFTER = re.compile(r"(?<=.)(?:_(?:line|phase|terminal|to|l_l|ll|pp|typ|nom))+\Z")  # resistance_line_to_line
+_AFTER = re.compile(
+    r"(?<=.)(?:_(?:line|phase_(?:to_)?phase|terminal|to|l_l|ll|pp|typ|nom))+\Z"
+)  # resistance_line_to_line
 _HINTS = {
     table: {word: hint for words, hint in hints.items() for word in words.split()}
     for table, hints in _WORDS.items()

@@ -7,6 +7,7 @@ from actuator_lti.files.reading import shown
 
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
+_MILLIONS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3}){2,}(?![0-9,])")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
 _SIGNS = str.maketrans(
     {"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"', "−": "-", "–": "-"}
@@ -25,7 +26,9 @@ _SPELLINGS = (
     (re.compile(r"\bK(?:RPM|rpm)\b"), "krpm"),
     (re.compile(r"°K\b"), " K"),
     (re.compile(r"°"), " deg"),
-    (re.compile(r"%"), " percent"),
+    (re.compile(r"%|\bpct\b"), " percent"),
+    (re.compile(r"\bper\b"), "/"),
+    (re.compile(r"\br\.p\.m\.?"), "rpm"),
     (re.compile(r"''|\""), " arcsec"),
     (re.compile(r"'"), " arcmin"),
     (re.compile(r"(?<=[AV]) ?_?(?:DC|dc)\b"), ""),  # of the motor that the model has: direct
@@ -36,7 +39,7 @@ _SPELLINGS = (
     (re.compile(r"/ *rps\b(?!\^)"), "/(rev/s)"),
     (re.compile(r"\brps\b"), "rev/s"),
     (re.compile(r"/ *\(? *1000 *(rpm|1/min|min\^-1)\b *\)?"), r"/(1000*(\1))"),
-    (re.compile(r"\b(k?g)(c?m\^2)"), r"\1*\2"),  # gcm2
+    (re.compile(r"\b(k?g)([cm]?m\^2)"), r"\1*\2"),  # gcm2
 )
 _POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*(?:\^|(?=[+-]))\s*([+-]?[0-9]{1,3})\b")
 # A column's power of ten, before its unit or behind it: "1.18 (10^-4 kg m2)", "0.1 kg-m2 x 10^-3".
@@ -50,10 +53,13 @@ _COLUMN = (
 _TEN = re.compile(r"\b10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _BOUND = re.compile(r"\s*(±|\+/-|[≤≥<>~≈]=?|max\.?|typ\.?|ca\.?|approx\.?)\s*(?=[0-9.])", re.IGNORECASE)
 _SPREAD = re.compile(r"\s*((?:±|\+/-).*|\(?(?:max|typ|nom)\b\.?\)?)\s*\Z", re.IGNORECASE)
+_EXPONENT = re.compile(r"(?<=[0-9.])\s+([eE][+-]?[0-9]+)\b")  # 5.0 E-6
+_TWO = re.compile(r"\s*([0-9.]+)\s*(?:±|\+/-)\s*([0-9]+\.?[0-9]*)\s*([^\s0-9%].*?)\s*\Z")
+_AT = re.compile(r"\s*(@\s*[-+]?[0-9.]+ ?(?:°|deg)?\s*[CK]?)\s*\Z")
 _SECOND = re.compile(r"(?<![\w^.-])(?!1(?:000)?(?![0-9.]))[0-9]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
-_OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:])\s*([0-9]+\.?[0-9]*)\s*\Z")
-_BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?bits?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
+_OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:]|to\b)\s*([0-9]+\.?[0-9]*)\s*\Z")
+_BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?[Bb]its?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
 _SYMBOL = re.compile(r"\A\s*[A-Za-z]\w{0,3}\s*=\s*(?=[+-]?[0-9.])")  # i = 8, R = 0.36 ohm
 LONGEST = 120  # characters of a quantity
 
@@ -68,14 +74,22 @@ def tidy(unit: str) -> str:
 
 def _alone(text: str) -> str:
     """A number in one power of ten and its unit; what a sheet says of its bounds is refused."""
-    for aside in (_BOUND, _SPREAD):
-        if found := aside.search(text) if aside is _SPREAD else aside.match(text):
+    for aside, find in ((_BOUND, _BOUND.match), (_AT, _AT.search), (_SPREAD, _SPREAD.search)):
+        if found := find(text):
             plain = f"{text[: found.start()]}{text[found.end() :]}".strip()
-            raise ValueError(f"write {shown(plain)}; {shown(found[1])} is one for tolerance or source")
+            two = _TWO.fullmatch(text)  # a number, its tolerance, and the unit of both
+            plain, width = (f"{two[1]} {two[3]}", _percent(two)) if two else (plain, "")
+            keys = "temperature.reference" if aside is _AT else "tolerance"
+            raise ValueError(f"write {shown(plain)}; {shown(found[1])} is one for {keys}{width} or source")
     text = _TEN.sub(lambda found: f"10^{found[1].translate(_RAISED)}", text)
     for column, product in _COLUMN:
         text = column.sub(product, text)
     return text
+
+
+def _percent(two: re.Match[str]) -> str:
+    value = float(two[1])
+    return f' = "{100.0 * float(two[2]) / value:.4g} %"' if value else ""
 
 
 def split_quantity(text: str) -> tuple[float, str]:
@@ -87,22 +101,27 @@ def split_quantity(text: str) -> tuple[float, str]:
         return 2.0 ** int(bits[1] or bits[2]), ""
     if over := _OVER.match(text):
         above, below = float(over[1]), float(over[3])
-        if over[2] == ":" and above < below:
+        if over[2] != "/" and above < below:
             raise ValueError(f'a reduction is written "{over[3]}:{over[1]}"')
         return above / below if below else nan, ""
-    text = _alone(text.replace("−", "-"))
+    text = _EXPONENT.sub(r"\1", _alone(text.replace("−", "-")))
     if grouped := _GROUPS.match(text):
         text = "".join(grouped[0].split()) + text[grouped.end() :]
     text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
     match = _NUMBER.match(text)
     if match is None:
         raise ValueError("a number and a unit are wanted")
+    if millions := _MILLIONS.match(text):
+        plain = millions[0].replace(",", "") + text[millions.end() :]
+        raise ValueError(f"commas; write {shown(plain)}")
     if _THOUSANDS.match(text):
         raise ValueError(
             f"a comma; write {shown(text.replace(',', '', 1))} or {shown(text.replace(',', '.', 1))}"
         )
     if _COMMA.match(text):
         raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
+    if re.match(r"[-–] *[0-9]", match[2]):
+        raise ValueError("a range; write one number")
     if _SECOND.search(match[2]):
         raise ValueError(f"{shown(match[2])} is not a unit, it has a number in it; write one number")
     number = float(match[1])

@@ -7,13 +7,16 @@ from math import isinf, pi, sqrt
 from typing import Any
 
 from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.plant import MotorConstants
-from actuator_lti.design.units import AdvisedError, ampere_unit, parse_quantity
+from actuator_lti.design.spellings import split_quantity
+from actuator_lti.design.units import AdvisedError, ampere_unit, parse_limit, parse_quantity
 from actuator_lti.errors import InputError
 
 CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|p|phase)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _MAINS = re.compile(r"(?<=V)[ _]?\(?(?:ac|rms|eff)\b\)?|(?<=V) ?~", re.IGNORECASE)
+_RANGE = re.compile(r"(?<=[0-9]) *(?:[-–]|to) *(?=[0-9])")
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _PER_TRAVEL = re.compile(r"/ *\(?[kcmnuµ]?m\b")  # of a linear encoder
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
@@ -74,6 +77,10 @@ class Frame:
         refused = [one for one in refused if isinstance(one, AdvisedError)] or refused
         raise refused[-1 if field.section in ("load", "command", "validation") else 0]
 
+    def limit(self, text: Any, unit: str) -> float:
+        """A limit of a requirement, in the unit in which its quantity is reported; amperes as of [limits]."""
+        return self.quantity(text, FIELDS["limits.peak_current"]) if unit == "A" else parse_limit(text, unit)
+
     def _said(self, text: Any, field: Field, unit: str, value: float) -> float:
         """The value, unless an AC motor has several amperes that the text may mean."""
         which = ampere_unit(field.path, unit, self.constants)
@@ -127,8 +134,10 @@ class Frame:
 
 def _refuse_mains(text: str) -> None:
     """A supply in volts of the mains: the bus is direct."""
-    volts = sqrt(2.0) * parse_quantity(text, "V")
-    raise InputError(f"the bus is direct; allowed: sqrt(2) times the mains behind a rectifier, {volts:.4g} V")
+    *low, high = _RANGE.split(text)  # 100-120 V
+    each = [f"{number} {split_quantity(high)[1]}" for number in low] + [high]
+    volts = " to ".join(f"{sqrt(2.0) * parse_quantity(one, 'V'):.4g} V" for one in each)
+    raise InputError(f"the bus is direct; allowed: sqrt(2) times the mains behind a rectifier, {volts}")
 
 
 def _turned(path: str, text: Any, unit: str) -> float | None:
@@ -138,4 +147,6 @@ def _turned(path: str, text: Any, unit: str) -> float | None:
         value = parse_quantity(text, turned.format(angle=unit.rpartition("/")[2])) if turned else 0.0
     except InputError:
         return None
-    return one / value if value > 0.0 else None
+    if turned and value <= 0.0:
+        raise InputError("allowed: above 0")
+    return one / value if turned else None

@@ -90,7 +90,9 @@ def _limits(design: Design) -> Iterator[str]:
     peak, resistance = design.limits.peak_current_A, design.effective_motor.resistance_ohm
     stall = inf if resistance is None else design.limits.voltage_V / resistance
     if stall < peak < inf:
-        yield f"limits.peak_current: {peak:g} A, but the supply gives only {stall:.3g} A at stall"
+        digits = next(n for n in range(3, 18) if float(f"{stall:.{n}g}") < float(f"{peak:.{n}g}"))
+        only = f"the supply gives only {stall:.{digits}g} A at stall"
+        yield f"limits.peak_current: {peak:.{max(digits, 6)}g} A, but {only}"
 
 
 def _unused(design: Design) -> Iterator[str]:
@@ -148,21 +150,26 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     rubs = behind is not None and behind.dry_torque_Nm > 0.0
     viscous = behind is not None and behind.viscous_Nms_rad > 0.0
     free, damped = not (rubs or viscous), load.moment_damping_Nms_rad > 0.0
+    unit = "N*s/m" if design.axis == "linear" else "N*m*s/rad"
     if coupling is not None and not (viscous or damped) and coupling.damping_Nms_rad == 0.0:
         least = 0.02 * sqrt(coupling.stiffness_Nm_rad * design.load_side_inertia_kgm2)  # 2 zeta sqrt(k J)
         but = " (its dry friction is in no linear loop)" if rubs else ""
         yield (
             "coupling.damping: 0, and no load.friction.viscous: with the motor at rest the load keeps ringing"
-            f"{but}; {least:.3g} in SI units damps it by 1 %"
+            f"{but}; {least:.3g} {unit} damps it by 1 %"
         )
     elif free and coupling is not None and coupling.play_rad > 0.0 and not damped:
         yield "coupling.play: in the gap nothing stops a load without load.friction, it may never rest"
     least, coefficient = 1.0 / design.total_ratio, design.friction.load_coefficient
-    rigid = design.coupling is None and load.path == "self-locking"
-    if rigid and load.moment_max_Nm > 0.0 and coefficient < least * (1 - 1e-12):
+    if coupling is None and load.path == "self-locking" and coefficient < least * (1 - 1e-12):
         held = 'self-locking drive cannot hold its load; or is load.path = "back-drivable"?'
         less = f"{coefficient:g} is less than 1/N = {least:g}"
-        yield f"friction.load_coefficient: {less}: the friction of a {held}"
+        bare = 'which a drive without gears is not; load.path = "back-drivable"?'
+        yield (
+            f"friction.load_coefficient: {less}: the friction of a {held}"
+            if design.gears
+            else f"load.path: self-locking is assumed, {bare}"
+        )
 
 
 def _pedigree(design: Design) -> Iterator[str]:

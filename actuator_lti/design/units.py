@@ -42,11 +42,13 @@ _DERIVED = {
     "in inch": ("0.0254", "m"),
     "ft foot": ("0.3048", "m"),
     "lb lbm pound": ("0.45359237", "kg"),
+    "mil": ("0.0000254", "m"),
     "oz ounce": ("0.028349523125", "kg"),
     "min minute": ("60", "s"),
     "h hour": ("3600", "s"),
     "N newton": ("1", "kg*m/s^2"),
     "lbf pound_force": ("4.4482216152605", "N"),
+    "slug": ("1", "lbf*s^2/ft"),
     "ozf ounce_force": ("0.27801385095378125", "N"),
     "kgf kp kilogram_force": ("9.80665", "N"),
     "gf gram_force": ("0.00980665", "N"),
@@ -65,7 +67,7 @@ _DERIVED = {
     "W watt": ("1", "J/s"),
     "V volt": ("1", "W/A"),
     "ohm Ω Ohm": ("1", "V/A"),
-    "H henry": ("1", "V*s/A"),
+    "H henry henries Henry Henries": ("1", "V*s/A"),
     "F farad": ("1", "A*s/V"),
     "Vs": ("1", "V*s"),
     "As": ("1", "A*s"),
@@ -86,17 +88,21 @@ _FLUX = (
 _ASIDE = {
     "erpm": 'is electrical; over the pole pairs it is "rpm"',
     "phase": 'is no unit; leave it out: with motor.constants = "peak-phase" R and L are of a phase, with '
-    '"rms-line" line-line, twice those of a phase',
+    '"rms-line" line-line, twice those of a phase, with "dc" of a stepper those of a phase',
     "grad": 'is no unit; of 360 a turn it is "deg", of 400 "0.9 deg"',
     "g": "is no unit; 1 g of a fall is 9.80665 m/s^2",
     "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
+    **dict.fromkeys(
+        ("tick", "ticks", "sample", "samples", "cycle", "cycles"),
+        "is no unit; every takes ticks of control.period without one, a time is so many of that period",
+    ),
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
     "db": "is no unit here; a ratio is 10^(dB/20): -20 dB is 0.1",
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
-_PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm")
+_PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm", "mil")
 _COUNTS: Dimension = (("[count]", 1),)
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
@@ -301,7 +307,11 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         return f"; {said.format(size=size, fall=fall, **here)}"
     if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
-    if value.angle == 0 < wanted.angle and value.without_angle() == wanted.without_angle():
+    if (
+        value.dimension
+        and value.angle == 0 < wanted.angle
+        and value.without_angle() == wanted.without_angle()
+    ):
         return "; write rev or rad into it, whichever is meant"
     return ""
 
@@ -356,14 +366,13 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         raise InputError(f"{error}; allowed: {example}") from None
     if number == 0.0 and not written and "[celsius]" not in dict(wanted.dimension):
         return 0.0
+    if not isfinite(value := scaled(number, result.factor)):
+        raise InputError(f"must be finite; allowed: {example}")
     if not compatible(result, wanted):
         missing = "has no unit" if not written else _kind_of(written, result)
         wrong = "wrong dimension, " if written else ""
         advice = _advice(result, wanted, number)
         raise (AdvisedError if advice else InputError)(f"{wrong}{missing}; allowed: {example}{advice}")
-    value = scaled(number, result.factor)
-    if not isfinite(value):
-        raise InputError(f"must be finite; allowed: {example}")
     return value
 
 

@@ -21,7 +21,7 @@ from actuator_lti.design.reader import Reader
 from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.tolerances import tolerances
-from actuator_lti.design.units import si_text
+from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_toml, shown
 from actuator_lti.files.tree import Tree
@@ -103,7 +103,9 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
         if known is not None and known.value == value:
             table[field.key] = _entry(known, unit_in_file(design, path, field))
         elif value is not None and value != inf and value != field.default:
-            unit = part.unit if field.kind == "limit" else unit_in_file(design, path, field)
+            unit = unit_in_file(design, path, field)
+            if field.kind == "limit":
+                unit = ampere_unit("limits.", part.unit, design.motor.constants)
             table[field.key] = _bare(value, unit)
     unsaid = name == "validation" and not any(path.startswith("validation.") for path in design.parameters)
     if unsaid and len(table) == 1 and part.full_deflection_rad == default_deflection(design.axis):

@@ -20,6 +20,9 @@ from actuator_lti.types import Floats
 Loop = Literal["L", "T", "S"]
 WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
 
+NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
+"""Of a row that is left out and counted."""
+
 # what each column is named, by which it is known, and how a name says its unit; SI over it, or what it is
 _UNITS: dict[str, tuple[re.Pattern[str], dict[str, object]]] = {
     "coherence": (re.compile(r"coh|gamma", re.I), {}),
@@ -115,8 +118,9 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
 
 def _table(text: str) -> dict[str, Floats]:
     """Columns by their headings."""
-    lines = [line.strip() for line in text.splitlines()]
-    lines = [line for line in lines if line and line[0] not in "#%"]
+    every = [(at, line.strip()) for at, line in enumerate(text.splitlines(), 1)]
+    every = [(at, line) for at, line in every if line and line[0] not in "#%"]
+    places, lines = [at for at, _ in every], [line for _, line in every]
     TABLE_ROWS.check(len(lines))
     if not lines:
         raise InputError(f"is empty; allowed: a {WHAT}")
@@ -127,6 +131,9 @@ def _table(text: str) -> dict[str, Floats]:
     head = rows.pop(0) if any(np.isnan(_number(word, cut)) for word in rows[0]) else None
     if any(len(row) != width for row in rows):
         raise InputError(f"rows of {width} and of other numbers of columns; allowed: a {WHAT}")
+    for line, row in zip(places[len(places) - len(rows) :], rows, strict=True):
+        if wrong := [word for word in row if word.lower() not in NO_VALUE and np.isnan(_number(word, cut))]:
+            raise InputError(f"line {line}: {shown(wrong[0])} is no number; allowed: numbers, or nothing")
     values = np.array([[_number(word, cut) for word in row] for row in rows]).reshape(-1, width)
     names = head or ["f_hz", "gain_db", "phase_deg", "coherence", *(f"column {k}" for k in range(4, width))]
     return dict(zip(names, values.T, strict=False))
@@ -161,7 +168,8 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     table = {role: values[good] for role, values in table.items()}
     f = table["frequency"] * _unit("frequency", found["frequency"], 1.0)
     if f.size < 2 or not (f > 0.0).all():
-        raise InputError(f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}; at least two")
+        told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
+        raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
     order = f.argsort(kind="stable")
     if (np.diff(f[order]) == 0.0).any():
         raise InputError("a frequency is given twice")

@@ -14,8 +14,8 @@ class Asked:
 
     For every signal that both have: relative error, fit, mean, rms and largest error, delay; over several
     records also all together, and the worst; with --out pictures of both and the difference. Where a record
-    contradicts itself or the design's limits (a wrong unit, swapped columns, a clock that is off), a motion
-    fits no better than its mean, or a signal is off by more than --error-limit, the status is 1.
+    contradicts itself or the design's limits (a wrong unit, swapped columns, a clock that is off), or a
+    signal is off by more than --error-limit of its motion, the status is 1.
 
     The outermost command that is recorded drives the model: reference of the output angle, speed, current
     (or torque), or voltage; loops outside it do not act. A recorded supply limits the voltage over time, and
@@ -42,10 +42,10 @@ class Asked:
         ),
     ] = None
     error_limit: Annotated[
-        float | None, Option("Error, of the motion about its mean, above which a signal fails.", "PERCENT")
-    ] = None
+        float, Option("Error, of the motion about its mean, above which a signal fails; 20.", "PERCENT")
+    ] = 20.0
 
     def __post_init__(self) -> None:
         """Refuse a negative limit."""
-        if self.error_limit is not None and not self.error_limit >= 0.0:
+        if not self.error_limit >= 0.0:
             raise InputError(f"error_limit = {self.error_limit:g}: must be 0 or more")

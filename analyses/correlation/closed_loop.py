@@ -15,7 +15,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.driving import LOADS, at_ticks, first_states, load_of, needed_command, supply_of
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
 from analyses.records.naming import KNOWN_UNITS
@@ -103,7 +103,8 @@ def correlate_record(
     if not measured:
         known = ", ".join(AXIS_SIGNALS[design.axis])
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
-    modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+    with because({record.name: findings}):
+        modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
     driven = needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
     used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}

@@ -77,7 +77,7 @@ def compare_signals(
         unit=unit,
         samples=len(measured),
         relative_error=size / norm,
-        fit_percent=100.0 * (1.0 - size / about_mean) if about_mean > 0.0 else float("nan"),
+        fit_percent=100.0 * (1.0 - size / about_mean) if about_mean > 1e-9 * norm else float("nan"),
         mean_error=float(np.mean(np.abs(difference))),
         rms_error=float(np.sqrt(np.mean(difference**2))),
         max_error=float(abs(difference[worst])),

@@ -79,13 +79,12 @@ def moves_alike(result: CorrelationResult) -> bool:
     return all(signal.share_of_motion <= 1.0 for signal in told)
 
 
-def agrees(results: Sequence[CorrelationResult], error_limit: float | None) -> bool:
-    """Whether no record contradicts itself or the design, each motion fits and, with a limit, each signal is
-    within that share of its motion."""
+def agrees(results: Sequence[CorrelationResult], error_limit: float) -> bool:
+    """Whether no record contradicts itself or the design, and each signal is within a share of its motion."""
     if any(finding.passed is False for result in results for finding in result.findings):
         return False
     signals = [signal for result in results for signal in result.signals.values()]
-    within = error_limit is None or all(signal.share_of_motion <= error_limit for signal in signals)
+    within = all(signal.share_of_motion <= error_limit for signal in signals)
     return within and all(moves_alike(result) for result in results)
 
 
@@ -98,9 +97,9 @@ class Correlation:
     records: tuple[CorrelationResult, ...]
 
     @property
-    def limit(self) -> float | None:
+    def limit(self) -> float:
         """Largest error allowed, over the measured signal about its mean."""
-        return None if self.asked.error_limit is None else self.asked.error_limit / 100.0
+        return self.asked.error_limit / 100.0
 
     @property
     def summary(self) -> dict[str, SignalSummary]:

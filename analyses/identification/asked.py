@@ -113,6 +113,10 @@ class Asked(Settings):
             "With --response: L (open loop), T = L/(1+L), S = 1/(1+L), closed (from the command).", flag="of"
         ),
     ] = "L"
+    averages: Annotated[
+        int | None,
+        Option("With --response: averages behind its coherence, which weighs the frequencies.", "N"),
+    ] = None
     frequency_response: Annotated[
         bool, Option("Of one record with a periodic excitation: a compliant two-mass drive.")
     ] = False
@@ -156,8 +160,8 @@ class Asked(Settings):
             raise InputError("--frequency-response takes one record (and --play RECORD for the play)")
         if self.response and len(self.files) != 1:
             raise InputError("--response takes one file; allowed: CSV or .mat of a frequency response")
-        if not self.response and (self.loop is not None or self.response_of != "L"):
-            raise InputError("--loop and --of go with --response")
+        if not self.response and (self.loop is not None or self.response_of != "L" or self.averages):
+            raise InputError("--loop, --of and --averages go with --response")
         if self.is_campaign and (self.validate or self.refine):
             raise InputError("--validate and --refine go with records, not with a campaign")
 

@@ -34,7 +34,7 @@ from analyses.identification.to_design import (
     with_correlations,
     with_structure,
 )
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
@@ -93,14 +93,17 @@ def identify_bench(
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     usual = cutoff is None and decimation is None
     recipe = None if usual else recipe_for(used[0], cutoff, decimation)
+    findings = {record.name: check_record(start, record) for record in (*used, *unseen)}
     if settings.electrical:
-        electrical = fit_electrical(start, used, recipe)
-        start = design_with_fit(plain, electrical_values(plain, electrical), told)
-    judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
-    findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
+        with because(findings):
+            electrical = fit_electrical(plain, used, recipe)
+            start = design_with_fit(plain, electrical_values(plain, electrical), told)
+        judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
+        findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     limit = settings.residual_limit / 100.0
     held = _held(design, start, settings)
-    right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
+    with because(findings):
+        right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     if electrical is not None and "inductance" in electrical.names:
         electrical = fit_electrical(plain, used, recipe, right.late_s)
         start = design_with_fit(plain, electrical_values(plain, electrical), told)

@@ -14,7 +14,7 @@ from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoi
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
-from analyses.records.consistency import Finding, check_record
+from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
 
@@ -99,9 +99,8 @@ def identify_campaign(
             aside.append(SetAside(id=run.id, reason=str(error)))
             continue
         findings[run.id] = tuple(check_run(design, imported, run, point))
-        wrong = [f"{one.subject}: {one.text}" for one in findings[run.id] if one.passed is False]
-        if wrong:
-            aside.append(SetAside(id=run.id, reason="; ".join(wrong), contradicts=True))
+        if wrong := wrong_of(findings[run.id]):
+            aside.append(SetAside(id=run.id, reason=wrong, contradicts=True))
         else:
             points.append(point)
     tools, outliers, own = campaign.instruments, campaign.outliers, _values_of(design)

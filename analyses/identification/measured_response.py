@@ -74,6 +74,7 @@ def identify_response(
     of: Of = "L",
     fixed: Mapping[str, float] | None = None,
     limit: float = 0.2,
+    averages: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> ResponseResult:
     """Fit a design to a measured frequency response of one of its loops.
@@ -94,13 +95,16 @@ def identify_response(
     limit : float
         Largest relative error of the design's response, root mean square over the frequencies.
 
+    averages : int, optional
+        Those behind the coherence, which then gives the deviations.
+
     Raises
     ------
     InputError
         If the response cannot be read, the design has no such loop, nothing is determined, or there are no
         more numbers than unknowns.
     """
-    measured = read_response(source)
+    measured = read_response(source, averages)
     start = with_values(design, dict(fixed or {}))
     model = _model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
@@ -173,7 +177,8 @@ def _model(
 
     def response(tried: Design) -> Complexes:
         if tried.coupling is not None and not tried.load_side_inertia_kgm2 > 0.0:
-            told = f"wants no inertia behind the coupling; allowed: a response of {name}, --of {of}"
+            told = f"no drive with a load behind the coupling has it as a response of {name}, --of {of}"
+            told += f"; allowed: --loop {', '.join(there)}, and --of as it was measured"
             raise InputError(told, where=measured.name)
         system = seen(tried)
         value = np.asarray(system(np.exp(2j * np.pi * measured.frequency_hz * system.dt))).ravel()

@@ -56,7 +56,14 @@ def identify(
     fixed = fixed_values(design, asked.fix)
     if asked.response:
         made = identify_response(
-            design, first, loop=asked.loop, of=asked.response_of, fixed=fixed, limit=limit, progress=progress
+            design,
+            first,
+            loop=asked.loop,
+            of=asked.response_of,
+            averages=asked.averages,
+            fixed=fixed,
+            limit=limit,
+            progress=progress,
         )
     elif asked.is_campaign:
         made = _of_campaign(design, asked, progress)

@@ -15,7 +15,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
 from analyses.identification.diagnosis import Followed
-from analyses.records.consistency import RATE_TOLERANCE, Finding
+from analyses.records.consistency import RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
@@ -70,8 +70,7 @@ def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     id, label = f"inputs-{record}", f"{record} agrees with itself and the design"
     if not findings:
         return Item(id=id, label=label, passed=None, reason="nothing to hold it against")
-    wrong = [f"{one.subject}: {one.text}" for one in findings if one.passed is False]
-    return Item.of(id, label, "; ".join(wrong))
+    return Item.of(id, label, wrong_of(findings))
 
 
 def share_item(id: str, label: str, value: float, limit: float, otherwise: str) -> Item:

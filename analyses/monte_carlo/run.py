@@ -132,6 +132,7 @@ def monte_carlo(
             r.id, judging.label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
             nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
             worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),
+            waiver=design.waiver_of(r.id),
         )
         for r, tally in tallies
     ]  # fmt: skip
@@ -215,8 +216,8 @@ def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
     normal = any(f.tolerance.kind != "uniform" for f in task.sampler.factors)
     correlated = not np.array_equal(task.sampler.correlation, np.eye(len(task.sampler.factors)))
     notes = {
-        "Scrambled Sobol points: intervals are those of independent samples (Clopper and Pearson, 95 %), "
-        "which is on the safe side.": True,
+        "Scrambled Sobol points: each bound is that of independent samples (Clopper and Pearson, one-sided, "
+        "95 % confidence), which is on the safe side.": True,
         "The tolerance box of a normal distribution ends at 3 standard deviations or its bounds.": normal,
         "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together.": correlated,
         f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"

@@ -225,7 +225,7 @@ class Conduct:
 
     # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
     # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-    # load go on changing; or why the run stopped
+    # load go on changing, with the limits that act; or why the run stopped
     status: str
     detail: str = ""  # with figures; empty where there is nothing to say
     later: str = ""  # that it ends so only after the run, and how far from there the run's end is
@@ -237,7 +237,7 @@ class Conduct:
 
     @property
     def wanted(self) -> bool:
-        """Whether the drive rests, turns steadily or follows, no limit in its way."""
+        """Whether the drive rests or turns steadily, no limit in its way, or follows."""
         return self.status in ("comes to rest", "becomes steady", "following")
 
 
@@ -256,7 +256,7 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         return Conduct(run.status, run.advice)
     rest = None if run.running is None else judge(run.running)
     if rest is None:
-        return Conduct("following")
+        return Conduct("following", _limited(run))
     unit, factor = COMMAND_UNITS[run.axis, "velocity" if run.stage == "voltage" else run.stage]
     if run.stage == "position":
         rest = counted(rest, full_deflection_rad)
@@ -271,6 +271,12 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     far = left > NEAR * np.abs([*run.followed, run.reference_rad[-1]]).max()
     later = f"after the run, which ends {factor * left:.3g} {unit} short of that" if far else ""
     return Conduct("comes to rest" if run.stage == "position" else "becomes steady", faint, later)
+
+
+def _limited(run: Trajectory) -> str:
+    """Which limits acted in a run, and for how much of it."""
+    acted = [f"{name} {100.0 * use.fraction:.3g} %" for name, use in run.limits.items() if use.fraction > 0.0]
+    return f"limited, of the time: {', '.join(acted)}" if acted else ""
 
 
 def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:

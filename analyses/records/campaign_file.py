@@ -45,7 +45,7 @@ from typing import Annotated, Literal
 from actuator_lti.bounds import CAMPAIGN_RUNS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path, read_campaign_toml, shown_path
-from analyses.records.naming import canonical
+from analyses.records.naming import canonical, spelled
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.request import key_of
 from analyses.toml_tables import Table
@@ -200,4 +200,5 @@ def _time(table: Table) -> TimeColumn:
 def _signal(signals: Table, name: str) -> SignalColumn:
     one = signals.table(name)
     made = Table({"column": name, **one.data}, one.path, one.origin).read(SignalColumn, name=name)
-    return replace(made, name=canonical(name, made.unit))
+    unit = spelled(made.unit)
+    return replace(made, name=canonical(name, unit), unit=unit)

@@ -1,12 +1,14 @@
 """Does a record agree with itself and with the drive it is said to come from?"""
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from math import inf, isfinite
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.arrays import BoolArray
 from analyses.estimation.least_squares import solve
@@ -53,6 +55,21 @@ class Finding:
     text: str
 
 
+def wrong_of(findings: Sequence[Finding]) -> str:
+    """What contradicts, in words; empty where nothing does."""
+    return "; ".join(f"{one.subject}: {one.text}" for one in findings if one.passed is False)
+
+
+@contextmanager
+def because(findings: Mapping[str, Sequence[Finding]]) -> Iterator[None]:
+    """What is wrong with the records comes before what is refused inside."""
+    try:
+        yield
+    except InputError as error:
+        told = "; ".join(f"{name}: {why}" for name, one in findings.items() if (why := wrong_of(one)))
+        raise InputError(f"{told}; so {error}") if told else error from None
+
+
 def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     """Hold a record against itself and against the limits of the design.
 
@@ -61,7 +78,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     followed it, and current, speed, voltage, supply and load against the design's limits. A ratio that a
     known factor explains is named.
     """
-    checks = (_rate, _clock, _steps, _reduction, _electrical, _command, _supply)
+    checks = (_rate, _still, _clock, _steps, _reduction, _electrical, _command, _supply)
     design = record.drive(design)
     found = (*(check(design, record) for check in checks), *_limits(design, record))
     return tuple(result for result in found if result is not None)
@@ -200,6 +217,20 @@ def _rate(design: Design, record: Record) -> Finding | None:
     return Finding(subject, False, clock if named == said else named)
 
 
+def _still(design: Design, record: Record) -> Finding | None:
+    """A position that stands still while the speed says, beyond its noise, that it moves."""
+    place, name = place_of(design, record), _rate_name(design)
+    if place is None or name not in record.signals or np.ptp(place[1]):
+        return None
+    speed, unit = record[name], "m" if design.axis == "linear" else "rad"
+    travel = record.period_s * float(np.ptp(np.cumsum(speed)))
+    noise = record.period_s * float(np.std(np.diff(speed))) * np.sqrt(0.5 * len(record))
+    if travel <= SURE * noise:
+        return None
+    text = f"the {place[0]} stands still, by the {name} it moves by {travel:.3g} {unit}: another column?"
+    return Finding(f"{name} against the rate of the {place[0]}", False, text)
+
+
 def clock_doubt(design: Design, record: Record) -> float:
     """The share by which a record's clock may be off: of its speed, or of its period from whole ticks."""
     if (rate := rate_ratio(design, record)) is not None:
@@ -333,12 +364,42 @@ def electrical_parts(design: Design, record: Record) -> dict[str, tuple[float, f
 
 def _electrical(design: Design, record: Record) -> Finding | None:
     """Voltage, current and motion through R, L and kE, at the accuracy of the signals and of the design."""
-    told = [_counted(design, name, *ends) for name, ends in electrical_parts(design, record).items()]
-    if not told:
+    if not (told := _voltage_told(design, record)):
         return None
-    each, words = zip(*told, strict=True)
+    (passed, words), u, i = told, record["voltage"], record["current"]
+    for cause, changed in (
+        ("the sign of the current is reversed", {"current": -i}),
+        ("the sign of the voltage is reversed", {"voltage": -u}),
+        ("the sign of the speed is reversed", {"voltage": -u, "current": -i}),
+        ("the columns of current and voltage are swapped", {"voltage": i, "current": u}),
+    ):
+        other = replace(record, signals={**record.signals, **changed})
+        if passed is False and (instead := _voltage_told(design, other)) and instead[0] is not False:
+            return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
+    if passed is None and (stands := _standing_current(design, record)):
+        passed, words = False, stands
+    return Finding("voltage against R i + kE w", passed, words)
+
+
+def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | None:
+    """Whether each part of the voltage counts once, and in words; None where nothing tells."""
+    doubt = abs(clock_doubt(design, record))
+    parts = electrical_parts(design, record).items()
+    told = [_counted(design, name, *ends, doubt if name == "kE w" else 0.0) for name, ends in parts]
+    each = [one for one, _ in told]
     passed = False if False in each else None if None in each else True
-    return Finding("voltage against R i + kE w", passed, "; ".join(words))
+    return (passed, "; ".join(words for _, words in told)) if told else None
+
+
+def _standing_current(design: Design, record: Record) -> str:
+    """A current of one value throughout, where the voltage less kE w says that it moves as much; or empty."""
+    at, speed = record["current"], record.signals.get("speed")
+    if np.ptp(at) or not at[0] or speed is None or not np.any(speed) or design.motor.resistance_ohm is None:
+        return ""
+    u, w = (_smooth(record, values - values.mean()) for values in (record["voltage"], speed))
+    moves = float(np.std(u - _ratio(u, w)[0] * w)) / design.motor.resistance_ohm
+    told = f"the current is {at[0]:.4g} A throughout, the voltage says that it moves by {moves:.2g} A rms"
+    return told if moves > 0.5 * abs(at[0]) else ""
 
 
 def resistance_doubt(design: Design, record: Record) -> float:
@@ -351,22 +412,29 @@ def resistance_doubt(design: Design, record: Record) -> float:
     return 0.0 if agrees else 0.5 * (low + high) - 1.0
 
 
-def _counted(design: Design, name: str, low: float, high: float) -> tuple[bool | None, str]:
-    """Whether a part of the voltage counts once, within what its data and the design's tolerance leave."""
+def _counted(
+    design: Design, name: str, low: float, high: float, doubt: float = 0.0
+) -> tuple[bool | None, str]:
+    """Whether a part of the voltage counts once, within what its data and the design's tolerance leave.
+
+    ``doubt`` is the share by which the clock may be off.
+    """
     if not isfinite(low):
         return None, f"{name} is not determined"
     key = "motor.back_emf_constant" if name == "kE w" else "motor.resistance"
-    allowed = SURE * own_share(design, key)
-    text = f"{name} counts {low:.3g} to {high:.3g} times"
+    allowed, motor = SURE * own_share(design, key) + doubt, design.effective_motor
     if low <= 1.0 + allowed and high >= 1.0 - allowed:
         return True, f"{name} is {low:.3g} to {high:.3g} times as the design has it"
+    ohm, back = motor.resistance_ohm or 0.0, motor.back_emf_constant_Vs_rad or 0.0
+    held = {"R i": f" that of R = {ohm:.4g} ohm", "kE w": f" that of kE = {back:.4g} V s/rad"}
+    text = f"{name} counts {low:.3g} to {high:.3g} times{held.get(name, '')}"
     ratio = 0.5 * (low + high)
     kelvin = (ratio - 1.0) / COPPER_1_K
     warm = name == "R i" and WINDING_K[0] < kelvin < WINDING_K[1]
     if warm:
         text += f": a winding {kelvin:+.0f} K from the design's"
         text += f", or a current {1.0 / ratio:.3g} times the real"
-    return (None if warm else False), with_factor(text, 1.0 / ratio if ratio else 0.0)
+    return (None if warm else False), with_factor(text, 1.0 / ratio if ratio > 0.0 else 0.0)
 
 
 def _command(design: Design, record: Record) -> Finding | None:
@@ -380,8 +448,8 @@ def _command(design: Design, record: Record) -> Finding | None:
         values = record[answer]
         if (command, answer) in (("reference", "angle"), ("output_speed_reference", "speed")):
             values = values / design.total_ratio
-        a, b = (part - part[0] for part in (values, record[command]))
-        if not np.any(b):  # a step that begins with the record tells no ratio
+        a, b = (part - part.mean() for part in (values, record[command]))
+        if not np.ptp(record[command]):  # a step that begins with the record tells no ratio
             continue
         ratio, alike = _ratio(a, b)
         subject = f"{answer} against its command"

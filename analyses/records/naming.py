@@ -110,13 +110,13 @@ def taken_apart(column: str) -> ColumnName:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit, as recorders spell them; a plain number is none."""
     try:
-        parse_unit(_spelled(text))
+        parse_unit(spelled(text))
     except ValueError:
         return False
     return bool(text.strip())
 
 
-def _spelled(unit: str) -> str:
+def spelled(unit: str) -> str:
     """Units as recorders spell them: 1/min, U/min, Ncm, Arms."""
     known = dict.fromkeys(("1/min", "U/min", "min-1", "min^-1", "r/min"), "rpm")
     known |= {"Ncm": "N*cm", "mNm": "mN*m", "kNm": "kN*m", "Arms": "A", "Vrms": "V", "Aeff": "A"}
@@ -129,7 +129,7 @@ def _words(base: str, unit: str | None) -> ColumnName:
     if words and words[-1] not in ("rms", "eff") and words[-1].endswith("rms"):
         rms, words[-1] = True, words[-1].removesuffix("rms")
     name = "_".join(word for word in words if word not in ("rms", "eff", "", "actual", "measured"))
-    return ColumnName(name, None if unit is None else _spelled(unit), rms)
+    return ColumnName(name, None if unit is None else spelled(unit), rms)
 
 
 def is_time(column: str) -> bool:

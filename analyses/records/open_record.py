@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml
+from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml, shown, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
 from analyses.records.csv_stream import STAMP
 from analyses.records.inputs import spec_of_names
@@ -39,11 +39,14 @@ ODRIVE_SPEC = RecordSpec(
 
 
 HEAD_BYTES = 1 << 16
+UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+PACKED = (b"\x1f\x8b", b"PK", b"BZ", b"\xfd7")
 EMPS_COLUMNS = {"t", "qm", "qg", "vir", "gtau"}
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t])\s*[+-]?[0-9]+,[0-9]")
 UNKNOWN = (
     "the layout is not known (columns such as time_s, reference_deg, Current [mA] are); "
-    "describe it in a record file (TOML), see actuator-lti correlate --help"
+    "describe it in a record file (TOML; column = its name, or its number from 1), see actuator-lti "
+    "correlate --help"
 )
 
 
@@ -148,13 +151,16 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
         spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))
     else:
         with open_regular(path, "record") as stream:
-            head = stream.read(HEAD_BYTES).decode("utf-8-sig", errors="replace")
+            data = stream.read(HEAD_BYTES)
+        if data[:2] not in UTF_16 and (b"\0" in data or data[:2] in PACKED):
+            raise InputError("is no text but binary or packed; allowed: " + RECORDS, where=shown_path(path))
+        head = data.decode("utf-8-sig", errors="replace")
         if head.startswith("%Motor characterization data"):
             return ODRIVE_SPEC, {}
         columns, layout = _columns_of_csv(head)
         spec, why = spec_of_names(columns, layout)
     if spec is None:
-        first = "; ".join(f'"{column}": {reason}' for column, reason in list(why.items())[:4])
+        first = "; ".join(f"{shown(column)}: {reason}" for column, reason in list(why.items())[:20])
         raise InputError(f"{UNKNOWN} ({first})" if first else UNKNOWN, where=str(path))
     return spec, why
 

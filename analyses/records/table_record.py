@@ -122,7 +122,8 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            message = f'time {time[k]:.9g} s does not come after {reached[k]:.9g} s (see "disorder")'
+            message = f"time {time[k]:.9g} s does not come after {reached[k]:.9g} s; allowed: rising "
+            message += 'times, or disorder = "drop" in a record file'
             raise InputError(message, where=f"{self._origin}:{block.lines[k]}")
         return keep
 

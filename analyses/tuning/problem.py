@@ -12,6 +12,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of, tolerances
+from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
@@ -185,7 +186,10 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     every = asked_for(design, extra)
     chosen = tuple(r for r in every if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
     if not chosen:
-        raise InputError("no requirement on a loop: nothing to tune for; state margins and bandwidths")
+        raise InputError(
+            "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
+            'file, or as --require "position.bandwidth>=30 Hz"'
+        )
     return chosen
 
 
@@ -232,7 +236,7 @@ def read_requirement(words: str, design: Design) -> Requirement:
     known = {name: q for name, q in QUANTITIES.items() if q.scope == "loop"}
     for what, one, allowed in (("loop", loop, (*loops_of(design), "every")), ("quantity", quantity, known)):
         if one not in allowed:
-            raise InputError(f"{said} {what} {one!r}; allowed: {', '.join(allowed)}")
+            raise InputError(f"{said} {what} {one!r}{nearest(one, allowed)}; allowed: {', '.join(allowed)}")
     unit = known[quantity].unit_for(design.axis)
     try:
         value = parse_limit(limit, unit)

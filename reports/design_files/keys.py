@@ -29,7 +29,7 @@ class Asked:
     explain: Annotated[
         str | None,
         Option(
-            words="The numbers of a design: written, read as, in the model as; and what follows.",
+            words="The numbers of a design: written, read as, in the model as; what follows, and warnings.",
             metavar="FILE",
         ),
     ] = None
@@ -37,16 +37,25 @@ class Asked:
 
 
 @dataclass(frozen=True)
+class Warned:
+    """What is suspicious about a design, as `margins` has it."""
+
+    text: Annotated[str, "To be checked"]
+
+
+@dataclass(frozen=True)
 class Keys:
-    """Keys that there are, or (of a design) its numbers and what follows from them."""
+    """Keys that there are, or (of a design) its numbers, what follows, what is suspicious."""
 
     keys: tuple[KeyEntry, ...] | tuple[Explained, ...]
     design: Design | None = None
     figures: tuple[SheetFigure, ...] = ()
+    warnings: tuple[Warned, ...] = ()
 
     def __str__(self) -> str:
-        what = f"number{'s' * (len(self.keys) != 1)} of {self.design.name}" if self.design else ""
-        return f"{len(self.keys)} {what or 'key' + 's' * (len(self.keys) != 1)}"
+        what = "value" if self.design else "key"
+        of = f" of {self.design.name}" if self.design else ""
+        return f"{len(self.keys)} {what}{'s' * (len(self.keys) != 1)}{of}"
 
 
 def keys(asked: Asked) -> Keys:
@@ -54,7 +63,7 @@ def keys(asked: Asked) -> Keys:
 
     An InputError if none does, or the design that is to be explained is refused.
     """
-    from actuator_lti.design import load_design
+    from actuator_lti.design import load_design, warnings_of
     from actuator_lti.design.key_reference import explained, key_reference, record_reference
     from actuator_lti.drive.sheet_figures import sheet_figures
 
@@ -62,7 +71,9 @@ def keys(asked: Asked) -> Keys:
     if asked.explain is not None:
         design = load_design(asked.explain)
         figures = tuple(one for one in sheet_figures(design) if text in one.name.lower())
-        return Keys(tuple(item for item in explained(design) if text in item.path), design, figures)
+        rows = (*explained(design), *_assumed(design, asked.explain))
+        warnings = tuple(Warned(line) for line in warnings_of(design) if text in line.lower())
+        return Keys(tuple(item for item in rows if text in item.path), design, figures, warnings)
     axis: Axis = "linear" if asked.linear else "rotary"
     listed = (*key_reference(axis), *record_reference(axis))
     found = tuple(key for key in listed if _is_called(key, text))
@@ -72,6 +83,18 @@ def keys(asked: Asked) -> Keys:
             "settings of a controller as a file: actuator-lti objects import"
         )
     return Keys(found)
+
+
+def _assumed(design: Design, file: str) -> tuple[Explained, ...]:
+    """The path of the load where its file does not say it: an engineer has to."""
+    from actuator_lti.design.key_reference import Explained
+    from actuator_lti.design.loader import design_text
+    from actuator_lti.files.reading import parse_toml
+
+    if "path" in parse_toml(design_text(file), file).get("load", {}):
+        return ()
+    path = design.load.path
+    return (Explained("load.path", "not written", f"{path}, assumed", "a load only adds friction"),)
 
 
 def _is_called(key: KeyEntry, text: str) -> bool:

@@ -5,6 +5,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from actuator_lti.design.loader import read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
@@ -41,8 +42,6 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
 
 
 def _design(payload: Mapping[str, Any]) -> Design:
-    from actuator_lti.design.loader import read_design_text
-
     return read_design_text(str(payload["design"]), str(payload["name"]))
 
 

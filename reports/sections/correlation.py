@@ -27,7 +27,7 @@ def _named(signal: str) -> str:
     return NAMES.get(signal, signal)
 
 
-def _of_record(result: CorrelationResult, number: int, error_limit: float | None) -> doc.Section:
+def _of_record(result: CorrelationResult, number: int, error_limit: float) -> doc.Section:
     active = [(name, 100.0 * share) for name, share in result.limits.items() if share > 0.0]
     limits = ", ".join(f"{name} {share:.1f} % of the time" for name, share in active) or "none"
     intro = f"Model {result.design} with the command of {result.record}; {result.counts}."
@@ -45,7 +45,7 @@ def _of_record(result: CorrelationResult, number: int, error_limit: float | None
     )  # fmt: skip
 
 
-def words(results: Sequence[CorrelationResult], error_limit: float | None = None) -> str:
+def words(results: Sequence[CorrelationResult], error_limit: float) -> str:
     """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
     wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
     parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
@@ -62,13 +62,11 @@ def words(results: Sequence[CorrelationResult], error_limit: float | None = None
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
     far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
-    if error_limit is not None:
-        side = "Above" if far.share_of_motion > error_limit else "Within"
-        parts.append(f"{side} the limit of {100.0 * error_limit:g} %: {far.name} {_share(far)}.")
-    elif not wrong and len(results) == 1:
-        parts.append("The record contradicts neither itself nor the design.")
-    elif not wrong:
-        parts.append("The records contradict neither themselves nor the design.")
+    beyond = far.share_of_motion > error_limit
+    side = "Above" if beyond else "Within"
+    parts.append(f"{side} the limit of {100.0 * error_limit:g} %: {_named(far.name).lower()} {_share(far)}.")
+    if not (wrong or beyond or apart):
+        parts.append("No record contradicts itself or the design.")
     return " ".join(parts)
 
 
@@ -76,7 +74,7 @@ def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
 
 
-def _summary(results: Sequence[CorrelationResult], error_limit: float | None) -> doc.Section:
+def _summary(results: Sequence[CorrelationResult], error_limit: float) -> doc.Section:
     rows: list[tuple[str, SignalComparison | SignalSummary]] = []
     for name, one in summarise(results).items():
         rows += [(result.record, result[name]) for result in results if name in result.signals]

@@ -132,6 +132,8 @@ SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "close
 def _of_loop(result: ResponseResult) -> doc.Section:
     fit, measured = result.fit, result.measured
     noise = "no deviations were measured: errors are those of the residual"
+    if np.isfinite(measured.coherence).any():
+        noise = f"the coherence is not read without --averages N, {noise}"
     if fit.misfit is not None:
         noise = f"misfit {fit.misfit:.2f} (1: the measured deviations explain the residual)"
     intro = (

@@ -67,9 +67,11 @@ def _result(result: BenchResult, axis: str) -> str:
     if result.refined is not None:  # these are the design's
         parts = [f"{key} {value_words(result.refined, key, axis)}" for key in result.refined.names[:3]]
         parts[0] = f"refined by simulation: {parts[0]}"
+    told = ", ".join(parts) or "the records tell neither inertia nor friction"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "its records" if len(result.resimulated) > 1 else worst.record
-    words = f"{', '.join(parts)}{constant_words(model, axis)}. The written design meets {met} within"
+    written = "The written design" if result.passed or result.accepted else "A design of what is found"
+    words = f"{told}{constant_words(model, axis)}. {written} meets {met} within"
     return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
 
 
@@ -234,5 +236,6 @@ def _friction(part: RecordFit, unit: str, rate: str) -> style.Chart:
     order = np.argsort(part.speed)
     line = order[style.kept_rows([(part.friction - part.residual)[order]])]
     panel.points(part.speed[few], part.friction[few], "rows of the record", size=3.0, colour=style.BLUE)
-    panel.curve(part.speed[line], (part.friction - part.residual)[line], "model", colour=style.ORANGE)
+    model = (part.friction - part.residual)[line]  # no function of the speed alone: in points as well
+    panel.points(part.speed[line], model, "model", size=2.0, colour=style.ORANGE)
     return chart

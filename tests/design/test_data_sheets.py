@@ -214,6 +214,30 @@ def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: st
     assert parameter_value(again, path) == 30.5
 
 
+@pytest.mark.parametrize(
+    ("text", "amperes"),
+    [
+        ("2.74 Arms", 2.74 * sqrt(1.5)),
+        ("9.5 A pk", 9.5 * sqrt(3) / 2),
+        ("6.72 A rms", 6.72 * sqrt(1.5)),
+        ("5.4 A dc", 5.4),
+        ("8.2 A", None),
+    ],
+)
+@pytest.mark.parametrize("quantity", ["motor_current", "duty_current"])
+def test_a_required_current_is_read_as_limits_read_theirs(
+    text: str, amperes: float | None, quantity: str
+) -> None:
+    asked = f'[[requirement]]\nid = "i"\nquantity = "{quantity}"\nmaximum = "{text}"\n'
+    if amperes is None:
+        with pytest.raises(InputError, match=r"requirement\.i\.maximum = .*A rms .* or A dc "):
+            read_design_text(SERVO + asked)
+        return
+    design = read_design_text(SERVO + asked)
+    assert design.requirements[0].maximum == pytest.approx(amperes, rel=1e-14)
+    assert read_design_text(write_design(design)) == design
+
+
 def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -> None:
     items = {item.path: item for item in explained(read_design_text(SERVO, "servo"))}
     assert items["motor.torque_constant"].written == "0.93 N*m/A"
@@ -467,6 +491,103 @@ CURRENT = '[control.current]\ngain = "1 V/A"\n[control.velocity]\n'
         ),
         ("computing_delay", "pwm_frequency", ("control.computing_delay: missing", "not needed, part of ")),
         ('name = "first"', 'model = "GPLE 60"', ("gear[1].name: missing", "(it is name)")),
+        # by hand: 32 mN m/sqrt(W) sqrt(0.299 ohm); 360 deg over 1.8 deg, over 20 arcsec
+        *(
+            ("[motor]", f'[motor]\n{key} = "{km}"', ("it is the motor constant Km",))
+            for key in ("km", "motor_constant")
+            for km in ("32 mNm/√W", "32 mNm/sqrt(W)", "32 mNm/W^0.5", "32 mNm/W½", "32 mNm/W^(1/2)")
+        ),
+        (
+            'torque_constant = "30.2 mN*m/A"',
+            'motor_constant = "32 mNm/√W"',
+            ("sqrt(R): 0.0175 N*m/A)",),
+        ),
+        (
+            "[motor]",
+            '[motor]\nrated_torque = "1 Nm"',
+            ("(it is continuous_current of [limits], the torque over",),
+        ),
+        ("[motor]", '[motor]\nbrake_inertia = "1 gcm2"', ("(it is added to rotor_inertia)",)),
+        *(
+            ("[motor]", f'[motor]\n{key} = "1 ohm"', ("of a stepper, else twice it)",))
+            for key in ("phase_resistance", "resistance_phase", "resistance_per_phase")
+        ),
+        ("[motor]", '[motor]\ntorque_ripple = "2 %"', ("motor.cogging is a torque in N*m",)),
+        *(
+            ("[limits]", f'[limits]\n{key} = "2 A"', ("(it is continuous_current)",))
+            for key in ("stall_current", "continuous_stall_current", "rms_current")
+        ),
+        ("voltage = ", 'peak_stall_current = "2 A"\nvoltage = ', ("(it is peak_current)",)),
+        ("voltage = ", "i2t = 3\nvoltage = ", ("(it is peak_time, for",)),
+        ("voltage = ", "dc_bus = ", ("(it is voltage)",)),
+        *(
+            ("efficiency = 0.9", f"{key} = 1", (why,))
+            for key, why in (
+                ("max_torque", "not needed"),
+                ("rated_torque", "not needed"),
+                ("no_load_torque", "dry_torque of [friction], at the motor"),
+                ("back_driving_torque", "output over ratio"),
+                ("transmission_error", "gear_error of [load]"),
+            )
+        ),
+        (
+            "[motor]",
+            '[motor]\nstep_angle = "1.8 deg"',
+            ("of [encoder], one revolution over it; here 200 counts",),
+        ),
+        *(
+            ("[control]", f"[encoder]\n{text}\n[control]", (why,))
+            for text, why in (
+                ('step_angle = "1.8 deg"', "here 200 counts"),
+                ('resolution = "20 arcsec"', "here 64800 counts"),
+                ('counts_per_rev = "20 arcsec"', "a revolution over it is 64800 counts"),
+                ("cpr = 1024", '"1024 lines" (4096 counts) or "1024 counts"'),
+                ("ppr = 1024", '"1024 lines" (4096 counts) or "1024 counts"'),
+                ('type = "resolver"', "not needed"),
+                ("poles = 2", "not needed"),
+                ('interface = "SSI"', "not needed"),
+                ('accuracy = "20 arcsec"', "not needed"),
+                ('counts_per_rev = "500"', ""),
+                (
+                    'counts_per_rev = "500 ppr"',
+                    'allowed: counts, as 4096, "1024 lines" or "12 bit"; write "500 l',
+                ),
+                ('counts_per_rev = "2,621,440 counts"', 'write "2621440 counts"'),
+            )
+            if why
+        ),
+        (
+            "[control]",
+            f'{CURRENT}observer = true\ngain = "1 As/rad"\n[control]',
+            ('encoder.speed = "tracking"',),
+        ),
+        # 250 us and 300 us of 100 us, half of that
+        *(
+            ("[control]", f'{CURRENT}gain = "9 Hz"\nevery = "{text}"\n[control]', (f"{why}\n",))
+            for text, why in (
+                ("250 us", "write the ticks of control.period"),
+                ("300 us", "control.period, here 3"),
+                ("10 kHz", "control.period, here 1"),
+            )
+        ),
+        ('computing_delay = "0 s"', 'computing_delay = "0.5 samples"', ("; here 5e-05 s",)),
+        *(
+            ("period = ", f'period = "{rate}" #', (f'"{rate}": {why}',))
+            for rate, why in (
+                ("0 Hz", "allowed: above 0"),
+                ("-5 Hz", "allowed: above 0"),
+                ("1e308 Hz", "must be f"),
+            )
+        ),
+        ("[control]", CURRENT.replace("1 V/A", "1e308 Hz") + 'gain = "9 Hz"\n[control]', ("must be finite",)),
+        ('"48 V"', '"100-120 VAC"', ("behind a rectifier, 141.4 V to 169.7 V",)),
+        (
+            '"142 g*cm^2"',
+            '"142 ± 7.1 gcm²"',
+            ('write "142 gcm²"; "± 7.1 gcm²" is one for tolerance = "5 %"',),
+        ),
+        ('"0.299 ohm"', '"0.299 Ω @25°C"', ('write "0.299 Ω"; "@25°C" is one for temperature.reference',)),
+        ('name = "first"', 'name = "i=43"', ('no =, as "i-43"',)),
         ("[motor]", '[motor]\nmotor_constant = "1 V"', ("(not needed: it follows from R and kM)",)),
         ("[motor]", '[motor]\n"Resistance (L-L)" = "1 V"', ("(it is resistance)",)),
         ('ratio = "43:1"', 'reduction = "43:1"', ("(it is ratio, which takes",)),

@@ -3,7 +3,14 @@
 import numpy as np
 import pytest
 
-from actuator_lti.design import Design, design_hash, load_design, read_design_text, with_values
+from actuator_lti.design import (
+    Design,
+    design_hash,
+    load_design,
+    read_design_text,
+    with_values,
+    write_design,
+)
 from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import write_changed
 from actuator_lti.errors import InputError, Mistakes
@@ -171,6 +178,50 @@ def test_a_warm_torque_constant_is_told_from_a_convention(
     assert ("the ratio is that" in text) is ("motor.constants" in words)
 
 
+@pytest.mark.parametrize(("warm", "words"), [(0.75, ""), (0.85, "here 0.85"), (2**-0.5, "")])
+def test_a_cause_is_told_only_where_its_ratio_is_near(warm: float, words: str) -> None:
+    """A kE of peak volts is sqrt(2) too large; magnets warm to 0.8 to 0.95."""
+    text = told(motor("dc", torque_constant=f"{0.1 * warm} Nm/A", back_emf_constant="0.1 V*s/rad"))
+    assert ("sheets give kM warm" in text) is bool(words)
+    assert words in text
+    assert ("the ratio is sqrt(2), rms against peak" in text) is (warm == 2**-0.5)
+
+
+def test_constants_that_disagree_are_told_by_the_convention_that_relates_them() -> None:
+    """Of peak amperes and volts of a phase kE is kM over 3/2."""
+    text = told(motor("peak-phase", torque_constant="0.75 Nm/A", back_emf_constant="0.75 V*s/rad"))
+    assert 'with motor.constants = "peak-phase" kE is kM over 3/2 in SI' in text
+    assert "in SI the two are one" not in text
+    stepper = told(motor("dc", torque_constant="1 Nm/A", back_emf_constant="1 V*s/rad/phase"))
+    assert 'with "dc" of a stepper those of a phase' in stepper
+
+
+@pytest.mark.parametrize("key", ["magnet_pitch", "pole_pitch"])
+def test_a_linear_motor_is_asked_for_the_period_of_its_cogging(key: str) -> None:
+    """2 pi/24 mm."""
+    linear = load_design("emps").with_values
+    given = {"motor.cogging": "10 N", "limits.speed": "0.1 m/s"}
+    with pytest.raises(InputError, match=r"cogging_periods: missing; motor.cogging needs it.*24 mm"):
+        linear(given)
+    periods = linear(given | {"motor.cogging_periods": "24 mm"}).motor.cogging_periods
+    assert periods == pytest.approx(2 * np.pi / 0.024, rel=1e-14)
+    with pytest.raises(InputError, match=r'takes "24 mm" too: 261.799 rad/m'):
+        linear({f"motor.{key}": "24 mm"})
+    one = linear(given | {"motor.cogging_periods": "1 rad/m"})
+    assert read_design_text(write_design(one), one.origin) == one
+
+
+@pytest.mark.parametrize(("peak", "shown"), [("2.034 A", "2.034 A, but the supply gives only 2.0339 A"),
+    ("3 A", "3 A, but the supply gives only 2.03 A"), ("2.03 A", "")])  # fmt: skip
+def test_amperes_that_differ_are_told_with_digits_that_do(peak: str, shown: str) -> None:
+    """12 V/5.9 ohm are 2.033898 A."""
+    current = '[control.current]\ngain = "9 V/A"\n'
+    lines = warnings_of(
+        read_design_text(DRIVE.replace("[control]", f'peak_current = "{peak}"\n[control]') + current)
+    )
+    assert any(f"limits.peak_current: {shown} at stall" in line for line in lines) is bool(shown)
+
+
 @pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
 @pytest.mark.parametrize(
     ("ampere", "volt", "constants", "units"),
@@ -258,6 +309,36 @@ def test_a_gear_that_speeds_up_is_suspicious(ratio: str, told_of: bool) -> None:
     warnings = warnings_of(read_design_text(DRIVE.replace("ratio = 19.2", f"ratio = {ratio}")))
     assert any("faster than the motor" in line for line in warnings) is told_of
     assert (ratio != '"1/86"') or any('written "86:1"' in line for line in warnings)
+
+
+GEAR = '[[gear]]\nname = "R22"\nratio = 19.2\n'
+SAFE = {"": True, '[load]\npath = "back-drivable"\n': False, "[friction]\nload_coefficient = 1\n": False}
+
+
+@pytest.mark.parametrize(("more", "warned"), SAFE.items())
+@pytest.mark.parametrize("gear", ["", GEAR])
+def test_a_load_that_nothing_feels_is_warned_of(more: str, warned: bool, gear: str) -> None:
+    """Where friction takes less than 1/N of it no drive locks itself."""
+    lines = warnings_of(read_design_text(DRIVE.replace(GEAR, gear + more)))
+    assert any('load.path = "back-drivable"?' in line for line in lines) is warned
+    assert any("load.path: self-locking is assumed" in line for line in lines) is (warned and not gear)
+
+
+def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
+    file = tmp_path / "direct.toml"
+    file.write_text(
+        DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n', encoding="utf-8"
+    )
+    data = cli.data("keys", "--explain", f"{file}")
+    rows = {one["path"]: (one["written"], one["read"]) for one in data["keys"]}
+    assert rows["load.path"] == ("not written", "self-locking, assumed")
+    assert rows["control.current.gain"][0] == "from 9 Hz"
+    said = [one["text"] for one in data["warnings"]]
+    assert any("turns the output faster than the motor" in line for line in said)
+    assert [f"warning: first: {line}" for line in said] == cli("margins", f"{file}").err.splitlines()
+    assert "load.path" not in [one["path"] for one in cli.data("keys", "--explain", "joint")["keys"]]
+    ran = cli("simulate", f"{file}", "--set", "load.inertia=30 gcm2", "--json", "--duration", "0.01")
+    assert any(said[-1] in line for line in ran.err.splitlines())
 
 
 def test_a_changed_design_keeps_the_keys_of_its_data_sheet(tmp_path) -> None:

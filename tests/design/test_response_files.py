@@ -88,6 +88,8 @@ def test_closed_loops_and_how_their_errors_grow(tmp_path, of):
         ("f,re,im\n0,2,3\n1,2,3", "frequencies above 0"),
         ("f,re,im,coherence\n1,2,3,1.2\n2,2,3,1", "a coherence outside 0 to 1"),
         ("f,re,im\n1,2,3\n2,2", "rows of 3"),
+        ("# bench\nf,re,im\n1,2,3\n\n2,x,1\n3,1,1", 'line 5: "x" is no number'),
+        ("f,re,im\n0,2,3\n1,2,3\n2,2,2", "each at a frequency above 0 Hz"),
         ("f,re,im\n1,0,0\n2,2,1", "a value that is 0"),
         ("", "is empty"),
     ],

@@ -135,6 +135,17 @@ WRITTEN = [
     ],
     ("3×10^-5 kg m²", "kg*m^2", 3e-5),
     ("3 x 10⁻⁵ kg m2", "kg*m^2", 3e-5),
+    # slug = lbf s2/ft, mil = a thousandth of an inch
+    ("1 slug*ft^2", "kg*m^2", 0.45359237 * 9.80665 * 0.3048),
+    ("1 gmm²", "kg*m^2", 1e-9),
+    ("4 mils", "m", 4 * 25.4e-6),
+    ("0.2 milliHenries", "H", 2e-4),
+    ("2.6 V per krpm", "V*s/rad", 2.6 * 0.03 / pi),
+    ("6000 r.p.m.", "rad/s", 200 * pi),
+    ("59 to 1", "1", 59.0),
+    ("85 pct", "1", 0.85),
+    ("5.0 E-6 kg.m2", "kg*m^2", 5e-6),
+    *[(text, "1", 262144.0) for text in ("18 Bit", "18 Bits", "18-Bit")],
 ]
 EXACT = ("100 us", "9.2 g*cm^2", "5.9 mN*m/A", "6 uH", "20 mohm")  # a decimal prefix costs no digit
 
@@ -182,6 +193,9 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("2 g", "m/s^2", "here 19.6133 m/s^2"),
         ("5 kg", "N", "a weight is written kgf"),
         ("1,000 rpm", "rad/s", 'write "1000 rpm" or "1.000 rpm"'),
+        ("2,621,440 counts", "1", 'write "2621440 counts"'),
+        ("100-120 V", "V", "a range; write one number"),
+        ("2 ticks", "s", "of control.period"),
         ("5 Arms", "A", "unknown unit"),
         ("3 rpn", "rad/s", 'nearest known: "rpm"'),
         ("3 mfoo", "m", "unknown unit"),

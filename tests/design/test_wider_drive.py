@@ -24,6 +24,7 @@ DIRECT = {  # the amperes of ilr33-amber, as an AC motor's file has to say them
     "limits.continuous_current": "4 A dc",
     "control.current.gain": "0.02 V/A dc",
     "control.velocity.gain": "0.12 A dc*s/rad",
+    "requirement.motor-current.maximum": "4 A dc",
 }
 FILTER = "control.velocity.filter"
 STIFF = {"stiffness": "100 N*m/rad"}

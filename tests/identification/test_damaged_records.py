@@ -286,6 +286,10 @@ WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
     "mA read as A": (_scaled(1e3, "current"), ALL, {}, "factor 1000"),
     "A read as mA": (_scaled(1e-3, "current"), ALL, {}, "the design's inertias beside"),
     "the current's sign turned": (_scaled(-1.0, "current"), ALL, {}, "does not explain"),
+    "the current's sign, by the voltage": (_scaled(-1.0, "current"), WHOLE, {}, "sign of the current is rev"),
+    "the voltage's sign": (_scaled(-1.0, "voltage"), WHOLE, {}, "the sign of the voltage is reversed"),
+    "current and voltage swapped": (_swapped("current", "voltage"), WHOLE, {}, "voltage are swapped"),
+    "an angle that stands still": (_scaled(0.0, "angle"), WHOLE, {}, "the angle stands still"),
     "rpm read as rad/s": (_scaled(30.0 / np.pi, "speed"), ALL, {}, "60/2 pi"),
     "degrees read as radians": (_scaled(180.0 / np.pi, "angle"), BARE, {}, "the design's inertias beside"),
     "degrees as turns": (_scaled(1.0 / 360.0, "angle"), ALL, {}, "times the rate of the angle"),
@@ -317,10 +321,10 @@ WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
 }  # fmt: skip
 
 
-def _refused(design: Design, record: Record) -> str:
+def _refused(design: Design, record: Record, *, electrical: bool = False) -> str:
     """Why no design comes of a record."""
     try:
-        result = identify_bench(design, [record])
+        result = identify_bench(design, [record], settings=Settings(electrical=electrical))
     except InputError as error:
         return str(error)
     assert not result.passed
@@ -330,7 +334,11 @@ def _refused(design: Design, record: Record) -> str:
 @pytest.mark.parametrize("name", WRONG)
 def test_what_cannot_be_put_right_gives_no_design(name: str, columns: Columns) -> None:
     damage, signals, wrong, reason = WRONG[name]
-    assert reason in _refused(with_values(BASE, wrong), _record(damage(columns), signals))
+    record, design = _record(damage(columns), signals), with_values(BASE, wrong)
+    assert reason in _refused(design, record)
+    if "voltage" in signals and not wrong:  # whatever else is asked for
+        said = _refused(design, record, electrical=True)
+        assert reason in said or "factor 1000" in said
 
 
 @pytest.mark.parametrize("factor", [100.0, 1e-3])

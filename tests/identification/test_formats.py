@@ -1,5 +1,6 @@
 """The formats that people have: one truth, written in many ways, reads the same."""
 
+import gzip
 import io
 import json
 from collections.abc import Callable
@@ -121,6 +122,14 @@ def test_one_record_in_many_formats(form: str, tmp_path) -> None:
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)
 
 
+def test_revolutions_per_minute_as_recorders_spell_them(tmp_path) -> None:
+    (tmp_path / "r.csv").write_text("t,n\n0,0\n1,60\n2,120\n")
+    for unit in ("rpm", "1/min", "U/min", "min^-1"):
+        text = f'file = "r.csv"\ntime = {{ column = 1 }}\nsignals.speed = {{ column = 2, unit = "{unit}" }}\n'
+        (tmp_path / "r.toml").write_text(text)
+        assert open_record(tmp_path / "r.toml")["speed"] == pytest.approx([0.0, 2.0 * np.pi, 4.0 * np.pi])
+
+
 def test_a_compressed_and_a_plain_file_read_alike() -> None:
     values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
     for packed in (False, True):
@@ -230,6 +239,11 @@ def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_toler
         (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
         (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
         (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
+        (lambda p: (p / "r.csv").write_text("a,b,c,d,e,f\n1,2,3,4,5,6\n"), '"f": no name'),
+        (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "its number from 1"),
+        (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
+        (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
+        (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),
         (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
     ],
 )

@@ -188,7 +188,20 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
         assert reason in cli.refused(*words, *more)
     _written(tmp_path, HERTZ, 10.0 * open_loop(HERTZ))
     said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
-    assert "wants no inertia behind the coupling; allowed: a response of position, --of L" in said
+    assert "has it as a response of position, --of L; allowed: --loop position" in said
+
+
+def test_coherence_weighs_with_its_averages_and_is_said_to_be_unread_without(tmp_path) -> None:
+    """Of 16 averages 0.99 is a deviation of sqrt(0.01/(0.99 * 15)), 2.6 %: the noise that is there."""
+    deviation = np.sqrt(0.01 / (0.99 * 15.0))
+    file = _measured(tmp_path, "L", deviation, 3, stated=False)
+    names, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([f"{names},coherence", *(f"{row},0.99" for row in rows)]))
+    read, unread = (identify_response(_design(OFF), file, averages=n) for n in (16, None))
+    assert 0.8 < read.fit.misfit < 1.2
+    assert "misfit" in section(read)["intro"]
+    assert unread.fit.misfit is None
+    assert "the coherence is not read without --averages N" in section(unread)["intro"]
 
 
 def test_a_fit_is_drawn_in_decibels_with_a_phase_that_does_not_wrap(tmp_path) -> None:

@@ -163,11 +163,8 @@ def test_content_above_nyquist_is_refused(run, tmp_path) -> None:
 
 
 AMBER = load_design("ilr33-amber")
-C0, kM, kE = (
-    AMBER.friction.dry_torque_Nm,
-    AMBER.motor.torque_constant_Nm_A,
-    AMBER.motor.back_emf_constant_Vs_rad,
-)
+C0, kM = AMBER.friction.dry_torque_Nm, AMBER.motor.torque_constant_Nm_A
+kE = AMBER.motor.back_emf_constant_Vs_rad
 SPEED = ("position",)
 CURRENT = (*SPEED, "velocity")
 VOLTAGE = (*CURRENT, "current")

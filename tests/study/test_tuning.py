@@ -137,9 +137,10 @@ def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense
     kept = {f.path for f in problem.factors}
     assert (len(problem.toleranced), len(kept), "motor.resistance" in kept) == (11, 10, True)
     assert problem.all_corners.shape == (1025, 10)
-    refused(tune, integrator(), words="no requirement")
+    refused(tune, integrator(), words="--require")
     for wish, words in (
         ("bandwidth>30", "allowed"), ("tail.bandwidth>=3 Hz", "current, velocity, position"),
         ("position.colour>=3 Hz", "bandwidth"), ("position.bandwidth>=3 kg", "kg"),
+        ("position.bandwith>=3 Hz", 'known: "bandwidth"'), ("every.phase_margin>=40", "unit like deg"),
     ):  # fmt: skip
         refused(read_requirement, wish, design, words=words)

@@ -27,6 +27,7 @@ STEP, SINE = commands.step(0.02), commands.sine(0.01, 5.0)
         ({}, STEP, 0.4, "comes to rest"),
         ({"instruments": {"current_noise_A": 0.05}}, STEP, 0.3, "comes to rest"),  # noise is no limit cycle
         ({}, SINE, 0.5, "following"),
+        ({}, commands.ramp(1.75), 1.0, "following"),  # 100 deg/s, of which the motor gives 22.7
         # limits hold the growing oscillation: it neither dies out nor runs away
         ({"controller": LOUD.controller}, commands.step(0.05), 0.5, "limit cycle"),
         # the rotor stays, the current is at its limit
@@ -39,7 +40,8 @@ def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command,
     result = conduct(run)
     assert result.status == ends
     assert ("Hz" in result.detail) == (ends == "limit cycle")
-    assert result.detail == "" or ends not in ("comes to rest", "following")
+    assert (result.detail == "") is (ends == "comes to rest")
+    assert ("limited, of the time: speed 99" in result.detail) is (command.kind == "ramp")
     assert bool(result.later) == (duration_s == 0.02)  # 20 ms into a step that takes longer
     wanted = ends in ("comes to rest", "following")
     assert section(Motion(design, Asked(), run))["status"] == ("info" if wanted else "warn")
