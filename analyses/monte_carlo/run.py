@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
@@ -84,7 +86,7 @@ def _task(design: Design, settings: MonteCarloSettings) -> SampleTask:
 
 
 def monte_carlo(
-    design: Design,
+    design: Design | str | PathLike[str],
     folder: str | Path,
     settings: MonteCarloSettings | None = None,
     *,
@@ -113,7 +115,7 @@ def monte_carlo(
         If nothing has a tolerance, or the folder holds another study.
     """
     need("pyarrow", "tables", "a Monte Carlo study")
-    settings = settings or MonteCarloSettings()
+    design, settings = as_design(design), settings or MonteCarloSettings()
     task = _task(design, settings)
     sampler = task.sampler
     store = Store.open(Path(folder), task.identity(), settings.chunk)
