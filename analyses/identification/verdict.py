@@ -101,7 +101,11 @@ def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
 
 
 def sampling_items(record: Record) -> Iterator[Item]:
-    """Whether the current is sampled fast enough for its mean between the samples to be known."""
+    """Whether the current is sampled fast enough for its mean between the samples to be known, and when."""
+    if any(note.startswith("resampled") for note in record.notes):
+        told = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
+        label = f"{record.name}: times of the rows"
+        yield Item(id=f"times-{record.name}", label=label, passed=None, reason=told)
     x = record.signals.get("current", np.zeros(0))
     if len(x) < 3 or not np.any(x):
         return
