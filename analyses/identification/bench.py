@@ -96,8 +96,8 @@ def identify_bench(
     if settings.electrical:
         with because(findings):
             electrical = fit_electrical(start, used, recipe)
-            told = electrical_values(start, electrical)
-            start = design_with_fit(start, told, f"voltage equation of {names}")
+            of_motor = electrical_values(start, electrical)
+            start = design_with_fit(start, of_motor, f"voltage equation of {names}")
         judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
         findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     limit = settings.residual_limit / 100.0
