@@ -286,7 +286,8 @@ def multisine(
     """Sum of equal sines with random phases from ``seed``, scaled to the peak ``amplitude_rad``.
 
     Every frequency is moved to the next whole number of periods in ``duration_s``, so that the signal is
-    periodic in it; all are turned together so that it begins at zero, rising.
+    periodic in it; all are turned together so that it begins at zero, rising. It is sent once: after
+    ``duration_s`` the command is 0.
 
     Raises
     ------
@@ -389,7 +390,7 @@ def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "ser
     >>> on_its_clock([0.002, 0.003], [5.0, 7.0]).values(1e-3, 5).tolist()
     [0.0, 0.0, 5.0, 7.0, 7.0]
     """
-    times, array = _checked(time_s, values, where)
+    times, array = _checked(time_s, values, where, "value")
     _without_holes(times, where)
     if times[-1] < 0.0:
         raise InputError(f"its last row is at {times[-1]:g} s: must be 0 or later", where)
@@ -403,13 +404,15 @@ def _table(
     return Command(kind, at.TABLE, (), highest_hz, float(times[-1]), np.vstack([times, values]), held)
 
 
-def _checked(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str) -> tuple[Floats, Floats]:
+def _checked(
+    time_s: npt.ArrayLike, given: npt.ArrayLike, where: str, what: str = "angle"
+) -> tuple[Floats, Floats]:
     """Rising finite times and as many finite values."""
-    times, values = numbers_of("times", time_s), numbers_of("angles", angle_rad)
+    times, values = numbers_of("times", time_s), numbers_of(f"{what}s", given)
     if times.size != values.size or times.size < 2:
-        message = f"{times.size} times and {values.size} angles: equal numbers, at least 2, needed"
+        message = f"{times.size} times and {values.size} {what}s: equal numbers, at least 2, needed"
         raise InputError(message, where)
-    for name, array in (("time", times), ("angle", values)):
+    for name, array in (("time", times), (what, values)):
         bad = np.flatnonzero(~np.isfinite(array))
         if bad.size:
             raise InputError(f"{name} in row {bad[0] + 1} = {array[bad[0]]}: must be finite", where)

@@ -1,5 +1,6 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
+from math import isfinite
 from os import PathLike
 
 import numpy as np
@@ -23,6 +24,14 @@ NOTED_NAMES = {
     "coupling_torque": at.IO_COUPLING_TORQUE,
 }
 """What a tick notes of its start, by name; twist and coupling torque are those of an elastic drive."""
+
+
+def _all_finite(command: float, load_Nm: float, torque_Nm: float) -> bool:
+    """Whether each is a finite real number, asked in every tick: as cheaply as can be."""
+    try:
+        return isfinite(command) and isfinite(load_Nm) and isfinite(torque_Nm)
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
 class Drive:
@@ -83,9 +92,14 @@ class Drive:
 
         Raises
         ------
+        InputError
+            For a command, load or torque that is no finite number.
         NumericalError
             If the drive has failed: too many events in a tick, or a state without bound.
         """
+        if not _all_finite(command, load_Nm, torque_Nm):
+            for name, value in (("command", command), ("load_Nm", load_Nm), ("torque_Nm", torque_Nm)):
+                finite_number(name, value)
         self._io[at.IN_COMMAND] = command
         if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
             self._p[at.RARE_LOAD] = 1.0

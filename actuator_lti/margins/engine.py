@@ -1,11 +1,10 @@
 """`stability_margins`: one entry for every kind of loop."""
 
-import math
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.errors import InputError, NumericalError, finite_number
 from actuator_lti.margins.assemble import assembled
 from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
@@ -76,7 +75,8 @@ def stability_margins(
     >>> m.stable, round(m.gain_margin_db, 4), round(m.phase_margin_deg, 4), round(1e3 * m.delay_margin_s, 5)
     (True, 9.943, 61.3521, 10.70796)
     """
-    if not (math.isfinite(delay_s) and delay_s >= 0.0):
+    finite_number("delay_s", delay_s, "finite and not negative, in s")
+    if delay_s < 0.0:
         raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
     if band_rad_s is not None and not 0.0 <= band_rad_s[0] < band_rad_s[1]:
         raise InputError(f"band_rad_s = {band_rad_s}: two frequencies, 0 <= low < high, in rad/s")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
+from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
@@ -66,7 +68,7 @@ class CorrelationResult:
 
 
 def correlate_record(
-    design: Design,
+    design: Design | str | PathLike[str],
     record: Record,
     *,
     command: str | None = None,
@@ -95,7 +97,7 @@ def correlate_record(
         If the record holds no command, or nothing to compare.
     """
     record = prepared(record)
-    design = record.drive(design)
+    design = record.drive(as_design(design))
     notes = list(record.notes)
     findings = check_record(design, record)
     measured = measured_signals(design, record, True, notes)

@@ -3,9 +3,11 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
@@ -113,7 +115,10 @@ class FrictionEffects:
 
 
 def friction_effects(
-    design: Design, loops: Loops | None = None, *, settlings: Iterable[Settling] | None = None
+    design: Design | str | PathLike[str],
+    loops: Loops | None = None,
+    *,
+    settlings: Iterable[Settling] | None = None,
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 
@@ -130,6 +135,7 @@ def friction_effects(
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
+    design = as_design(design)
     control, own, integrator = design.controller, design.controller.own_law, ""
     if own is not None and own[1].integrates and own[0] != "current":
         integrator = "speed" if own[0] == "velocity" else own[0]

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from os import PathLike
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
@@ -64,7 +66,7 @@ class CampaignResult:
 
 def identify_campaign(
     imported: ImportedCampaign,
-    design: Design,
+    design: Design | str | PathLike[str],
     *,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,
@@ -86,6 +88,7 @@ def identify_campaign(
     InputError
         Without a torque constant, or with too few usable runs; the reasons of those set aside are told.
     """
+    design = as_design(design)
     constant = design.effective_motor.torque_constant_Nm_A
     if constant is None:
         told = "motor.torque_constant: the design has none, so currents cannot become torques"

@@ -5,12 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
+from actuator_lti.errors import whole_number
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
@@ -103,7 +106,7 @@ class AmplitudeMap:
 
 
 def amplitude_map(
-    design: Design,
+    design: Design | str | PathLike[str],
     loops: Loops,
     *,
     load_Nm: float = 0.0,
@@ -115,6 +118,9 @@ def amplitude_map(
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
     `MOST_TICKS`.
     """
+    design = as_design(design)
+    for count in counts:
+        whole_number("counts", count, 2)
     part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
     given, counts = counts, (max(int(part * counts[0]), 2), max(int(part * counts[1]), 2))
     frequencies = tones(design, loops, counts[1])

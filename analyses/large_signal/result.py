@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, log
+from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
@@ -146,29 +148,37 @@ class LargeSignals:
     bode: AmplitudeBode
     sawtooth: Sawtooth
 
+    def __str__(self) -> str:
+        rows, columns = len(self.map.amplitude_rad), len(self.map.frequency_hz)
+        return f"{self.design.name}: large signals, {rows} amplitudes x {columns} frequencies of the map"
+
     def plot_map(self, axes: Any = None) -> Axes:
         """Draw what acts at each amplitude and frequency; gives matplotlib's axes."""
         return self.map.plot_map(axes, linear_axis=self.design.axis == "linear")
 
 
 def large_signals(
-    design: Design, loops: Loops | None = None, *, counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES)
+    design: Design | str | PathLike[str],
+    loops: Loops | None = None,
+    *,
+    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 
     Parameters
     ----------
-    design : Design
+    design : Design, or its name or path
     loops : Loops, optional
         Sampled and sliding, of this design, if they are there already.
     counts : (int, int)
-        Amplitudes and frequencies of the map.
+        Amplitudes and frequencies of the map, at least 2 of each.
 
     Raises
     ------
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
+    design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops
     map_ = amplitude_map(design, loops, counts=counts)
     shift = limit_shift(design, loops) if rubs(design) else None

@@ -21,8 +21,10 @@ from analyses.margins.asked import Asked
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.specification.weakest import Spread, spread
 
+CURVE_POINTS = 600
 
-@dataclass(frozen=True, kw_only=True)
+
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Measured:
     """A measured response of a loop and the model's at the same frequencies: L, T or S as it was measured."""
 
@@ -37,11 +39,31 @@ class Measured:
     source: str  # where the radius comes from
     open_loop: MeasuredResponse  # the measured L: itself, T/(1 - T) or 1/S - 1
     open_model: np.ndarray
+    # The model's L on a grid of its own, from a tenth of the least frequency to the largest that it has
+    curve_hz: Floats
+    curve: np.ndarray
     # Of the measured open loop, each with its range; None where the points are too coarse, see ``note``
     margins: StabilityMargins | None
     note: str
     beyond: int  # points above half the sampling frequency, left out
     left_out: int  # rows of the file without numbers
+
+    def __repr__(self) -> str:
+        f, off = self.frequency_hz, np.abs(self.difference_db).max()
+        return (
+            f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
+            f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
+        )
+
+    @property
+    def nearer(self) -> tuple[str, float] | None:
+        """L, T or S of the model, where another one is less than half as far off, and how far in dB (rms)."""
+        L = self.open_model
+        models = {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
+        apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models.items()}
+        best = min(apart, key=lambda of: apart[of])
+        decibel = float(20.0 / np.log(10.0) * apart[best])
+        return (best, decibel) if apart[best] < 0.5 * apart[self.of] else None
 
     @property
     def difference_db(self) -> Floats:
@@ -100,6 +122,9 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     radius = np.multiply(size, opened.deviation, out=np.zeros(omega.size), where=size > 0.0)
     data = MeasuredResponse(omega, opened.response, radius, loop.period_s, found.source)
     L = np.asarray(loop.plain_open(points)).reshape(-1)
+    top = 10.0 * read.frequency_hz[-1] if loop.period_s is None else 0.5 / loop.period_s
+    grid = np.geomspace(0.1 * read.frequency_hz[0], top, CURVE_POINTS)
+    along = 2j * np.pi * grid if loop.period_s is None else np.exp(2j * np.pi * grid * loop.period_s)
     margins, note = None, ""
     try:
         margins = stability_margins(data)
@@ -109,6 +134,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         name=read.name, loop=name, of=of, frequency_hz=omega / (2.0 * np.pi), measured=values,
         model={"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[of], open_loop=data, open_model=L,
         radius=np.asarray(found.radius, dtype=np.float64), source=found.source,
+        curve_hz=grid, curve=np.asarray(loop.plain_open(along)).reshape(-1),
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,
     )  # fmt: skip
 

@@ -38,7 +38,11 @@ class Asked(OnMachines):
     operating_point: Annotated[str, POINT] = "sliding"
     at_least: Annotated[
         float | None,
-        Option("Probability that is enough, with 95 % confidence; else every sample must pass.", "P"),
+        Option(
+            "Probability that is enough, if its one-sided 95 % lower bound shows it; else every sample must "
+            "pass, and the worst case (with --no-worst: at least 59 samples, which show 95 %).",
+            "P",
+        ),
     ] = None
     worst: Annotated[bool, Option("Seek the worst case of each requirement.", flag="worst/--no-worst")] = True
     sample: Annotated[int | None, Option("Only print sample number K as a design file.", "K")] = None

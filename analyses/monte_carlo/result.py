@@ -19,11 +19,13 @@ import numpy as np
 from scipy.special import betaincinv
 
 from actuator_lti.asked.verdict import Tally, Verdict
+from actuator_lti.design.asked import Waiver
 from actuator_lti.errors import InputError
 from analyses.specification.requirements import RequirementVerdict, tally
 
 SHARES = (0.001, 0.01, 0.05, 0.25, 0.5, 0.75, 0.95, 0.99, 0.999)
 CONFIDENCE = 0.95
+PROVEN_SHARE = 0.95  # of the designs, that samples alone have to show where nothing else is asked
 MOST = 16_384  # bins: up to so many samples every value is kept
 SHOWN_BINS = 60
 _LAST_63 = np.int64(2**63 - 1)
@@ -67,17 +69,33 @@ def column_statistics(name: str, unit: str, sketch: Sketch) -> ColumnStatistics:
 
 
 def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
-    """Interval (95 %) of a probability from passes in independent trials; covers at least as it claims.
+    """Lower and upper bound of a probability from passes in independent trials, each with 95 % confidence.
 
-    For points of a scrambled Sobol sequence the share of passes scatters less than that of independent
-    trials, so the interval is on the safe side. Clopper and Pearson 1934.
+    Each alone holds at least as often as it claims. For points of a scrambled Sobol sequence the share of
+    passes scatters less than that of independent trials, so they are on the safe side. Clopper and Pearson
+    1934, one-sided.
+
+    Examples
+    --------
+    >>> round(clopper_pearson(300, 300)[0], 5)  # 0.05^(1/300)
+    0.99006
     """
     if not 0 <= passed <= count or count == 0:
         raise InputError(f"{passed} of {count}: passes must lie between 0 and the number of samples")
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low = 0.0 if passed == 0 else float(betaincinv(passed, count - passed + 1, tail))
-    high = 1.0 if passed == count else float(betaincinv(passed + 1, count - passed, 1.0 - tail))
+    low = 0.0 if passed == 0 else float(betaincinv(passed, count - passed + 1, 1.0 - CONFIDENCE))
+    high = 1.0 if passed == count else float(betaincinv(passed + 1, count - passed, CONFIDENCE))
     return low, high
+
+
+def samples_needed(probability: float) -> float:
+    """How many samples prove a probability if all pass: p^n <= 5 %; infinitely many for certainty.
+
+    Examples
+    --------
+    >>> samples_needed(0.95), samples_needed(0.99), samples_needed(1.0)
+    (59, 299, inf)
+    """
+    return inf if probability >= 1.0 else math.ceil(math.log(1.0 - CONFIDENCE) / math.log(probability))
 
 
 _NONE = np.empty(0, dtype=np.int64)
@@ -180,7 +198,8 @@ class Odds:
     unit: str
     passed: int
     count: int
-    # Share of passes with its 95 % interval (Clopper and Pearson; on the safe side for Sobol points)
+    # Share of passes, and its lower and upper bound, each with 95 % confidence (Clopper and Pearson; on the
+    # safe side for Sobol points)
     probability: float
     low: float
     high: float
@@ -192,6 +211,7 @@ class Odds:
     worst: float | None = None
     worst_sample: int | None = None  # its number
     columns: tuple[str, ...] = ()  # columns that the requirement looks at
+    waiver: Waiver | None = None  # which lets go that it is not proven
 
 
 @dataclass(frozen=True)
@@ -250,7 +270,7 @@ class MonteCarloResult:
     # Requirements that are not judged, not proven, as each takes a computation of one design
     left_out: tuple[RequirementVerdict, ...] = ()
     # Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample and
-    # the worst case have to
+    # the worst case have to (where none was sought, so many samples that they prove `PROVEN_SHARE`)
     at_least: float | None = None
     notes: tuple[str, ...] = ()
     # For each figure that a requirement looks at, every tolerance alone, the one that moves it most first
@@ -259,7 +279,8 @@ class MonteCarloResult:
     @property
     def tally(self) -> Tally:
         """The requirements counted."""
-        return Tally.of(self.judged(odds) for odds in self.odds if odds.id != "all") + tally(self.left_out)
+        each = [odds for odds in self.odds if odds.id != "all"]
+        return Tally.of(map(self.judged, each), [o.waiver is not None for o in each]) + tally(self.left_out)
 
     @property
     def verdict(self) -> Verdict:
@@ -270,17 +291,23 @@ class MonteCarloResult:
         """The worst case of a requirement, where one was sought."""
         return next((case for case in self.worst if case.requirement == odds.id), None)
 
+    @property
+    def enough(self) -> float:
+        """The probability that samples alone have to prove."""
+        return PROVEN_SHARE if self.at_least is None else self.at_least
+
     def judged(self, odds: Odds) -> Verdict:
         """Whether a requirement is met: in every sample and the worst case, or as often as is enough."""
-        if self.at_least is not None:
-            return Verdict.of(odds.low >= self.at_least)
         case = self.case(odds)
-        return Verdict.of(odds.passed == odds.count and (case is None or case.passed))
+        if self.at_least is None and (case is not None or odds.passed < odds.count):
+            return Verdict.of(odds.passed == odds.count and case is not None and case.passed)
+        proven, refuted = odds.low >= self.enough, odds.high < self.enough
+        return Verdict.of(proven if proven or refuted else None)
 
     def __str__(self) -> str:
         lines = [f"{self.design_name}: {self.samples} samples, seed {self.seed}"]
         lines += [
-            f"{o.id}: {100 * o.probability:.2f} % ({100 * o.low:.2f} to {100 * o.high:.2f})"
+            f"{o.id}: {100 * o.probability:.2f} % (at least {100 * o.low:.2f}, at most {100 * o.high:.2f})"
             for o in self.odds
         ]
         return "\n".join(lines)

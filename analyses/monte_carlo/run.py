@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
+from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
@@ -84,7 +86,7 @@ def _task(design: Design, settings: MonteCarloSettings) -> SampleTask:
 
 
 def monte_carlo(
-    design: Design,
+    design: Design | str | PathLike[str],
     folder: str | Path,
     settings: MonteCarloSettings | None = None,
     *,
@@ -113,7 +115,7 @@ def monte_carlo(
         If nothing has a tolerance, or the folder holds another study.
     """
     need("pyarrow", "tables", "a Monte Carlo study")
-    settings = settings or MonteCarloSettings()
+    design, settings = as_design(design), settings or MonteCarloSettings()
     task = _task(design, settings)
     sampler = task.sampler
     store = Store.open(Path(folder), task.identity(), settings.chunk)
@@ -132,6 +134,7 @@ def monte_carlo(
             r.id, judging.label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
             nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
             worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),
+            waiver=design.waiver_of(r.id),
         )
         for r, tally in tallies
     ]  # fmt: skip
@@ -215,8 +218,8 @@ def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
     normal = any(f.tolerance.kind != "uniform" for f in task.sampler.factors)
     correlated = not np.array_equal(task.sampler.correlation, np.eye(len(task.sampler.factors)))
     notes = {
-        "Scrambled Sobol points: intervals are those of independent samples (Clopper and Pearson, 95 %), "
-        "which is on the safe side.": True,
+        "Scrambled Sobol points: each bound is that of independent samples (Clopper and Pearson, one-sided, "
+        "95 % confidence), which is on the safe side.": True,
         "The tolerance box of a normal distribution ends at 3 standard deviations or its bounds.": normal,
         "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together.": correlated,
         f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"

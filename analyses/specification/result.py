@@ -2,9 +2,11 @@
 
 import math
 from dataclasses import dataclass
+from os import PathLike
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
@@ -90,7 +92,7 @@ class Specification:
     manoeuvres: tuple[Manoeuvre, ...]  # by load torque
 
 
-def specification(design: Design, loops: Loops | None = None) -> Specification:
+def specification(design: Design | str | PathLike[str], loops: Loops | None = None) -> Specification:
     """Work out and simulate the figures at each load torque of the design.
 
     Parameters
@@ -104,6 +106,7 @@ def specification(design: Design, loops: Loops | None = None) -> Specification:
     InputError, NumericalError
         As `assemble_loops` and `simulate`.
     """
+    design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops
     settling_s = linear_steady_state(loops, np.array([1.0])).settling_ticks * design.controller.period_s
     loads = design.validation.loads_Nm

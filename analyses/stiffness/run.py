@@ -6,12 +6,14 @@ It is put to the simulator: by its own derivative, and by a moment injected at t
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import ceil, sqrt
+from os import PathLike
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, LoadFriction, Motor
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.stiffness import (
@@ -225,7 +227,7 @@ REST_HZ = (2.0, 20.0)
 REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
 
 
-def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
+def stiffness(design: Design | str | PathLike[str], *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
     Parameters
@@ -239,6 +241,7 @@ def stiffness(design: Design, *, simulated: bool = True) -> Stiffness:
     InputError
         For a loop that is not stable.
     """
+    design = as_design(design)
     held = design.controller.position is not None
     checks = check_stiffness(design, CHECKED_HZ) if simulated and held else ()
     largest = design.load.moment_max_Nm if any(np.isfinite(one.foreseen_Nm_rad) for one in checks) else 0.0

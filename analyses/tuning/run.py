@@ -12,6 +12,7 @@ from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Progress
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
@@ -65,6 +66,8 @@ def tune(
         If there is no requirement on a loop, or an element has no place in the drive.
     """
     design, settings = as_design(design), settings or TuningSettings()
+    if not isinstance(settings, TuningSettings):
+        raise InputError(f"settings = {shown(settings)}: allowed: TuningSettings")
     wanted = loop_requirements(design, settings.requirements)
     allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
@@ -44,7 +45,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: Design,
+    design: Design | str | PathLike[str],
     settings: Settings | None = None,
     progress: Progress | None = None,
     *,

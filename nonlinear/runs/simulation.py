@@ -22,7 +22,7 @@ from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
-from nonlinear.runs.setup import STATE_PLACES, Run, Tables, put_supply, put_torque
+from nonlinear.runs.setup import STATE_PLACES, Run, Tables, check_command, put_supply, put_torque
 from nonlinear.runs.trajectory import STATUS, Energy, LimitUse, ProbeRecord, State, Status, Trajectory
 
 LOOK_S = 0.1  # between two looks at a run
@@ -123,6 +123,7 @@ def simulate(
     >>> run.time_s.size, bool(abs(run.output_angle_rad[-1] - 0.01) < 1e-3)
     (1000, True)
     """
+    check_command(command)
     design, tables = as_design(design), Tables()
     row = Run(
         design=design, command=command, duration_s=duration_s, load_Nm=load_Nm, bias=bias, probes=probes,

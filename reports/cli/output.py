@@ -31,8 +31,12 @@ def console() -> Console:
     """Give the console for people: colours on a terminal, plain text in a pipe (120 wide, or COLUMNS)."""
     from rich.console import Console
 
+    class Own(Console):
+        def on_broken_pipe(self) -> None:  # rich would leave with 1: a requirement that is not met
+            raise BrokenPipeError
+
     width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else 120
-    return Console(highlight=False, width=width, file=cast("TextIO", _Straight()))
+    return Own(highlight=False, width=width, file=cast("TextIO", _Straight()))
 
 
 class _Straight:

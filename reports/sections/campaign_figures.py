@@ -45,9 +45,11 @@ def residual_figure(fit: SurfaceFit) -> doc.Block:
     named = {o.run for o in fit.outliers}
     y, std = 1e6 * fit.own_residuals_Nm, 1e6 * fit.residual_stds_Nm
     for quantity, label in (("speed_rad_s", "motor speed, rad/s"), ("load_Nm", "load torque, N m")):
+        x = [getattr(point, quantity) for point in fit.points]
+        if max(x) <= 0.0:  # nothing over no load
+            continue
         panel = chart.panel(label, "residual, µN m")
         panel.rule_y(0.0)
-        x = [getattr(point, quantity) for point in fit.points]
         for at, middle, width in zip(x, y, std, strict=True):
             ends = [middle - 2.0 * width, middle + 2.0 * width]
             panel.curve([at, at], ends, colour=style.MUTED, width=0.9, read=False)

@@ -1,6 +1,6 @@
 """The identification of a campaign: coefficients, runs, residuals, contributions, what to measure next."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import groupby
 
 import numpy as np
@@ -78,14 +78,22 @@ def shared_table(fit: SurfaceFit) -> doc.Block:
 def law_table(laws: RicherLaws) -> doc.Block:
 
     def verdict(one: LawScore) -> str:
-        return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or "no"
+        no = "no, not determined by these runs" if hopeless(one) else "no"
+        return "–" if one.name == "plain" else "yes" if one.warranted else one.reason or no
+
+    def hopeless(one: LawScore) -> bool:
+        """More than a hundred times the plain law's squared error."""
+        return one.gain is not None and one.gain < -100.0
+
+    def gain(name: str) -> Callable[[LawScore], float | None]:
+        return lambda one: None if hopeless(one) else getattr(one, name)
 
     columns = [
         doc.of("name", "name", "Law"),
         doc.of("formula", "formula", "Terms"),
         doc.of("error_Nm", "error", "Error, unseen runs", "µN m", scale=1e6, format="sig:3"),
-        doc.of("gain", "gain", "Squared error less by", "%", scale=100.0, format="fix:1"),
-        doc.of("gain_std", "std", "± standard error", "%", scale=100.0, format="fix:1"),
+        doc.of(gain("gain"), "gain", "Squared error less by", "%", scale=100.0, format="fix:1"),
+        doc.of(gain("gain_std"), "std", "± standard error", "%", scale=100.0, format="fix:1"),
         doc.of(verdict, "verdict", "Warranted"),
     ]
     note = (

@@ -236,5 +236,6 @@ def _friction(part: RecordFit, unit: str, rate: str) -> style.Chart:
     order = np.argsort(part.speed)
     line = order[style.kept_rows([(part.friction - part.residual)[order]])]
     panel.points(part.speed[few], part.friction[few], "rows of the record", size=3.0, colour=style.BLUE)
-    panel.curve(part.speed[line], (part.friction - part.residual)[line], "model", colour=style.ORANGE)
+    model = (part.friction - part.residual)[line]  # no function of the speed alone: in points as well
+    panel.points(part.speed[line], model, "model", size=2.0, colour=style.ORANGE)
     return chart

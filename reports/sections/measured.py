@@ -18,9 +18,13 @@ def words(one: Measured) -> str:
     told += f"; rms {np.sqrt((db**2).mean()):.2f} dB, {np.sqrt((deg**2).mean()):.1f} deg"
     if one.radius.any():
         told += f"; at {one.within} of {db.size} points it lies within the spread ({one.source})"
+    like = ""
+    if one.nearer:
+        of, off = one.nearer
+        like = f" It is nearer to {of} of the model, {off:.2f} dB rms: was it measured of {one.loop}:{of}?"
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
     left = f" {one.left_out} rows without numbers are left out." if one.left_out else ""
-    return f"{one.name} over the {_place(one)}. {told}.{beyond}{left} {one.note}".strip()
+    return f"{one.name} over the {_place(one)}. {told}.{like}{beyond}{left} {one.note}".strip()
 
 
 WHAT = {"L": "open {}", "T": "closed {}", "S": "sensitivity of the {}"}
@@ -103,14 +107,14 @@ def decibels_and_degrees(
 
 
 def _nyquist(one: Measured) -> doc.Block:
-    chart, L, model = style.Chart(width=style.HALF, height=430.0), one.open_loop.frdata, one.open_model
+    chart, L, model = style.Chart(width=style.HALF, height=430.0), one.open_loop.frdata, one.curve
     panel = chart.panel("real part of L", "imaginary part of L", by_point=True)
     panel.equal = True
     near = [(z, r) for z, r in zip(L, one.open_loop.radius, strict=True) if abs(z + 1.0) < 4.0 and r > 0.0]
     if rings := [z + r * style.TURN[::3] for z, r in near]:
         panel.shape([(ring.real, ring.imag) for ring in rings], "spread", colour=style.BLUE, opacity=0.15)
     panel.points(L.real, L.imag, "measured", colour=style.BLUE, parameter=one.frequency_hz)
-    panel.curve(model.real, model.imag, "model", parameter=one.frequency_hz, **style.series(1))
+    panel.curve(model.real, model.imag, "model", parameter=one.curve_hz, **style.series(1))
     panel.points([-1.0], [0.0], marker="+", colour=style.INK, size=14.0, read=False)
     panel.x.limits(-3.0, 1.65)
     panel.y.limits(-2.0, 2.0)

@@ -1,14 +1,20 @@
 """Odds, distributions and worst cases of a Monte Carlo study, for the page."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, WorstCase
+from analyses.monte_carlo.result import (
+    ColumnStatistics,
+    Driver,
+    MonteCarloResult,
+    Odds,
+    samples_needed,
+)
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, or_none
@@ -16,16 +22,15 @@ from reports.sections.margins import finite
 from reports.sections.names import unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
+from reports.verdict_summary import why
 
 _SHOWN = (1, 5, 50, 95, 99)  # per cent
+_MET_WITHIN = ": met within the tolerances"
+NAMED = 3  # requirements that a note on the terminal names; of more it says how many
 
 
 def section(result: MonteCarloResult) -> doc.Section:
-    items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
-    for one in result.left_out:  # not sampled
-        words, waiver = f"{label(one)}: met within the tolerances", one.waiver.words if one.waiver else ""
-        id = f"tolerance/{one.id}"
-        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
+    items = _verdicts(result)
     blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
     blocks += [_odds_table(result), *_figures(result)] if result.odds else []
     blocks += [_driver_table(result)] if result.drivers else []
@@ -44,9 +49,20 @@ def section(result: MonteCarloResult) -> doc.Section:
 
 
 def brief(result: MonteCarloResult) -> Brief:
-    kept = ("label", "probability", "low", "nominal", "worst", "unit")
+    kept = ("label", "verdict", "probability", "low", "nominal", "worst", "unit")
     tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
-    return Brief(_result(result), tables, [*result.notes, f"samples and worst designs: {result.folder}"])
+    reasons: dict[str, list[str]] = {}
+    for one in _verdicts(result):
+        if one["verdict"] != Verdict.MET:
+            reasons.setdefault(why(one), []).append(one["label"].removesuffix(_MET_WITHIN))
+    notes = [f"{_some(names)}: {reason}" for reason, names in reasons.items()]
+    return Brief(
+        _result(result), tables, [*notes, *result.notes, f"samples and worst designs: {result.folder}"]
+    )
+
+
+def _some(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= NAMED else f"{len(names)} requirements"
 
 
 def text(result: MonteCarloResult | Design) -> str | None:
@@ -68,24 +84,53 @@ def _result(result: MonteCarloResult) -> str:
     return f"{words}."
 
 
+def _verdicts(result: MonteCarloResult) -> list[doc.VerdictItem]:
+    items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
+    for one in result.left_out:  # not sampled
+        words, waiver = f"{label(one)}{_MET_WITHIN}", one.waiver.words if one.waiver else ""
+        id = f"tolerance/{one.id}"
+        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
+    return items
+
+
 def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     wanted = 1.0 if result.at_least is None else result.at_least
-    passed, share = result.judged(odds) is Verdict.MET, odds.probability
-    reason = "" if passed else _why(odds, result.case(odds))
-    if result.at_least is not None:
-        share, reason = odds.low, f"{100 * odds.low:.3f} % with 95 % confidence"
+    share = odds.probability if result.at_least is None else odds.low
+    verdict = result.judged(odds)
     percent: dict[str, Any] = {"unit": "%", "value": 100.0 * odds.probability, "limit": 100.0 * wanted}
     percent |= {"distance": 100.0 * (share - wanted), "comparison": ">="}
-    words = f"{capital(odds.label)}: met within the tolerances"
-    return doc.verdict(f"tolerance/{odds.id}", words, passed=passed, reason=reason, **percent)
+    words = f"{capital(odds.label)}{_MET_WITHIN}"
+    made = doc.verdict(f"tolerance/{odds.id}", words, passed=None, reason=_why(result, odds), **percent)
+    waiver = odds.waiver.words if odds.waiver and verdict is Verdict.NOT_PROVEN else ""
+    return {**made, "verdict": verdict.value, "waiver": waiver}
 
 
-def _why(odds: Odds, case: WorstCase | None) -> str:
+def _why(result: MonteCarloResult, odds: Odds) -> str:
+    case, verdict = result.case(odds), result.judged(odds)
+    if verdict is Verdict.NOT_PROVEN:
+        return _unproven(odds, result.enough)
+    if result.at_least is not None:
+        met = verdict is Verdict.MET
+        bound = f"at least {100 * odds.low:.3f}" if met else f"at most {100 * odds.high:.3f}"
+        return f"{bound} % with 95 % confidence"
     if odds.passed < odds.count:
         return f"{odds.count - odds.passed} of {odds.count} samples fail, worst is number {odds.worst_sample}"
-    if case is None or case.value is None:
+    if case is None or verdict is Verdict.MET:
+        return ""
+    if case.value is None:
         return "every sample passes, but a loop is unstable in the worst case of the tolerance box"
     return f"every sample passes, but the worst case of the tolerance box fails: {case.value:.4g} {case.unit}"
+
+
+def _unproven(odds: Odds, enough: float) -> str:
+    """Say what the samples show, and how many would show enough."""
+    needed = samples_needed(enough)
+    most = "no number of samples" if math.isinf(needed) else f"at least {needed} samples, if all pass,"
+    most = "more samples" if odds.count >= needed else most
+    return (
+        f"{odds.passed} of {odds.count} samples show {100 * odds.low:.3f} % with 95 % confidence; "
+        f"{most} can show {100 * enough:g} %"
+    )
 
 
 def _odds_table(result: MonteCarloResult) -> doc.Block:
@@ -93,9 +138,10 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
     columns = [
         doc.of("label", "label", "Requirement"),
         doc.of(limit_words, "limit", "Limit"),
+        doc.of(lambda odds: "" if odds.id == "all" else result.judged(odds).value, "verdict", "Verdict"),
         doc.of("probability", "probability", "Probability met", **share, better=1),
-        doc.of("low", "low", "95 % lower bound", **share),
-        doc.of("high", "high", "95 % upper bound", **share),
+        doc.of("low", "low", "95\u00a0% lower bound", **share),
+        doc.of("high", "high", "95\u00a0% upper bound", **share),
         doc.of("nominal", "nominal", "Nominal", format="sig:4"),
         doc.of("worst", "sampled", "Worst sample", format="sig:4"),
         doc.of("worst_sample", "number", "No.", align="right"),

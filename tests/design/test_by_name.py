@@ -9,7 +9,22 @@ from scipy import signal
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
 from actuator_lti.design import design_hash, parameter_value, read_design_text
-from analyses import compare, load_campaign, open_record, sawtooth, tune
+from analyses import (
+    amplitude_map,
+    compare,
+    evaluate_requirements,
+    large_signals,
+    load_campaign,
+    open_record,
+    sawtooth,
+    survey_loops,
+    tune,
+    validate,
+)
+from analyses.friction_effects import friction_effects
+from analyses.monte_carlo import monte_carlo
+from analyses.specification import specification
+from analyses.stiffness import stiffness
 from nonlinear import Drive, State, commands, simulate
 from reports import report
 
@@ -37,7 +52,20 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
         assemble_loops("ilr33-ambre")
 
 
+@pytest.mark.parametrize("ask", [
+    evaluate_requirements, friction_effects, large_signals, sawtooth, specification, stiffness, survey_loops,
+    tune, validate, lambda name: monte_carlo(name, "nowhere"), lambda name: amplitude_map(name, None),
+])  # fmt: skip
+def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
+    with pytest.raises(InputError, match='nearest known: "ilr33-amber"'):
+        ask("ilr33-ambre")
+
+
 BAD = {
+    "delay": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0]), delay_s="1 ms"),
+    "counts of none": lambda: large_signals("ilr33-amber", counts=(0, 0)),
+    "counts in part": lambda: large_signals("ilr33-amber", counts=(5.5, 6)),
+    "settings": lambda: tune("ilr33-amber", 3),
     "load": lambda: load_design(3),
     "text": lambda: read_design_text(b"x"),
     "write": lambda: write_design(3),

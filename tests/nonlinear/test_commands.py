@@ -9,7 +9,7 @@ from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import State, commands, loads, simulate
+from nonlinear import Drive, State, commands, loads, simulate
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
@@ -75,6 +75,12 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: commands.ramp(1.0, 1.0, 0.5), "must be later"),
         (lambda: commands.multisine(1.0, [], 1.0, TS), "at least one frequency"),
         (lambda: commands.sampled([0.0, 1.0], [0.0]), "equal numbers"),
+        (lambda: loads.series([0.0, 1.0], ["a", "b"]), "values = .*must be numbers, in SI"),
+        (lambda: Drive("ilr33-amber").step(float("nan")), "command = nan: must be a finite number"),
+        (lambda: Drive("ilr33-amber").step(None), "command = None: must be a finite number"),
+        (lambda: Drive("ilr33-amber").step("x"), "command = 'x': must be a finite number"),
+        (lambda: Drive("ilr33-amber").step(0.0, np.inf), "load_Nm = inf: must be a finite number"),
+        (lambda: simulate("ilr33-amber", None, 0.1), "None: allowed: a Command"),
         (lambda: commands.sampled([0.0, 0.0], [0.0, 1.0]), "must be later than"),
         (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
         (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),

@@ -48,6 +48,22 @@ def test_gain_and_delay_are_what_lies_between(kind: str) -> None:
     assert kind != "L" or "within 0.42 dB" in words(one)
 
 
+def test_a_closed_loop_given_as_an_open_one_is_named_and_a_result_is_printed_short() -> None:
+    """The model of an own loop is exact: as T it is 0 dB off. The drawn model has points of its own."""
+    one = measured_over(LOOPS, bench("velocity", "T", 1.0), "velocity")
+    assert one.nearer == ("T", pytest.approx(0.0, abs=1e-9))
+    assert "was it measured of velocity:T?" in words(one)
+    right = measured_over(LOOPS, bench("velocity", "T", 1.05), "velocity:T")
+    assert right.nearer is None
+    assert "was it measured" not in words(right)
+    assert len(repr(right)) < 200
+    assert "T of velocity" in str(right)
+    at = LOOPS.velocity
+    exact = at.plain_open(np.exp(2j * np.pi * right.curve_hz * at.period_s)).reshape(-1)
+    np.testing.assert_allclose(right.curve, exact)
+    assert right.curve_hz[0] < HERTZ[0] < HERTZ[-1] < right.curve_hz[-1]
+
+
 def test_a_closed_loop_is_judged_as_it_was_measured() -> None:
     """Where T is near 1, a percent of it is many times L = T/(1 - T)."""
     model, n = bench("position", "T", 1.0), np.random.default_rng(3).normal(size=(2, HERTZ.size))

@@ -8,13 +8,15 @@ import pytest
 from toleranced import toleranced
 
 from actuator_lti import load_design, read_design_text
+from actuator_lti.design.asked import Waiver
 from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.judging import Reduction, reduced, unpacked
-from analyses.monte_carlo.result import MOST
+from analyses.monte_carlo.result import MOST, clopper_pearson
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
+from reports.sections.monte_carlo import brief, section
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +71,39 @@ def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(
     assert other.columns == searched.columns
     assert other.odds == searched.odds
     assert [w.parameters for w in other.worst] == [w.parameters for w in searched.worst]
+
+
+@pytest.mark.parametrize(("passed", "count", "at_least", "verdict", "says"), [
+    (300, 300, 0.99, "met", "at least 99.006 % with 95 % confidence"),  # 0.05^(1/300)
+    (298, 298, 0.99, "not proven", "at least 299 samples, if all pass, can show 99 %"),
+    (290, 300, 0.97, "not proven", "more samples can show 97 %"),
+    (300, 300, 1.0, "not proven", "no number of samples can show 100 %"),
+    (0, 300, 0.02, "not met", "at most 0.994 % with 95 % confidence"),  # 1 - 0.05^(1/300)
+    (58, 58, None, "not proven", "at least 59 samples, if all pass, can show 95 %"),  # 0.95^59 < 5 %
+    (59, 59, None, "met", ""),
+    (58, 59, None, "not met", "1 of 59 samples fail"),
+])  # fmt: skip
+def test_what_samples_alone_prove(passed, count, at_least, verdict, says, study):
+    bounds = clopper_pearson(passed, count)
+    odds = replace(study.odds[0], passed=passed, count=count, low=bounds[0], high=bounds[1])
+    result = replace(study, odds=(odds,), at_least=at_least)
+    (item,) = section(result)["blocks"][0]["items"]
+    assert (item["verdict"], result.verdict) == (verdict, verdict)
+    assert says in item["reason"]
+
+
+def test_what_samples_do_not_prove_can_be_waived(study):
+    waiver = Waiver(requirement=study.odds[0].id, reason="prototype", date="2026-01-31")
+    odds = replace(study.odds[0], passed=3, count=3, low=0.0, high=1.0, waiver=waiver)
+    assert replace(study, odds=(odds,)).tally.words("requirements") == "0 of 1 requirements met, 1 waived"
+
+
+def test_the_terminal_says_verdict_and_reason(study):
+    made = brief(study)
+    rows = {row["label"]: row["verdict"] for row in made.blocks[0]["rows"]}
+    assert rows["motor current, at 8 N m"] == "not met"
+    reason = next(note for note in made.notes if note.startswith("Motor current, at 8 N m: "))
+    assert "samples fail, worst is number" in reason
 
 
 def test_a_single_sample_is_replayed_by_its_number_and_another_study_does_not_mix_in(study, design):

@@ -155,18 +155,30 @@ def test_infinite_and_missing_figures_are_counted_apart():
     assert result.maximum == 89.0
 
 
-def test_the_interval_covers_at_least_as_claimed():
-    """The exact odds; and 400 studies of 128 Sobol points: P(x + y < 0.3) = 0.045 in the unit square."""
-    ends = [clopper_pearson(k, 200) for k in range(201)]
-    for probability in (0.003, 0.05, 0.5, 0.97):
-        covers = np.array([low <= probability <= high for low, high in ends])
-        assert 0.95 <= binom.pmf(np.arange(201), 200, probability)[covers].sum() <= 1.0
-    covered = 0
+@pytest.mark.parametrize("probability", [0.003, 0.05, 0.5, 0.97])
+def test_each_exact_bound_holds_at_least_as_claimed(probability):
+    low, high = np.array([clopper_pearson(k, 200) for k in range(201)]).T
+    for holds in (low <= probability, probability <= high):
+        assert 0.95 <= binom.pmf(np.arange(201), 200, probability)[holds].sum() <= 1.0
+
+
+@pytest.mark.parametrize(("passed", "count", "low", "high"), [
+    (300, 300, 0.05 ** (1 / 300), 1.0),
+    (0, 300, 0.0, 1.0 - 0.05 ** (1 / 300)),
+    (1, 2, 1.0 - 0.95**0.5, 0.95**0.5),  # 1 - (1 - p)^2 = 5 %; p^2 = 95 %
+])  # fmt: skip
+def test_bounds_are_one_sided(passed, count, low, high):
+    assert clopper_pearson(passed, count) == pytest.approx((low, high), rel=1e-12)
+
+
+def test_each_bound_holds_for_sobol_points_too():
+    """400 studies of 128 points of a known probability: P(x + y < 0.3) = 0.045 in the unit square."""
+    covered = np.zeros(2)
     for seed in range(400):
         points = Sampler((uniform("x", 0.5, 0.5), uniform("y", 0.5, 0.5)), np.eye(2), seed=seed).draw(0, 128)
         low, high = clopper_pearson(int((points.sum(axis=1) < 0.3).sum()), 128)
-        covered += low <= 0.045 <= high
-    assert covered >= 0.95 * 400
+        covered += low <= 0.045, high >= 0.045
+    assert covered.min() >= 0.95 * 400
 
 
 FIXED = ("control.period", "limits.continuous_current", "load.moment_max", "load.moment_slope", "every")
