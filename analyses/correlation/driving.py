@@ -153,6 +153,15 @@ def steps_of(values: Floats) -> BoolArray:
     return np.asarray(moves & ~around[:-2] & ~around[2:])
 
 
+def jump_share(design: Design, record: Record) -> float:
+    """Share of the command's change that is jumps, at times between two samples that none of them tells."""
+    driven = command_of(design, record)
+    change = np.zeros(1) if driven is None else np.diff(driven.values)
+    if driven is None or not np.any(change):
+        return 0.0
+    return float(np.linalg.norm(change[steps_of(driven.values)]) / np.linalg.norm(change))
+
+
 def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:
     """The recorded supply as `simulate` takes it; nothing without one, or for an ideal source.
 

@@ -87,7 +87,8 @@ def identify_bench(
     settings = Settings() if settings is None else settings
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
     names = ", ".join(record.name for record in records)
-    start, electrical = with_values(design, fixed_values(design, settings.fix)), None
+    start = plain = with_values(design, fixed_values(design, settings.fix))
+    electrical, told = None, f"voltage equation of {names}"
     both: Fit | None = None
     cutoff, decimation = settings.cutoff_hz, settings.decimation
     usual = cutoff is None and decimation is None
@@ -95,15 +96,17 @@ def identify_bench(
     findings = {record.name: check_record(start, record) for record in (*used, *unseen)}
     if settings.electrical:
         with because(findings):
-            electrical = fit_electrical(start, used, recipe)
-            told = electrical_values(start, electrical)
-            start = design_with_fit(start, told, f"voltage equation of {names}")
+            electrical = fit_electrical(plain, used, recipe)
+            start = design_with_fit(plain, electrical_values(plain, electrical), told)
         judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
         findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     limit = settings.residual_limit / 100.0
     held = _held(design, start, settings)
     with because(findings):
         right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
+    if electrical is not None and "inductance" in electrical.names:
+        electrical = fit_electrical(plain, used, recipe, right.late_s)
+        start = design_with_fit(plain, electrical_values(plain, electrical), told)
     used, model = right.records, right.model
     compared = design_values(design, model, used, start)  # at the constant that made the torques
     if electrical is None:
@@ -209,6 +212,7 @@ def _items(
     yield verdict.residual_item(model.relative_residual, limit)
     yield from verdict.offset_items(design, model)
     yield from verdict.kept_items(model, held, design.axis)
+    yield from verdict.lag_items(right.late_s, max(record.period_s for record in right.records))
     for record in right.records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():

@@ -8,6 +8,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
+from analyses.correlation.driving import jump_share
 from analyses.estimation.arrays import BoolArray, lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
@@ -54,10 +55,14 @@ class Followed:
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosed:
-    """The model of records that were put right, how they follow their commands, and what was found."""
+    """The model of records that were put right, how they follow their commands, and what was found.
+
+    ``late_s`` is how much a drive signal was late, or how closely that is told, whichever is more.
+    """
 
     model: JointModel
     records: tuple[Record, ...]
+    late_s: float
     followed: Mapping[str, Followed]
     findings: Mapping[str, tuple[Finding, ...]]
 
@@ -77,13 +82,16 @@ def diagnosed(
     used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
     model = fit(used)
     sure: dict[int, Lag] = {}
+    late = 0.0
     for k, (record, like) in enumerate(zip(used, model.simulated, strict=False)):
         own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
-            error = float(np.hypot(own.standard_error, other.standard_error))
+            between = record.period_s * jump_share(start, record) / np.sqrt(12.0)
+            error = float(np.linalg.norm([own.standard_error, other.standard_error, between]))
             lag = Lag(own.seconds - other.seconds, error)
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
             sure |= {k: lag} if lag.is_sure else {}
+            late = max(late, abs(lag.seconds), error)
     if sure:
         for k, lag in sure.items():
             used[k] = shifted(start, used[k], lag.seconds)
@@ -102,6 +110,7 @@ def diagnosed(
     return Diagnosed(
         model=model,
         records=tuple(used),
+        late_s=late,
         followed={name: one for name, one in seen.items() if one is not None},
         findings={name: tuple(each) for name, each in found.items()},
     )

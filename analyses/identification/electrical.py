@@ -29,13 +29,16 @@ class ElectricalFit(Fit):
     relative_residual: float
 
 
-def fit_electrical(design: Design, records: Sequence[Record], recipe: Recipe | None = None) -> ElectricalFit:
+def fit_electrical(
+    design: Design, records: Sequence[Record], recipe: Recipe | None = None, late_s: float = 0.0
+) -> ElectricalFit:
     """Fit the voltage equation to records of voltage, current and motion.
 
     All signals pass the same filter without phase, by default that of each record's period. The recorded
     voltage is the drive's own, which acts later by the design's computing delay and half a tick; what this
     shift does to the values is an error of theirs. The inductance is kept out where it is not five times its
-    standard error: a record sampled too slowly, or too calm, does not show it, and none is invented.
+    standard error: a record sampled too slowly, or too calm, does not show it, and none is invented. A
+    current that is late by ``late_s`` (a filter, another clock) makes R times that of it.
     """
     control = design.controller
     shifts = control.computing_delay_s + 0.5 * control.period_s, 0.0
@@ -44,10 +47,17 @@ def fit_electrical(design: Design, records: Sequence[Record], recipe: Recipe | N
     if "inductance" not in whole.names:
         return whole
     value, std = whole["inductance"], whole.std("inductance")
-    if value > SHOWN * std:
+    of_lag = whole["resistance"] * late_s
+    if value > SHOWN * np.hypot(std, of_lag):
         return whole
-    again = _fitted(late, early, tuple(name for name in whole.names if name != "inductance"))
+    rest = tuple(name for name in whole.names if name != "inductance")
     told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
+    if value > SHOWN * std:  # it takes up the lag, which leaves the others right
+        told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
+        fit = whole.renamed({name: name for name in rest})
+        again = replace(whole, names=rest, values=fit.values, covariance=fit.covariance)
+    else:
+        again = _fitted(late, early, rest)
     kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
     return replace(again, fixed={**again.fixed, "inductance": kept})
 

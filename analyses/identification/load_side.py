@@ -1,6 +1,7 @@
 """Motion and torque on either side of an elastic coupling, as far as a record and the design tell them."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import lsim
@@ -23,13 +24,14 @@ class TwoSides:
 
     ``motor`` is the motion at the motor shaft, ``load`` that at the coupling's own shaft. ``torque`` is what
     the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``. ``told`` says where the
-    load's motion comes from.
+    load's motion comes from, ``used`` which signal it takes.
     """
 
     motor: Motion
     load: Motion
     torque: Floats
     told: str
+    used: Mapping[str, str] = field(default_factory=dict)
 
 
 def two_sides(
@@ -54,10 +56,14 @@ def two_sides(
         told = "load's own motion, the motor's by the design's stiffness"
         return TwoSides(motor=motor, load=load, torque=torque, told=told)
     load, told = _follows(design, coupling, record, motion, moment), "load's motion by the design's coupling"
-    measured = _measured(design, record, load, moment, recipe)
+    measured, used = _measured(design, record, load, moment, recipe), {}
     if measured is not None:
-        load, told = measured, "load's motion of the output's encoder"
-    return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told)
+        load, told, used = (
+            measured,
+            "load's motion of the output's encoder",
+            {"output_angle": "load's motion"},
+        )
+    return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told, used=used)
 
 
 def _of_load(design: Design, load: Motion) -> Floats:

@@ -157,7 +157,7 @@ def record_rows(
         )  # what the load side takes but for its inertia at the motor's own pace
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
-        told = f"{told}, {sides.told}"
+        told, used = f"{told}, {sides.told}", {**sides.used, **used}
     names, columns = friction_columns(motion, form, knots_rad_s)
     others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
     pace, skip = np.abs(motion.velocity), recipe.skip_end_samples

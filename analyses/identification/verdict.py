@@ -92,8 +92,20 @@ def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterato
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
 
 
+def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
+    """A current that is, or may be, later than the motion by more than a sample."""
+    if late_s > period_s:
+        told = f"{1e3 * late_s:.2g} ms off, or not told closer: what is sure is taken back as a delay"
+        why = f"{told}, assumed no filter; inertia and friction hang on it"
+        yield Item(id="lag", label="Current and motion at one time", passed=None, reason=why)
+
+
 def sampling_items(record: Record) -> Iterator[Item]:
-    """Whether the current is sampled fast enough for its mean between the samples to be known."""
+    """Whether the current is sampled fast enough for its mean between the samples to be known, and when."""
+    if any(note.startswith("resampled") for note in record.notes):
+        told = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
+        label = f"{record.name}: times of the rows"
+        yield Item(id=f"times-{record.name}", label=label, passed=None, reason=told)
     x = record.signals.get("current", np.zeros(0))
     if len(x) < 3 or not np.any(x):
         return

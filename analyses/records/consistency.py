@@ -285,7 +285,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
     copied = int(np.count_nonzero((rows[:, 2] == 0.0) & (filled > 1.5)))
     if not places:
         return None
-    told = [f"{lost:.0f} rows are missing where the time goes on"] if lost else []
+    told = [f"{lost:.0f} rows are missing where the time goes on, or time stamps jitter"] if lost else []
     told += [f"{copied} rows repeat the one before"] if copied else []
     words = f"{' and '.join(told) or 'none is of two rows'}, of {places} places where the motion tells"
     words += ": take the record again, or give the times at which rows were taken" if told else ""

@@ -94,9 +94,9 @@ def _intro(result: BenchResult) -> str:
 def _parameters(model: JointModel, axis: str) -> doc.Block:
     """Values, their standard errors as published recipes give them, and as the record really tells."""
     white = dict(zip(model.names, model.white_errors.tolist(), strict=True))
-    more = [doc.of(white.get, "white", "Standard error if white", format="sig:4")]
+    more = [doc.of(white.get, "white", "Error if white", format="sig:3")]
     if model.bias:
-        more.append(doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:3"))
+        more.append(doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:2"))
     note = (
         "White residuals: ordinary least squares, as is usually published. Standard error: with the "
         "autocorrelation of the residuals, and the scatter between records where there are several; this one "

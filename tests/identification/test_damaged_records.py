@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Design
@@ -208,6 +209,47 @@ def test_a_voltage_tells_the_constant_a_drift_widens_and_a_load_not_recorded_is_
     result = identify_bench(DRIVE, [_record(loaded, BARE)])
     assert not result.passed
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
+
+
+def test_a_filtered_current_tells_no_inductance(columns: Columns) -> None:
+    """A filter of 2 ms in the current alone makes R times 2 ms of it, 18 times the motor's."""
+    a = np.exp(-0.5)
+    filtered = {**columns, "current": lfilter([1.0 - a], [1.0, -a], columns["current"])}
+    result = identify_bench(BASE, [_record(filtered, WHOLE)], settings=Settings(electrical=True))
+    assert "inductance" not in result.electrical.names
+    assert result.design.motor.inductance_H == BASE.motor.inductance_H
+    (item,) = (one for one in result.items if one.id == "lag")
+    assert item.passed is None
+
+
+SLOW = {
+    "motor.resistance": 0.66, "motor.inductance": 2.1e-4, "motor.torque_constant": 0.0257,
+    "motor.back_emf_constant": 0.0257, "motor.rotor_inertia": 6.8e-6, "limits.speed": 400.0,
+}  # fmt: skip
+
+
+def test_steps_of_the_voltage_between_the_samples_are_no_lag() -> None:
+    """A motor of L/R = 0.3 ms by Euler's rule at 20 kHz, sampled at 1 kHz: the intervals hold the truth."""
+    drive, step = with_values(BASE, SLOW, check=False), 5e-5
+    time = step * np.arange(60_000)
+    slow, fast = (np.sign(np.sin(2.0 * np.pi * f * time + 0.1)) for f in (0.837, 1.913))
+    u = 6.0 * slow + 3.0 * fast
+    inertia, dry, seen = drive.inertia_kgm2, drive.friction.dry_torque_Nm, np.zeros((len(time), 2))
+    i = w = angle = 0.0
+    for k, volt in enumerate(u.tolist()):
+        seen[k] = angle, i
+        i += step / 2.1e-4 * (volt - 0.66 * i - 0.0257 * w)
+        w += step / inertia * (0.0257 * i - drive.friction.viscous_Nms_rad * w)
+        w = max(abs(w) - step / inertia * dry, 0.0) * np.sign(w)
+        angle += step * w
+    angle, current = seen[::20].T
+    current = current + NOISE_A * np.random.default_rng(1).standard_normal(len(current))
+    record = record_of(time[::20], voltage_reference=u[::20], angle=angle, current=current)
+    result = identify_bench(drive, [record])
+    assert "taken back" not in _said(result)
+    model = result.model
+    assert abs(model["inertia"] - inertia) < 2.0 * model.std("inertia") < 0.1 * inertia
+    assert "jumps between the samples" in model.bias_told
 
 
 OFF = {"motor.torque_constant": 1.03 * 5.9e-3, "motor.back_emf_constant": 1.03 * 5.9e-3}
