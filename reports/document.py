@@ -42,7 +42,7 @@ from reports.document_schema import (
     VerdictItem,
     validate,
 )  # fmt: skip
-from reports.numbers import prose
+from reports.numbers import prose, show
 from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible
 
@@ -206,9 +206,15 @@ def remark(words: str) -> Block:
     return text(start + words[1:] + ("." if words[-1:].isalnum() else ""))
 
 
-def fact(label: str, value: Any, unit: str = "", *, better: int = 0) -> FactItem:
+def fact(label: str, value: Any, unit: str = "", *, format: str = "text", better: int = 0) -> FactItem:
     made: FactItem = {"label": label, "value": plain(value), "unit": unit}
+    made |= {"format": format} if format != "text" else {}
     return {**made, "better": better} if better else made
+
+
+def shown_fact(item: Mapping[str, Any]) -> str:
+    """Write the value of a fact."""
+    return show(item["value"], item.get("format", "text"))
 
 
 def facts(items: Iterable[FactItem]) -> Block:

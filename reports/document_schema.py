@@ -105,6 +105,7 @@ class FactItem(TypedDict):
     label: str
     value: Scalar
     unit: str
+    format: NotRequired[Format]
     better: NotRequired[int]
 
 

@@ -15,7 +15,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree
 from actuator_lti.start.extras import need
-from reports.document import column, figures, judged, section, table, walk
+from reports.document import column, figures, judged, section, shown_fact, table, walk
 from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
@@ -189,7 +189,7 @@ def _block(block: Mapping[str, Any], drawings: Mapping[int, str]) -> Tree:
     if kind == "figure":
         return _figure(block, drawings[id(block)])
     if kind == "facts":
-        values = [f"{clean(show(i['value']), 300)} {clean(i['unit'], 30)}".strip() for i in block["items"]]
+        values = [f"{clean(shown_fact(i), 300)} {clean(i['unit'], 30)}".strip() for i in block["items"]]
         labels = [clean(i["label"], 200) for i in block["items"]]
         return {"kind": kind, "items": [list(pair) for pair in zip(labels, values, strict=True)]}
     if kind == "verdicts":

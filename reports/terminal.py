@@ -89,7 +89,7 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     elif block["kind"] == "facts":
         facts = Table.grid(padding=(0, 2))
         for item in block["items"]:
-            facts.add_row(Text(item["label"]), Text(f"{show(item['value'])} {item['unit']}".rstrip()))
+            facts.add_row(Text(item["label"]), Text(f"{doc.shown_fact(item)} {item['unit']}".rstrip()))
         out.print(facts)
     elif block["kind"] == "text":
         out.print(Text(block["text"]))

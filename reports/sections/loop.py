@@ -45,12 +45,14 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
-    items = []
-    for of in AT_A_GLANCE:
-        value = _short(margins.shown(of, figures), of.at_a_glance)
-        items.append(doc.fact(of.label, value, of.shown[0], better=of.direction))
-    crossover = _short(margins.margin_row(figures)["crossover_hz"], "sig:3")
-    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz")])
+    items = [
+        doc.fact(
+            of.label, margins.shown(of, figures), of.shown[0], format=of.at_a_glance, better=of.direction
+        )
+        for of in AT_A_GLANCE
+    ]
+    crossover = margins.margin_row(figures)["crossover_hz"]
+    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz", format="sig:3")])
 
 
 def result(figures: LoopFigures) -> str:
@@ -67,14 +69,6 @@ def result(figures: LoopFigures) -> str:
     rotor = "Rotor free, " if figures.loop.name == "current" else ""
     verdict = f"{rotor}{figures.margins.verdict} ({figures.margins.evidence})"
     return to_minus(capital(f"{verdict}: {', '.join(words)}." if words else f"{verdict}."))
-
-
-def _short(value: float | None, format: str) -> float | None:
-    """Cut a figure to what a reader remembers; the tables hold every digit."""
-    if value is None:
-        return None
-    kind, _, places = format.partition(":")
-    return round(value, int(places)) if kind in ("fix", "gain") else float(f"{value:.{places}g}")
 
 
 def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
