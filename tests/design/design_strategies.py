@@ -42,7 +42,7 @@ _GROWN = [
     ("supply.regenerative", "supply.capacitance"),
 ]  # fmt: skip
 _LIMITS = {"gain_margin": "6.5 dB", "bandwidth": "90 rpm", "delay_margin": "3 ms", "overshoot": "12 %",
-           "modulus_margin": 0.4, "motor_current": "400 mA"}  # fmt: skip
+           "modulus_margin": 0.4, "motor_current": "0.4 A dc"}  # fmt: skip
 
 
 @st.composite

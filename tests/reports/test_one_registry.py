@@ -30,7 +30,8 @@ def test_the_first_screen_and_the_loop_show_what_the_registry_says(monkeypatch) 
     (cell,) = glance["loops"][-1]["figures"]
     assert (cell["label"], cell["value"], cell["format"]) == ("New figure", value, "fix:3")
     facts = loop.section("position", DESIGN, figures["position"])["blocks"][0]["items"]
-    assert facts[0] == {"label": "New figure", "value": round(value, 3), "unit": "", "better": 1}
+    shown = {"label": "New figure", "value": value, "unit": "", "format": "fix:3", "better": 1}
+    assert facts[0] == shown
 
 
 def test_the_live_page_knows_no_figure_by_itself(monkeypatch) -> None:

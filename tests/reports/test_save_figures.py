@@ -96,6 +96,6 @@ def test_a_double_click_selects_no_text(page: Page) -> None:
     chart = page.locator("#answer .chart").first
     chart.scroll_into_view_if_needed()
     box = chart.bounding_box()
-    page.mouse.dblclick(box["x"] + box["width"] / 2, box["y"] + 30)
+    page.mouse.dblclick(box["x"] + box["width"] / 2, box["y"] + 60)
     assert page.evaluate("getSelection().toString()") == ""
     assert "moved" in (chart.get_attribute("class") or "")
