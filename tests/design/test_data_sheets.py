@@ -1,7 +1,6 @@
 """Drives written as their data sheets have them."""
 
 from math import pi, sqrt
-from pathlib import Path
 
 import pytest
 

@@ -7,7 +7,7 @@ import pytest
 from programs import needs_compiler
 
 import actuator_lti.compiled.compiler as build_module
-import analyses.linear.code_check as code_check
+import reports.exports as exports
 from actuator_lti import load_design
 from actuator_lti.compiled.library import Library
 from analyses.linear.code_check import CodeCheck, check_code
@@ -83,7 +83,7 @@ def test_exports_say_what_was_measured(tmp_path, monkeypatch, cli) -> None:
     assert "| Position loop | phase margin | deg |" in words
     cli.text("export", "c", name, "--no-check", "--out", tmp_path / "d")
     assert "Not measured at this export" in (tmp_path / "d/README.md").read_text()
-    monkeypatch.setattr(code_check, "check_code", lambda _: CodeCheck(reason="said here"))
+    monkeypatch.setattr(exports, "check_code", lambda _: CodeCheck(reason="said here"))
     cli.text("export", "fmu", name, "--platform", "linux64", "--out", unit)
     with zipfile.ZipFile(unit) as archive:
         assert b"Not measured: said here" in archive.read("documentation/compiled_code.md")

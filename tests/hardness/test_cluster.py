@@ -46,8 +46,8 @@ def pages(port: int) -> list[str]:
     """What a browser is given that does not speak TLS."""
     given = []
     for path in ("/", "/status", "/info/main/workers.html", "/metrics", "/json/identity.json", "/health"):
-        with contextlib.suppress(OSError, http.client.HTTPException):
-            link = http.client.HTTPConnection("127.0.0.1", port, timeout=5)
+        door = contextlib.closing(http.client.HTTPConnection("127.0.0.1", port, timeout=5))
+        with contextlib.suppress(OSError, http.client.HTTPException), door as link:
             link.request("GET", path)
             status = link.getresponse().status
             given += [f"{path}: {status}"] if status != 404 else []
