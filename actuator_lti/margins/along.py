@@ -45,9 +45,10 @@ class Along:
         parts = zip(*(part.in_w for part in self._parts), strict=True)
         gain_w, self.real_w, self._rising = map(np.concatenate, parts)
         self.gain_w, self.gain_L = polished(self.loop, gain_w, gain=True)
-        for k in np.flatnonzero(np.abs(self.factors.log_value(self.real_w)[0]) > FAR_LOG):
-            self.real_w[k] = self.factors.onto_axis(float(self.real_w[k]))
         log_gain = self.factors.log_value(self.real_w)[0]
+        for k in np.flatnonzero(np.abs(log_gain) > FAR_LOG):
+            self.real_w[k] = self.factors.onto_axis(float(self.real_w[k]))
+            log_gain[k] = self.factors.log_at(float(self.real_w[k]))[0]
         self.real_L = -np.exp(log_gain).astype(complex)
         near = np.abs(log_gain) <= FAR_LOG + SAME
         self.real_w[near], self.real_L[near] = polished(self.loop, self.real_w[near], gain=False)
