@@ -279,19 +279,15 @@ def _limited(run: Trajectory) -> str:
     return f"limited, of the time: {', '.join(acted)}" if acted else ""
 
 
-def summary(run: Trajectory, full_deflection_rad: float = 0.0) -> Tree:
-    """What happened, in numbers, SI; full deflection as in `conduct`."""
+def summary(run: Trajectory, ended: Conduct) -> Tree:
+    """What happened, in numbers, SI, and what it ended in."""
     limits = {
         name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
         for name, u in run.limits.items()
     }
     angle = "m" if run.axis == "linear" else "rad"
     si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
-    ended = conduct(run, full_deflection_rad)
-    followed = run.stage in (
-        "velocity",
-        "current",
-    )  # an angle is the output; a voltage has none
+    followed = run.stage in ("velocity", "current")  # an angle is the output; a voltage has none
     out = {
         "design": run.design_name,
         "status": ended.status,

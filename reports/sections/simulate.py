@@ -10,7 +10,7 @@ from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
 from analyses.motion.run import Motion
-from analyses.motion.settling import summary
+from analyses.motion.settling import Conduct, summary
 from nonlinear import Trajectory
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
@@ -25,14 +25,13 @@ LONGEST_GAP_S = 0.002  # spans of an active limit closer than this fraction of t
 def section(result: Motion) -> doc.Section:
     run, ended = result.run, result.ended
     figure = doc.figure("trajectory", chart_of(run), caption="The motion over time.", alt="The motion.")
-    blocks = [figure, _table(run), _limits(run), *([_energy(run)] if run.energy else [])]
+    blocks = [figure, _table(run, ended), _limits(run), *([_energy(run)] if run.energy else [])]
     words = f"{run.time_s.size} rows, status {ended.status}" + f" ({ended.said})" * bool(ended.said)
     return doc.section("simulate", "Motion", blocks, result=words, status="info" if ended.wanted else "warn")
 
 
 def data(result: Motion) -> Tree:
-    full = result.design.validation.full_deflection_rad
-    return {**summary(result.run, full), "files": result.asked.files}
+    return {**summary(result.run, result.ended), "files": result.asked.files}
 
 
 def write(result: Motion, folder: Path | None) -> list[str]:
@@ -42,11 +41,11 @@ def write(result: Motion, folder: Path | None) -> list[str]:
     return result.asked.files
 
 
-def _table(run: Trajectory) -> doc.Block:
+def _table(run: Trajectory, ended: Conduct) -> doc.Block:
     """Largest and last values: outputs in the unit of the command line, motor speeds in rpm as well."""
     unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
     rows: list[doc.Row] = []
-    for name, value in summary(run).items():
+    for name, value in summary(run, ended).items():
         if name.startswith(("largest_command", "largest_error", "final_response")):
             rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
         elif isinstance(value, float):
