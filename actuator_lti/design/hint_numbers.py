@@ -22,8 +22,8 @@ _AT_MOTOR = re.compile(
     r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise"
 )
 _TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?)\s*")
-_BARE = re.compile(r"\s*[0-9.]+\s*\Z")
-ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
+BARE = re.compile(r"\s*[0-9.]+\s*\Z")
+_ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
 _COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
 
 
@@ -40,7 +40,7 @@ def with_numbers(
 
     ``takes`` tells whether a key reads a text as it stands.
     """
-    if path == "motor" and ROOT_OF_WATTS.search(f"{_plain(table[key])}"):
+    if path == "motor" and _ROOT_OF_WATTS.search(f"{_plain(table[key])}"):
         return _motor_constant(_plain(table[key]), tree, frame)
     if word.startswith("counts_per_rev") and ", which takes" not in word:
         return word + _lines(_plain(table[key]), word, takes) + _over_step(_plain(table[key]), path, frame)
@@ -77,7 +77,7 @@ def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str
         linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
         over = _over_step(text, field.section, frame)
         return over.replace("here", f"a {'metre' * linear or 'revolution'} over it is")
-    if field.path == "motor.torque_constant" and ROOT_OF_WATTS.search(f"{text}"):
+    if field.path == "motor.torque_constant" and _ROOT_OF_WATTS.search(f"{text}"):
         return f"; it is {_motor_constant(text, tree, frame)}"
     if (ticks_said := _TICKS.fullmatch(f"{text}")) and (
         period_s := _period_s(_of(tree, "control", "period"))
@@ -124,7 +124,7 @@ def _lines(value: Any, word: str, takes: Callable[[str, str], bool]) -> str:
     number = re.match(r"\s*[0-9]+", f"{value}")
     if "some makers" not in word or number is None:
         return ""
-    if isinstance(value, str) and not _BARE.match(value) and takes("encoder.counts_per_rev", value):
+    if isinstance(value, str) and not BARE.match(value) and takes("encoder.counts_per_rev", value):
         return f", which takes {shown(value)} too"
     n = int(number[0])
     return f': "{n} lines" ({4 * n} counts) or "{n} counts"'
@@ -134,7 +134,7 @@ def _motor_constant(text: str, tree: Tree, frame: Frame) -> str:
     """Km in N m/sqrt(W): losses of one winding (dc), or of three with R line-line or of a phase."""
     factor = 1.0 if frame.constants == "dc" else 1.5
     linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
-    Km = _si(ROOT_OF_WATTS.sub("", text), "N" if linear else "N*m")
+    Km = _si(_ROOT_OF_WATTS.sub("", text), "N" if linear else "N*m")
     kM = Km * (factor * _si(_of(tree, "motor", "resistance"), "ohm")) ** 0.5
     here = f": {kM:.4g} {'N/A' if linear else 'N*m/A'}" if kM > 0.0 else ""
     return f"the motor constant Km: torque_constant is Km sqrt({'' if factor == 1.0 else '1.5 '}R){here}"

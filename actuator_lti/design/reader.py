@@ -18,7 +18,7 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS, fields_in
-from actuator_lti.design.hint_numbers import hint_of, ticks_of, with_numbers
+from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
@@ -47,7 +47,6 @@ _NAME = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9 _/:+()-]{0,62}[A-Za-z0-9_+)-])?\Z"
 _ENTRY = ("value", "source", "grade", "tolerance")
 _BANDWIDTH = re.compile(r"[Hh](?:z|ertz)\b|\brad")  # a speed in rpm is none
 _FORMULA = re.compile(r"= [^,;]*")  # integral_time = gain/integral gain
-_BARE = re.compile(r"\s*[0-9.]+\s*\Z")
 _OF_COUNTS = ("a number without a unit", 'counts, as 4096, "1024 lines" or "12 bit"')
 _VERY_NEAR = 0.85  # of a misspelled key whose value is checked
 _ASIDE = re.compile(r", (?:which takes|in|with) ")  # what a hint says beside the one key that it names
@@ -328,7 +327,7 @@ class Reader:
             return self.refuse(path, raw, "allowed: a whole number")
         if not field.accepts(value):
             unit = field.unit(self.structure)
-            share = unit == "1" and field.high == 1.0 and 2.0 <= value <= 100.0 and _BARE.match(f"{raw}")
+            share = unit == "1" and field.high == 1.0 and 2.0 <= value <= 100.0 and BARE.match(f"{raw}")
             percent = f'; or is it "{value:g} %"' if share else ""
             return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}")
         return int(value) if field.kind == "integer" else value

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import InputError
+from actuator_lti.systems.plain_system import period_of
 from actuator_lti.types import Real
 
 _MOST_SAMPLES = 100
@@ -91,7 +92,7 @@ def given_of(system: Any) -> Given:
         raise InputError(
             f"a loop has one input and one output; this has {system.ninputs} and {system.noutputs}"
         )
-    period_s = float(system.dt) if system.dt else None  # dt=True: 1 s
+    period_s = period_of(system)
     if hasattr(system, "num"):
         num, den = _trimmed(system.num[0][0]), _trimmed(system.den[0][0])
         if not den.size:

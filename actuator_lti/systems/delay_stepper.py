@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 from numpy.polynomial.legendre import Legendre, legvander
-from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.resolvent import balanced
+from actuator_lti.types import Floats, Mask
 
-Real = NDArray[np.float64]
 _STAGES = 7
 _RADAU = (Legendre.basis(_STAGES) - Legendre.basis(_STAGES - 1)).roots()
 NODES = np.concatenate(([-1.0], _RADAU[:-1], [1.0]))  # of a piece, from -1 to 1
@@ -56,7 +55,7 @@ class DelayStepper:
     [0.0, 0.0, 0.5, 2.0]
     """
 
-    def __init__(self, system: Any, start_s: float, state: Real, u: Real) -> None:
+    def __init__(self, system: Any, start_s: float, state: Floats, u: Floats) -> None:
         if not len(system.delays_s):
             raise InputError("a system without delays: take to_state_space()")
         self.start_s, self._delays = start_s, system.delays_s
@@ -69,9 +68,9 @@ class DelayStepper:
         self._jumps = self._passed_on()
         self._t, self._state, self._h = 0.0, state.copy(), self._shortest  # times from the start on
         self._last, self._u, self._slope = 0.0, u.copy(), np.zeros_like(u)
-        self._due: list[tuple[float, int, int, Real]] = []  # (time, number, delay, its jumps)
+        self._due: list[tuple[float, int, int, Floats]] = []  # (time, number, delay, its jumps)
         self._number = count()
-        self._next: tuple[float, Real] | None = None
+        self._next: tuple[float, Floats] | None = None
         self._same = _SAME * self._shortest
         self._near = 1.5 * self._same
         self._driven = np.zeros(self._jumps.shape[1])  # what jumps at the start: state and input
@@ -83,7 +82,7 @@ class DelayStepper:
         self._series = np.zeros((1024, NODES.size, len(self._C)))
         self._largest = np.zeros(len(self._C))
 
-    def at(self, t: float, u: Real) -> tuple[Real, Real]:
+    def at(self, t: float, u: Floats) -> tuple[Floats, Floats]:
         """State and output at an instant not before the last one, the input straight since then."""
         t -= self.start_s
         if t > self._last:
@@ -93,7 +92,7 @@ class DelayStepper:
         z = self._delayed(np.array([t]), np.array([t + self._near]))[0]
         return self._state, (self._C @ self._state + self._D @ np.concatenate([z, u]))[len(self._delays) :]
 
-    def pieces(self) -> tuple[Real, Real, Real]:
+    def pieces(self) -> tuple[Floats, Floats, Floats]:
         """When the pieces so far begin, their lengths, and the outputs as power series of the part of each.
 
         Highest power first, shape (pieces, 8, p).
@@ -101,7 +100,7 @@ class DelayStepper:
         some = slice(1, self._count)
         return self._begins[some], self._lengths[some], _OF_PART @ self._series[some, :, len(self._delays) :]
 
-    def _turned(self, slope: Real) -> None:
+    def _turned(self, slope: Floats) -> None:
         """The jumps that begin where the input's slope changes, at the start those of both too."""
         m, driven = len(slope), self._driven.copy()
         driven[len(self._state) :].reshape(_ORDERS, -1)[1, -m:] = (slope - self._slope) * self._unit
@@ -132,10 +131,10 @@ class DelayStepper:
                 self._next = t, jumps
         return limit if self._next is None else min(limit, self._next[0])
 
-    def _matters(self, jumps: Real) -> NDArray[np.bool_]:
+    def _matters(self, jumps: Floats) -> Mask:
         return _SIZES @ np.abs(jumps) > _SMALL * self._largest
 
-    def _pass_on(self, t: float, jumps: Real) -> None:
+    def _pass_on(self, t: float, jumps: Floats) -> None:
         for k in np.flatnonzero(self._matters(jumps)[: len(self._delays)]):
             heappush(self._due, (t + self._delays[k], next(self._number), int(k), jumps[:, k]))
 
@@ -155,7 +154,7 @@ class DelayStepper:
         self._h = max(longer * h, self._h if h == whole else 0.0)
         self._t, self._state, self._largest = self._t + h if h < whole else until, states[-1], largest
 
-    def _collocated(self, h: float) -> tuple[Real, Real]:
+    def _collocated(self, h: float) -> tuple[Floats, Floats]:
         """States, and v and y, at the nodes of a piece of length h."""
         times = self._t + 0.5 * h * (NODES + 1.0)
         near = min(self._near, 0.5 * h)
@@ -167,7 +166,7 @@ class DelayStepper:
         states = np.vstack([self._state, inner.real])
         return states, states @ self._C.T + driven @ self._D.T
 
-    def _delayed(self, times: Real, inside: Real) -> Real:
+    def _delayed(self, times: Floats, inside: Floats) -> Floats:
         """What the delays give at some times, each continued from the piece of a time inside of its own."""
         begins = self._begins[: self._count]
         piece = np.searchsorted(begins, inside[:, None] - self._delays, side="right") - 1
@@ -175,7 +174,7 @@ class DelayStepper:
         series = self._series[piece, :, np.arange(len(self._delays))]
         return (series * np.clip(part, -1.0, 1.0)[..., None] ** _POWERS).sum(axis=-1)
 
-    def _keep(self, h: float, series: Real) -> None:
+    def _keep(self, h: float, series: Floats) -> None:
         k = self._count
         if k > MOST_PIECES:
             raise InputError(
@@ -188,7 +187,7 @@ class DelayStepper:
                 setattr(self, name, np.concatenate([kept, np.zeros_like(kept)]))
         self._begins[k], self._lengths[k], self._series[k], self._count = self._t, h, series, k + 1
 
-    def _passed_on(self) -> Real:
+    def _passed_on(self) -> Floats:
         """The jumps of v and y, all orders, from those of x and, all orders, of z and u.
 
         Those of order p in units of p!/unit^p.

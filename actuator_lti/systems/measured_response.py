@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
+from actuator_lti.systems.plain_system import period_of
 from actuator_lti.types import Complex, Real
 
 CONFIDENCE = 0.99
@@ -200,7 +201,7 @@ def at_once(radius: Real) -> Real:
 def _read(data: Any) -> tuple[Real, Complex, float | None]:
     if data.ninputs != 1 or data.noutputs != 1:
         raise InputError(f"a loop has one input and one output; this has {data.ninputs} and {data.noutputs}")
-    dt = float(data.dt) if data.dt else None
+    dt = period_of(data)
     omega, L = np.asarray(data.omega, dtype=float), np.asarray(data.frdata, dtype=complex).reshape(-1)
     if dt is not None and (omega > math.pi / dt * (1.0 + 1e-9)).any():
         raise InputError(

@@ -199,6 +199,11 @@ def descriptor(system: Any, s: np.ndarray) -> np.ndarray:
     return M
 
 
+def period_of(system: Any) -> float | None:
+    """Sampling period, s; 1 where it is not stated (``True``), ``None`` where continuous."""
+    return float(system.dt) if system.dt else None
+
+
 def response(system: Any, points: np.ndarray) -> np.ndarray:
     """Response at complex s, shape (outputs, inputs, points); inf + nan j at a pole."""
     E = np.exp(-points[:, None] * system.delays_s)

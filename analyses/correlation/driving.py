@@ -14,8 +14,7 @@ from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray
+from actuator_lti.types import Floats, Mask
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
@@ -140,7 +139,7 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_of(values: Floats) -> BoolArray:
+def steps_of(values: Floats) -> Mask:
     """For each interval between two samples, whether the values jump there from standstill to standstill.
 
     Examples

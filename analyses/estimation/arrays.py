@@ -1,13 +1,11 @@
-"""Arrays of one kind of number, as all analyses of records type them, and rows that are marked in them."""
+"""Rows that are marked in the arrays of a record."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int64]
+from actuator_lti.types import Mask
 
 
-def stretches(marked: BoolArray) -> list[tuple[int, int]]:
+def stretches(marked: Mask) -> list[tuple[int, int]]:
     """Where marked rows follow each other: the first, and the one after the last.
 
     Examples
@@ -19,12 +17,12 @@ def stretches(marked: BoolArray) -> list[tuple[int, int]]:
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def longest(marked: BoolArray) -> tuple[int, int]:
+def longest(marked: Mask) -> tuple[int, int]:
     """The longest such stretch, the first of equal ones; an empty one where nothing is marked."""
     return max(stretches(marked), key=lambda one: one[1] - one[0], default=(0, 0))
 
 
-def lasting(marked: BoolArray, least: int) -> BoolArray:
+def lasting(marked: Mask, least: int) -> Mask:
     """Marked rows, but for those of stretches shorter than ``least``."""
     out = np.zeros(len(marked), dtype=bool)
     for start, stop in stretches(marked):

@@ -10,6 +10,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
+from analyses.estimation.least_squares import scaled_lstsq
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
 from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
@@ -138,10 +139,9 @@ def _constant_shares(fit: SurfaceFit) -> Floats:
     rows = np.array([[1.0, p.speed_rad_s, p.load_Nm] for p in fit.points]) / fit.residual_stds_Nm[:, None]
     torque = np.array([p.torque_Nm for p in fit.points]) / fit.residual_stds_Nm
     told, held = list(fit.told), [k for k in range(len(NAMES)) if k not in fit.told]
-    both = np.column_stack([torque, torque - rows[:, held] @ fit.values[held]])
-    change, value = np.linalg.lstsq(rows[:, told], both, rcond=None)[0].T
+    own = torque - rows[:, held] @ fit.values[held]
     shares = np.zeros(len(NAMES))
-    shares[told] = change / value
+    shares[told] = scaled_lstsq(rows[:, told], torque) / scaled_lstsq(rows[:, told], own)
     return shares
 
 

@@ -7,9 +7,9 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Mask
 from analyses.correlation.driving import jump_share
-from analyses.estimation.arrays import BoolArray, lasting
+from analyses.estimation.arrays import lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
@@ -166,7 +166,7 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], Floats]:
     return [Finding(subject="drift along the record", passed=None, text=text)] if told else [], moved
 
 
-def flat_tops(values: Floats) -> BoolArray:
+def flat_tops(values: Floats) -> Mask:
     """Where a signal stands at its largest or smallest value for three samples or more.
 
     Examples

@@ -13,8 +13,7 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.fit import Fit
 from analyses.records.differentiation import Motion, filtered_motion
 from analyses.records.record import Record
@@ -101,7 +100,7 @@ class Rows:
     speed: Floats = field(repr=False)
     acceleration: Floats = field(repr=False)
     step_s: float = field(repr=False)
-    keep: BoolArray = field(repr=False)
+    keep: Mask = field(repr=False)
     recipe: Recipe = field(repr=False)
 
     @property
@@ -114,11 +113,11 @@ class Rows:
         """Rows that were left out."""
         return int(np.count_nonzero(~self.keep))
 
-    def shared(self, other: Rows) -> BoolArray:
+    def shared(self, other: Rows) -> Mask:
         """Which rows both use, as far as the shorter of them goes."""
         return np.asarray(self.keep[: len(other.keep)] & other.keep[: len(self.keep)])
 
-    def at(self, rows: BoolArray, values: Floats) -> Floats:
+    def at(self, rows: Mask, values: Floats) -> Floats:
         """Of values at the rows used those at some of them."""
         return values[np.flatnonzero(rows[self.keep[: len(rows)]])]
 
@@ -144,7 +143,7 @@ class RecordFit(Rows):
     own_residual: Floats = field(repr=False)
     friction: Floats = field(repr=False)
     noise: Floats = field(repr=False)
-    compared: BoolArray = field(repr=False)
+    compared: Mask = field(repr=False)
 
     @property
     def relative_residual(self) -> float:

@@ -18,7 +18,7 @@ from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
-from analyses.estimation.least_squares import told_apart
+from analyses.estimation.least_squares import scaled_lstsq, told_apart
 from analyses.estimation.parameters import parameter
 from analyses.identification.asked import Of
 from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
@@ -154,8 +154,7 @@ def _given(start: Design, fit: ResponseFit, parts: Callable[[Design], Floats]) -
     found = with_values(start, dict(zip(fit.names, fit.values.tolist(), strict=True)), check=False)
     key = parameter(name).key
     more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
-    size = np.linalg.norm(fit.slopes, axis=0)
-    moved = np.linalg.lstsq(fit.slopes / size, parts(more) - parts(found), rcond=None)[0] / size
+    moved = scaled_lstsq(fit.slopes, parts(more) - parts(found))
     return kept_constant(start, name, fit, moved / fit.values / STEP)
 
 

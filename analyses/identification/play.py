@@ -8,8 +8,7 @@ from scipy.ndimage import binary_erosion
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.estimation.parameters import own_std
 from analyses.identification.two_mass import TwoMass
@@ -113,7 +112,7 @@ def _play_with(design: Design, record: Record, fit: TwoMass, values: Mapping[str
     )
 
 
-def _coarse(steps: tuple[float, float], touching: BoolArray, smooth_samples: float) -> float:
+def _coarse(steps: tuple[float, float], touching: Mask, smooth_samples: float) -> float:
     """Error from resolutions: uniform, averaged over the independent rows of one cycle (two contacts)."""
     visits = max(int(np.count_nonzero(np.diff(touching.astype(np.int8)) == 1)), 2)
     independent = np.count_nonzero(touching) / (0.5 * visits) / max(smooth_samples, 1.0)
@@ -130,7 +129,7 @@ def _resolution(values: Floats) -> float:
     return step if np.mean(np.abs(shares - np.round(shares)) < 0.01) > 0.95 else 0.0
 
 
-def _in_contact(torque_Nm: Floats, twist: Floats, half: float, guard_samples: int) -> BoolArray:
+def _in_contact(torque_Nm: Floats, twist: Floats, half: float, guard_samples: int) -> Mask:
     """Rows beyond the gap on the side that the torque, well away from zero, pushes to."""
     side = np.sign(torque_Nm)
     pushed = np.abs(torque_Nm) > CONTACT * float(np.quantile(np.abs(torque_Nm), 0.95))

@@ -7,8 +7,7 @@ import numpy as np
 from scipy.signal import lfilter
 from scipy.stats import norm
 
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import IntArray
+from actuator_lti.types import Floats, Ints
 from analyses.identification.joint_model import JointModel, RecordFit
 
 LEVEL = 0.01
@@ -29,7 +28,7 @@ class ResidualTest:
     record: str
     name: str
     input: str
-    lags: IntArray = field(repr=False)
+    lags: Ints = field(repr=False)
     correlation: Floats = field(repr=False)
     bound: float
 

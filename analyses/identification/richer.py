@@ -5,8 +5,7 @@ from math import nan
 
 import numpy as np
 
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray
+from actuator_lti.types import Floats, Mask
 from analyses.identification.shared_errors import with_shared
 from analyses.identification.surface import SurfaceFit
 
@@ -89,7 +88,7 @@ def compare_laws(fit: SurfaceFit) -> RicherLaws:
     return RicherLaws(scores=tuple(scores), best=best, folds=int(fold.max()) + 1)
 
 
-def _predicted(rows: Floats, shared: Floats, torque: Floats, seen: BoolArray) -> tuple[Floats, float]:
+def _predicted(rows: Floats, shared: Floats, torque: Floats, seen: Mask) -> tuple[Floats, float]:
     """Weighted errors of a law (shared errors along) at unseen runs, and what is left at those it saw."""
     rows = rows / np.maximum(np.linalg.norm(rows[seen], axis=0), 1e-300)
     a = with_shared(rows[seen], shared[seen])

@@ -9,8 +9,8 @@ from scipy.ndimage import minimum_filter1d
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray, lasting
+from actuator_lti.types import Floats, Mask
+from analyses.estimation.arrays import lasting
 from analyses.identification.joint_model import (
     FrictionForm,
     JointModel,
@@ -233,7 +233,7 @@ def rows_under(design: Design, record: Record, model: JointModel) -> Rows:
     return made(moment=model["gravity_sin"] * rows.sine + model["gravity_cos"] * rows.cosine)
 
 
-def _at_rest(velocity: Floats, period_s: float) -> BoolArray:
+def _at_rest(velocity: Floats, period_s: float) -> Mask:
     """Stretches of 30 ms or more below 0.5 % of the largest speed: the friction is not that of sliding."""
     slow = np.abs(velocity) < REST_SHARE * float(np.max(np.abs(velocity), initial=0.0))
     return lasting(slow, max(round(REST_TIME_S / period_s), 6))

@@ -17,6 +17,7 @@ from actuator_lti.systems.measured_response import MeasuredResponse
 from actuator_lti.types import Floats
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
+from analyses.linear.responses import response_at
 from analyses.margins.asked import Asked
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.specification.weakest import Spread, spread
@@ -58,9 +59,8 @@ class Measured:
     @property
     def nearer(self) -> tuple[str, float] | None:
         """L, T or S of the model, where another one is less than half as far off, and how far in dB (rms)."""
-        L = self.open_model
-        models = {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
-        apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models.items()}
+        models = _closed(self.open_model).items()
+        apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models}
         best = min(apart, key=lambda of: apart[of])
         decibel = float(20.0 / np.log(10.0) * apart[best])
         return (best, decibel) if apart[best] < 0.5 * apart[self.of] else None
@@ -124,7 +124,6 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     L = np.asarray(loop.plain_open(points)).reshape(-1)
     top = 10.0 * read.frequency_hz[-1] if loop.period_s is None else 0.5 / loop.period_s
     grid = np.geomspace(0.1 * read.frequency_hz[0], top, CURVE_POINTS)
-    along = 2j * np.pi * grid if loop.period_s is None else np.exp(2j * np.pi * grid * loop.period_s)
     margins, note = None, ""
     try:
         margins = stability_margins(data)
@@ -132,11 +131,16 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         note = error.message
     return Measured(
         name=read.name, loop=name, of=of, frequency_hz=omega / (2.0 * np.pi), measured=values,
-        model={"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}[of], open_loop=data, open_model=L,
+        model=_closed(L)[of], open_loop=data, open_model=L,
         radius=np.asarray(found.radius, dtype=np.float64), source=found.source,
-        curve_hz=grid, curve=np.asarray(loop.plain_open(along)).reshape(-1),
+        curve_hz=grid, curve=response_at(loop.plain_open, 2.0 * np.pi * grid),
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,
     )  # fmt: skip
+
+
+def _closed(L: np.ndarray) -> dict[str, np.ndarray]:
+    """What may be measured of a loop, of its open loop: that, T and S."""
+    return {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
 
 
 def _with_spread(

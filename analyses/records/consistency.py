@@ -9,8 +9,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
@@ -109,7 +108,7 @@ def _smooth(record: Record, values: Floats) -> Floats:
     return np.asarray(sosfiltfilt(butter(2, share, output="sos"), values, padtype="even"))
 
 
-def _moving(*signals: Floats) -> BoolArray:
+def _moving(*signals: Floats) -> Mask:
     """Where one of some signals is not small: in a long rest there is nothing but noise."""
     return np.any([np.abs(values) > IN_MOTION * np.max(np.abs(values)) for values in signals], axis=0)
 
@@ -141,7 +140,7 @@ class RateRatio:
     low: float
     high: float
     rate: Floats
-    moves: BoolArray
+    moves: Mask
 
     @property
     def doubt(self) -> float:
@@ -292,7 +291,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
     return Finding(f"steps of the {place[0]} from row to row", not told, words)
 
 
-def _other(record: Record, name: str, rate: Floats, moves: BoolArray) -> str:
+def _other(record: Record, name: str, rate: Floats, moves: Mask) -> str:
     """The signal that is more like the rate, if there is one: two columns are swapped."""
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):

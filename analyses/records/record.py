@@ -13,8 +13,8 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray, longest
+from actuator_lti.types import Floats, Mask
+from analyses.estimation.arrays import longest
 
 RESAMPLE_TOLERANCE = 0.05
 """Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
@@ -85,7 +85,7 @@ class Record:
     notes: tuple[str, ...] = ()
     inputs: tuple[InputColumn, ...] = ()
     resample_tolerance: float = RESAMPLE_TOLERANCE
-    left_out: BoolArray | None = field(default=None, repr=False)
+    left_out: Mask | None = field(default=None, repr=False)
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     def drive(self, design: Design) -> Design:

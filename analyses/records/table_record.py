@@ -9,8 +9,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
-from actuator_lti.types import Floats
-from analyses.estimation.arrays import BoolArray, IntArray
+from actuator_lti.types import Floats, Ints, Mask
 from analyses.records.inputs import inputs_of
 from analyses.records.record import Record, RowCounts, check_error, line_error
 from analyses.records.spec import RecordSpec, to_si, unit_factor
@@ -51,7 +50,7 @@ class Block:
     """Numbers of the wanted columns, shape (n, columns), NaN where missing, and the file line of each row."""
 
     values: Floats
-    lines: IntArray
+    lines: Ints
 
 
 class SiRows:
@@ -99,7 +98,7 @@ class SiRows:
             raise InputError("a value is missing", where=f"{self._origin}:{block.lines[missing.argmax()]}")
         return self._kept(block, ~missing, LACKING)
 
-    def _kept(self, block: Block, keep: BoolArray, reason: str) -> Block:
+    def _kept(self, block: Block, keep: Mask, reason: str) -> Block:
         if keep.all():
             return block
         self._counts.drop(reason, f"line {block.lines[keep.argmin()]}", int(np.count_nonzero(~keep)))
@@ -116,7 +115,7 @@ class SiRows:
         self._last_raw = float(raw[-1])
         return np.asarray(unwrapped)
 
-    def _increases(self, time: Floats, block: Block) -> BoolArray:
+    def _increases(self, time: Floats, block: Block) -> Mask:
         reached = np.maximum.accumulate(np.concatenate([[self._last_time], time]))
         self._last_time = float(reached[-1])
         keep = np.asarray(time > reached[:-1])
