@@ -7,6 +7,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable
 from functools import partial
+from itertools import count
 
 import control
 import numpy as np
@@ -19,6 +20,7 @@ ORDERS = (2, 5, 10, 25)
 PERIOD_S = 1e-3
 LARGER = ((25, 0.030), (50, 0.100), (100, 0.400))  # order, seconds allowed
 CERTIFIED_S = 0.050
+GAINS = count(1.0, 2.0**-10)
 
 
 def rows(quick: bool = False) -> Iterable[Row]:
@@ -37,8 +39,7 @@ def rows(quick: bool = False) -> Iterable[Row]:
             yield _row(f"order {order}, state space, continuous", loops, stability_margins, allowed_s)
         for kind in ("continuous", "sampled"):
             loops = [_loop(seed, ORDER, kind == "sampled") for seed in seeds]
-            certified = partial(stability_margins, certify=True)
-            yield _row(f"order {ORDER}, state space, {kind}, certified", loops, certified, CERTIFIED_S)
+            yield _row(f"order {ORDER}, state space, {kind}, certified", loops, _certified, CERTIFIED_S)
 
 
 def _beside(order: int, form: str, kind: str, seeds: range, repeats: int, target: float = 1.3) -> Row:
@@ -56,6 +57,11 @@ def _beside(order: int, form: str, kind: str, seeds: range, repeats: int, target
         target=target,
         note=f"{1e3 * ours:.2f} ms against {1e3 * theirs:.2f} ms",
     )
+
+
+def _certified(loop: control.StateSpace) -> object:
+    """Of a gain that no call had before: what was certified once is kept."""
+    return stability_margins(next(GAINS) * loop, certify=True)
 
 
 def _row(name: str, loops: list[control.StateSpace], margins: Callable[..., object], allowed_s: float) -> Row:

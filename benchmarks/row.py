@@ -23,4 +23,4 @@ class Row:
         """Whether the target is met; ``None`` for a figure without one."""
         if self.target is None:
             return None
-        return self.measured <= self.target if self.comparison == "<=" else self.measured >= self.target
+        return bool(self.measured <= self.target if self.comparison == "<=" else self.measured >= self.target)
