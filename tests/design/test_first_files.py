@@ -145,6 +145,13 @@ def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
 
 
+def test_kv_of_a_motor_stated_per_phase_is_line_line() -> None:
+    """kM = 8.27/KV in N m per ampere of a phase (ODrive's documentation): kE and kM are one constant."""
+    text = motor("peak-phase", torque_constant=f"{8.27 / 82} N*m/A", back_emf_constant="82 KV")
+    same = read_design_text(text).effective_motor
+    assert same.back_emf_constant_Vs_rad == pytest.approx(same.torque_constant_Nm_A, rel=1e-4)
+
+
 # 44 oz-in/A rms is 0.31071 N m/A rms; over sqrt(3) it is kE in V rms line-line
 KE = 44 * 0.0070615518 / 3**0.5
 

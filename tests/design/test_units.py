@@ -309,6 +309,13 @@ def test_energy_is_the_same_in_both_units() -> None:
     assert tolerance.half_width == pytest.approx(1e-5 / p**2, rel=1e-14)
 
 
+def test_behind_a_screw_a_speed_constant_is_that_of_the_rotary_motor() -> None:
+    """p = 10 mm/2 pi: kE of the axis is kE of the motor over p."""
+    design = read_design_text(TEXT.replace('"0.2 V*s/rad"', '"48 rpm/V"'))
+    kE = 60.0 / (2 * pi * 48)
+    assert design.motor.back_emf_constant_Vs_rad == pytest.approx(kE / (10e-3 / (2 * pi)), rel=1e-12)
+
+
 def test_a_lead_may_be_per_revolution_and_a_wrong_one_is_one_mistake() -> None:
     lead = 'lead = "10 mm"'
     per_turn = read_design_text(TEXT.replace(lead, 'lead = "10 mm/rev"'))
