@@ -129,15 +129,13 @@ def test_designs_can_be_sent_to_workers_and_kept_in_caches() -> None:
 
 
 def test_tolerances_are_listed_in_the_order_of_the_file() -> None:
-    listed = tolerances(AMBER)
-    assert [path for path, _, _ in listed] == [
-        "gear.planetary.input_inertia",
-        "gear.planetary.output_inertia",
-        "gear.worm.input_inertia",
-        "load.inertia",
+    listed = [(path, nominal, width.half_width / nominal) for path, nominal, width in tolerances(AMBER)]
+    assert listed == [
+        ("gear.planetary.input_inertia", 1e-7, pytest.approx(0.5)),
+        ("gear.planetary.output_inertia", 5e-7, pytest.approx(0.5)),
+        ("gear.worm.input_inertia", 5e-7, pytest.approx(0.5)),
+        ("load.inertia", 2e-4, pytest.approx(0.5)),
     ]
-    assert [nominal for _, nominal, _ in listed] == [1e-7, 5e-7, 5e-7, 2e-4]
-    assert [width.half_width / nominal for _, nominal, width in listed] == pytest.approx([0.5] * 4)
 
 
 @pytest.mark.parametrize(
