@@ -187,9 +187,7 @@ def test_the_headers_say_which_design_and_source_and_name_the_flags(single: bool
     """Texts of C and of Python have the same octal signs."""
     design = replace(load_design("emps"), name='a "b" 1.5')
     texts = c_export(design, single_precision=single)
-    said = re.findall(
-        r'^#define DRIVE_(?:DESIGN_NAME|\w+_HASH) (".*?")(?: /\*|$)', texts["drive_design.h"], re.M
-    )
+    said = re.findall(r'^#define DRIVE_(?:DESIGN_NAME|\w+_HASH) ("[^"]*")', texts["drive_design.h"], re.M)
     assert list(map(literal_eval, said)) == [design.name, design_hash(design), source_hash()]
     flags = dict(re.findall(r"DRIVE_FLAG_(\w+) = (\d+)", texts["drive.h"]))
     assert [int(flags[name]) for name in ("VOLTAGE", "AT_REST")] == [at.FLAG_VOLTAGE, at.FLAG_STICK]
