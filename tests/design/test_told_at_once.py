@@ -182,7 +182,8 @@ rotor = "free"
 WRONG = {
     "quantity": (3, "phase_margin"), "loop": (4, "every, position"), "rotor": (5, "current loop only"),
     "minimum": (6, "deg"), "colour": (7, "unknown key"), "[2].id": (9, "allowed: a text"),
-    "[2].loop": (11, "every, position"), "[2].maximum": (12, "at least 0 %"), "[2].to": (13, "position loop only"),
+    "[2].loop": (11, "every, position"), "[2].maximum": (12, "at least 0 %"),
+    "[2].to": (13, "position loop only"),
     "[3].id": (14, "missing"), "[3].minimum": (17, "at most maximum = 20 ms"),
     "[3].rotor": (19, "current loop only"),
 }  # fmt: skip
