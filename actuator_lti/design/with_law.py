@@ -99,7 +99,7 @@ def with_settings(
     design: Design, stage: str, system: Any, inputs: Any, settings: Mapping[str, Any]
 ) -> Design:
     """As `with_law`; a setting that it does not take is refused with those that it does."""
-    known = tuple(with_law.__kwdefaults__)
+    known = tuple(with_law.__kwdefaults__ or ())
     for name, value in settings.items():
         if name not in known:
             allowed = f"unknown{nearest(name, known)}; allowed: {', '.join(known)}"
