@@ -1,18 +1,18 @@
 """Step response of a system with inner delays: walked along the first of them, then by its poles."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import flint
 import numpy as np
+from flint import acb_mat
 from scipy.interpolate import BarycentricInterpolator
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
 from actuator_lti.margins.loop import balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion, Spans, Undecided
+from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion
+from actuator_lti.step.search import Pieces
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import MOST_PIECES, DelayStepper
 from actuator_lti.systems.plain_system import response
@@ -23,35 +23,12 @@ _MEET = 1e-7
 _POINTS = 32
 _ZERO = 1e-12  # of the largest response about the poles
 _FORGOTTEN = 25.0  # time constants
-_CIRCLE, _AROUND = 0.25, 32  # radius, of the way to what lies next, and points on it
+_RADIUS = 0.25  # of the circle about a pole, of the way to what lies next
+_TURN = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
 
 
-class Stepped:
-    """The first part of the response, over each piece a power series of the part of it."""
-
-    sampled, tie = False, 0.0
-
-    def __init__(self, begins: Real, lengths: Real, series: Real) -> None:
-        self._begins, self._lengths, self._series = begins, lengths, series
-
-    def spans(self, undecided: Undecided, of: Callable[[Real], Real]) -> Spans:
-        """See `actuator_lti.step.motion.Motion.spans`."""
-        a, h, series = self._begins, self._lengths, self._series
-        left, right = of(series[:, -1]), of(series.sum(axis=1))
-        most = left + np.abs(series[:, :-1]).sum(axis=1)
-        keep = undecided(a, a + h, left, right, most)
-        return list(zip(a[keep], h[keep], series[keep], strict=True))
-
-    def curve(self, end: float, count: int) -> tuple[Real, Real]:
-        """Times up to ``end``, and e there."""
-        time = np.linspace(0.0, end, count)
-        k = np.searchsorted(self._begins, time, side="right") - 1
-        powers = np.vander((time - self._begins[k]) / self._lengths[k], self._series.shape[1])
-        return time, (powers * self._series[k]).sum(axis=1)
-
-
-def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
-    """Unit step response of a system with inner delays over its final value, and that value.
+def delayed_response(system: Any) -> tuple[Motion, float, Pieces]:
+    """How the unit step response of a system with inner delays ends, its final value, and how it begins.
 
     The first delays are walked along; after them the response is the free motion of the exact poles, which
     the collocation of the delays starts and integrals of T about them sharpen. The two have to agree
@@ -66,10 +43,10 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
     around = 1j * np.abs(poles.values[np.abs(poles.values) > 0.0])
     if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
         raise InputError(NO_FINAL)
-    head = _FIRST * float(form.delays_s.max())
+    head, u = _FIRST * float(form.delays_s.max()), np.ones(1)
     if head > MOST_PIECES * float(form.delays_s.min()):
         raise InputError("the step response lasts too many delays to be stepped")
-    walk, u = DelayStepper(system, 0.0, np.zeros(form.states), np.ones(1)), np.ones(1)
+    walk = DelayStepper(system, 0.0, np.zeros(form.states), u)
     while True:
         walk.at(head, u)
         begins, lengths, series = walk.pieces()
@@ -79,10 +56,9 @@ def delayed_response(system: Any) -> tuple[Stepped, Motion, float]:
         late = begins > 0.75 * head
         modes = (np.exp(np.outer(begins[late], exact)) @ weights).real / final
         if np.abs(modes - series[late, -1]).max() <= _MEET:
-            n = exact.size
-            A = flint.acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
-            state = weights * np.exp(exact * head) / final
-            return Stepped(begins, lengths, series), Motion(A, np.ones(n), state, False, head), final
+            n, state = exact.size, weights * np.exp(exact * head) / final
+            A = acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
+            return Motion(A, np.ones(n), state, False, head), final, (begins, lengths, series)
         head *= 2.0
 
 
@@ -105,25 +81,19 @@ def collocated(form: DelayForm, points: int) -> Real:
 
 
 def _modes(system: Any, poles: Complex, start: float) -> tuple[Complex, Complex]:
-    """Poles still alive after ``start`` (s), and their weights: residues of T/s.
+    """Poles still alive after ``start`` (s), of the upper half plane, and the weights of each or its pair.
 
     Both from the exact T on a circle about each estimate that holds no other: the mean of T z is the residue,
-    that of T z^2 over it how far the pole lies off. Only those of the upper half plane; where they are not
-    real, a weight counts for the pair.
+    that of T z^2 over it how far the pole lies off. The weight is the residue of T/s.
     """
-    alive = (poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)
-    turn = np.exp(2j * np.pi * (np.arange(_AROUND) + 0.5) / _AROUND)
-    found: list[tuple[complex, complex]] = []
-    for k in np.flatnonzero(alive):
-        pole = complex(poles[k])
-        z = _CIRCLE * min(abs(pole), float(np.abs(np.delete(poles, k) - pole).min(initial=np.inf))) * turn
-        weighted = response(system, pole + z)[0, 0] * z
-        residue = complex(weighted.mean())
-        if abs(residue) <= _ZERO * float(np.abs(weighted).max()):
-            continue  # T has no pole there
-        off = complex((weighted * z).mean()) / residue
-        if pole.imag == 0.0:
-            off, residue = complex(off.real), complex(residue.real)
-        found.append((pole + off, residue / (pole + off) * (1.0 if pole.imag == 0.0 else 2.0)))
-    exact, weights = np.array(found, dtype=complex).reshape(-1, 2).T
-    return exact, weights
+    near = poles[(poles.real > -_FORGOTTEN / start) & (poles.imag >= 0.0) & (poles.real < 0.0)]
+    apart = np.abs(near[:, None] - np.append(poles, 0.0))
+    apart[apart == 0.0] = np.inf
+    z = _RADIUS * apart.min(axis=1)[:, None] * _TURN
+    weighted = response(system, (near[:, None] + z).ravel())[0, 0].reshape(z.shape) * z
+    residue = weighted.mean(axis=1)
+    shown = np.abs(residue) > _ZERO * np.abs(weighted).max(axis=1)  # T has a pole there
+    near, residue, off = near[shown], residue[shown], (weighted * z)[shown].mean(axis=1) / residue[shown]
+    real = near.imag == 0.0
+    exact = near + np.where(real, off.real, off)
+    return exact, np.where(real, residue.real, 2.0 * residue) / exact

@@ -1,22 +1,22 @@
 """Step response and its figures: rise, overshoot, settling."""
 
 from dataclasses import dataclass
-from itertools import pairwise
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
-from actuator_lti.margins.loop import rational_loop
-from actuator_lti.step.delayed import Stepped, delayed_response
-from actuator_lti.step.motion import OVER, Motion, notes, rational_motion
+from actuator_lti.margins.given import ULP
+from actuator_lti.margins.loop import RationalLoop, rational_loop
+from actuator_lti.step.delayed import delayed_response
+from actuator_lti.step.motion import Motion, rational_motion
+from actuator_lti.step.search import Pieces, Search
+from actuator_lti.systems.exact_fraction import exact_sum
 from actuator_lti.systems.measured_response import refuse_measured
-from actuator_lti.types import Mask, Real
+from actuator_lti.types import Real
 
 _SHOWN = 2000
-_BAND = 0.02
-_FLAT = 1e-12
+_EPS = float(np.finfo(float).eps)
+_TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,10 @@ class StepFigures:
 def step_figures(system: Any) -> StepFigures:
     """Figures of the unit step response of a stable system.
 
-    A rational system is taken exactly as its doubles say, as the free motion of its certified poles; every
-    figure is found by halving all of time, so that nothing hides between two points of a grid. A sampled
-    system is looked at at its samples. A system with inner delays is walked along its first delays, in pieces
-    over which nothing jumps, each a polynomial, and is then the free motion of its exact poles.
-
-    All figures are relative to the final value, however small it is beside what comes before: a resonance
-    80 dB above the gain at zero frequency gives an overshoot of a million percent.
+    A rational system is taken exactly as its doubles say, as the free motion of its certified poles; all of
+    time is halved, so that nothing hides between two points of a grid. A sampled system is looked at at its
+    samples. A system with inner delays is walked along its first delays, and is then the free motion of its
+    exact poles. All figures are relative to the final value, however small it is beside what comes before.
 
     Parameters
     ----------
@@ -84,38 +81,33 @@ def step_figures(system: Any) -> StepFigures:
     refuse_measured(system)
     if hasattr(system, "delays_s"):
         if system.delays_s.size:
-            early, later, final = delayed_response(system)
-            return _figures([early], later, final)
+            return _figures(*delayed_response(system))
         system = system.to_state_space()
     loop = rational_loop(system)
-    return _figures([], *rational_motion(system, loop), loop.period_s, notes(loop))
+    return _figures(*rational_motion(system, loop), period_s=loop.period_s, notes=_notes(loop))
 
 
 def _figures(
-    early: list[Stepped],
     later: Motion,
     final: float,
+    early: Pieces | None = None,
     period_s: float | None = None,
     notes: tuple[str, ...] = (),
 ) -> StepFigures:
-    scale = 1.0 if period_s is None else period_s
-    parts: list[Stepped | Motion] = [*early, later]
-    ten, ninety = (
-        min(_passage(part, level - 1.0 - part.tie, last=False) for part in parts) for level in (0.1, 0.9)
-    )
-    settled = max(0.0, *(_passage(part, _BAND + part.tie, last=True) + part.sampled for part in parts))
-    excess, peak_time = OVER, np.inf
-    for part in parts:
-        excess, peak_time = _greatest(part, excess, peak_time)
-    excess = excess if np.isfinite(peak_time) else 0.0
-    time, deviation = _curve(early, later, ninety, settled)
+    search = Search(_TIE if period_s else 0.0)
+    if early is not None:
+        search.inside(early)
+    later.look(search)
+    scale, settled = period_s or 1.0, max(0.0, search.last + later.sampled)
+    excess = search.peak if np.isfinite(search.peak_time) else 0.0
+    time, deviation = _curve(later, early, search.ninety, settled)
     return StepFigures(
-        rise_time_s=(ninety - ten) * scale,
+        rise_time_s=(search.ninety - search.ten) * scale,
         overshoot_percent=100.0 * excess,
         settling_time_s=settled * scale,
         final_value=final,
         peak_value=(1.0 + excess) * final,
-        peak_time_s=peak_time * scale,
+        peak_time_s=search.peak_time * scale,
         period_s=period_s,
         time_s=time * scale,
         response=(1.0 + deviation) * final,
@@ -123,63 +115,31 @@ def _figures(
     )
 
 
-def _passage(part: Stepped | Motion, level: float, *, last: bool) -> float:
-    """The first time at which e lies above a level, or the last at which |e| does; infinite: never."""
-    best, sides = (-np.inf, (level, -level)) if last else (np.inf, (level,))
-    of = np.abs if last else np.asarray
-
-    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-        nonlocal best
-        above = np.concatenate((a[left > level], b[right > level]))
-        best = above.max(initial=best) if last else above.min(initial=best)
-        return (most > level) & ((b > best) if last else (a < best))
-
-    for a, h, series in sorted(part.spans(undecided, of), key=itemgetter(0), reverse=last):
-        roots = [root for side in sides for root in _within(series, side)]
-        if roots:
-            return a + h * (max(roots) if last else min(roots))
-    return float(best)
-
-
-def _greatest(part: Stepped | Motion, best: float, place: float) -> tuple[float, float]:
-    """Largest e and its time, where it is above the best so far."""
-
-    def undecided(a: Real, b: Real, left: Real, right: Real, most: Real) -> Mask:
-        nonlocal best, place
-        for t, e in ((a, left), (b, right)):
-            k = int(e.argmax())
-            if e[k] > best or (e[k] == best and t[k] < place):
-                best, place = float(e[k]), float(t[k])
-        return most > best * (1.0 + _FLAT)
-
-    for a, h, series in part.spans(undecided, np.asarray):
-        for top in _within(np.polyder(series)):
-            if (e := float(np.polyval(series, top))) > best:
-                best, place = e, a + h * top
-    return best, place
-
-
-def _within(series: Real, level: float = 0.0) -> list[float]:
-    """Where a power series takes a level in [0, 1], in order: its derivative's zeros part its passages."""
-    f = np.poly1d(series) - level
-    if not f.order:
-        return []
-    slope = f.deriv().coeffs
-    turns = [] if abs(slope[-1]) > np.abs(slope[:-1]).sum() else _within(slope)
-    edges = (0.0, *turns, 1.0)
-    return [
-        float(brentq(f, low, high, xtol=1e-15))
-        for low, high in pairwise(edges)
-        if min(f(low), f(high)) <= 0.0 <= max(f(low), f(high))
-    ]
-
-
-def _curve(early: list[Stepped], later: Motion, ninety: float, settled: float) -> tuple[Real, Real]:
+def _curve(later: Motion, early: Pieces | None, ninety: float, settled: float) -> tuple[Real, Real]:
     """Times until well after settling, close together while it rises, and the deviation there."""
-    end = max(2.0 * settled or 2.0 * ninety or (5.0 / later.slowest or 1.0), later.start)
-    spans = [later.curve(end, _SHOWN), *(part.curve(later.start, _SHOWN) for part in early)]
+    end = max(2.0 * settled or 2.0 * ninety or later.whole, later.start)
+    spans = [later.curve(end, _SHOWN)]
     if later.start < (rising := min(5.0 * ninety, end)):
         spans.append(later.curve(rising, _SHOWN // 2))
+    if early is not None:
+        begins, lengths, series = early
+        time = np.linspace(0.0, later.start, _SHOWN)
+        k = np.searchsorted(begins, time, side="right") - 1
+        powers = np.vander((time - begins[k]) / lengths[k], series.shape[1])
+        spans.append((time, (powers * series[k]).sum(axis=1)))
     time, deviation = (np.concatenate(part) for part in zip(*spans, strict=True))
     once, first = np.unique(time, return_index=True)
     return once, deviation[first]
+
+
+def _notes(loop: RationalLoop) -> tuple[str, ...]:
+    """Say where the last digits of the coefficients decide about the final value."""
+    if not loop.in_z or loop.coefficients is None:
+        return ()
+    moved = sum(float(np.abs(p).sum()) / abs(exact_sum(p)) for p in loop.coefficients) * ULP * _EPS
+    if moved < 0.01:
+        return ()
+    return (
+        f"{ULP} units in the last place of the coefficients move the final value by {100 * moved:.2g} %: "
+        "the figures are those of the coefficients as given; a state space would hold the system better",
+    )

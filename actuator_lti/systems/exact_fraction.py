@@ -46,14 +46,6 @@ def roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
     return [(flint.acb(0), zeros)] * bool(zeros) + all_roots(p.numer())
 
 
-def product(poles: list[flint.acb]) -> flint.acb_poly:
-    """The polynomial with these roots."""
-    total = flint.acb_poly([1])
-    for p in poles:
-        total *= flint.acb_poly([-p, 1])
-    return total
-
-
 def divided(p: flint.acb_poly, at: flint.acb) -> flint.acb_poly:
     """p over x - at, the remainder left out."""
     quotient, carried = [], flint.acb(0)
@@ -88,10 +80,10 @@ def shown(f: Fraction, loop: RationalLoop) -> Fraction:
         slowest = min((rate for rate in rates if rate > 0.0), default=np.inf)
         above, residues = balls(f.num / f.den[f.den.degree()]), []
         for k, p in enumerate(near):
-            beside = product([*others, *near[k + 1 :]])
+            beside = flint.acb_poly.from_roots([*others, *near[k + 1 :]])
             residues.append(above(p) / beside(p))
             above = divided(above - residues[-1] * beside, p)
-        below, dc = product(others), flint.acb(1 if loop.in_z else 0)
+        below, dc = flint.acb_poly.from_roots(others), flint.acb(1 if loop.in_z else 0)
         size = abs(complex(above(dc) / below(dc)))
         if any(abs(complex(r)) > _UNSEEN * slowest * size for r in residues):
             return f

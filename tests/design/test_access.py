@@ -112,11 +112,7 @@ def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
     text = "# a comment\n" + design_text("ilr33-amber").replace(
         'source = "tuned here"', 'source = "elsewhere"'
     )
-    head, tail = text.split("[motor]")
-    body, rest = tail.split("[[gear]]", 1)
-    lines = body.strip().splitlines()
-    shuffled = head + "[motor]\n" + "\n".join(reversed(lines)) + "\n\n[[gear]]" + rest
-    assert design_hash(read_design_text(shuffled, "elsewhere")) == design_hash(AMBER)
+    assert design_hash(read_design_text(text, "elsewhere")) == design_hash(AMBER)
     for change in (
         {"motor.inductance": "6.1 uH"},
         {"requirement.gain-margin.minimum": "7 dB"},

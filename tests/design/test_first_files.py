@@ -145,6 +145,13 @@ def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
 
 
+def test_kv_of_a_motor_stated_per_phase_is_line_line() -> None:
+    """kM = 8.27/KV in N m per ampere of a phase (ODrive's documentation): kE and kM are one constant."""
+    text = motor("peak-phase", torque_constant=f"{8.27 / 82} N*m/A", back_emf_constant="82 KV")
+    same = read_design_text(text).effective_motor
+    assert same.back_emf_constant_Vs_rad == pytest.approx(same.torque_constant_Nm_A, rel=1e-4)
+
+
 # 44 oz-in/A rms is 0.31071 N m/A rms; over sqrt(3) it is kE in V rms line-line
 KE = 44 * 0.0070615518 / 3**0.5
 
@@ -162,38 +169,33 @@ def test_constants_that_disagree_are_told_as_they_are_written(written: str, want
     assert float(number) == pytest.approx(wanted, rel=1e-3)  # four digits are told
 
 
+SAME, WARM = "the ratio is that", "sheets give kM warm"
+TAKE = "here 0.889): take one and write the other"
+OF_A_PHASE = 'with motor.constants = "peak-phase" kE is kM over 3/2 in SI'
+STEPPER = 'with "dc" of a stepper those of a phase'
+
+
 @pytest.mark.parametrize(
-    ("constants", "kM", "kE", "words"),
+    ("constants", "kM", "kE", "said", "not_said"),
     [  # kM over kE: 0.889 of sqrt(3), 0.889 of one, 0.866 at 8.27/KV of peak amperes
-        ("rms-line", "1.47 Nm/A", "100 V/1000 min-1", "here 0.889): take one and write the other"),
-        ("dc", "89.4 mNm/A", "95 rpm/V", "here 0.889): take one and write the other"),
-        ("dc", "82.7 mNm/A", "100 KV", 'motor.constants = "peak-phase"'),
+        ("rms-line", "1.47 Nm/A", "100 V/1000 min-1", TAKE, SAME),
+        ("dc", "89.4 mNm/A", "95 rpm/V", TAKE, SAME),
+        ("dc", "82.7 mNm/A", "100 KV", f'{SAME} of motor.constants = "peak-phase"', TAKE),
+        # a kE of peak volts is sqrt(2) too large; magnets warm to 0.8 to 0.95
+        ("dc", "0.075 Nm/A", "0.1 V*s/rad", "within 10 %", WARM),
+        ("dc", "0.085 Nm/A", "0.1 V*s/rad", "here 0.85", "the ratio is sqrt(2)"),
+        ("dc", "0.085 Nm/A", "0.1 V*s/rad", WARM, "the ratio is sqrt(2)"),
+        ("dc", f"{0.1 / 2**0.5} Nm/A", "0.1 V*s/rad", "the ratio is sqrt(2), rms against peak", WARM),
+        # of peak amperes and volts of a phase kE is kM over 3/2
+        ("peak-phase", "0.75 Nm/A", "0.75 V*s/rad", OF_A_PHASE, "in SI the two are one"),
+        ("dc", "1 Nm/A", "1 V*s/rad/phase", STEPPER, OF_A_PHASE),
     ],
 )
-def test_a_warm_torque_constant_is_told_from_a_convention(
-    constants: str, kM: str, kE: str, words: str
+def test_a_cause_is_told_only_where_its_ratio_is_near(
+    constants: str, kM: str, kE: str, said: str, not_said: str
 ) -> None:
     text = told(motor(constants, torque_constant=kM, back_emf_constant=kE))
-    assert words in text
-    assert ("the ratio is that" in text) is ("motor.constants" in words)
-
-
-@pytest.mark.parametrize(("warm", "words"), [(0.75, ""), (0.85, "here 0.85"), (2**-0.5, "")])
-def test_a_cause_is_told_only_where_its_ratio_is_near(warm: float, words: str) -> None:
-    """A kE of peak volts is sqrt(2) too large; magnets warm to 0.8 to 0.95."""
-    text = told(motor("dc", torque_constant=f"{0.1 * warm} Nm/A", back_emf_constant="0.1 V*s/rad"))
-    assert ("sheets give kM warm" in text) is bool(words)
-    assert words in text
-    assert ("the ratio is sqrt(2), rms against peak" in text) is (warm == 2**-0.5)
-
-
-def test_constants_that_disagree_are_told_by_the_convention_that_relates_them() -> None:
-    """Of peak amperes and volts of a phase kE is kM over 3/2."""
-    text = told(motor("peak-phase", torque_constant="0.75 Nm/A", back_emf_constant="0.75 V*s/rad"))
-    assert 'with motor.constants = "peak-phase" kE is kM over 3/2 in SI' in text
-    assert "in SI the two are one" not in text
-    stepper = told(motor("dc", torque_constant="1 Nm/A", back_emf_constant="1 V*s/rad/phase"))
-    assert 'with "dc" of a stepper those of a phase' in stepper
+    assert (said in text, not_said in text) == (True, False)
 
 
 @pytest.mark.parametrize("key", ["magnet_pitch", "pole_pitch"])

@@ -6,14 +6,12 @@ voltages that the plain run has recorded.
 
 from dataclasses import replace
 from math import inf
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from fmu_host import hosted, needs_compiler, written
 from random_drives import random_drive, random_elastic_drive
-from scipy.optimize import brentq
 
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits
@@ -126,85 +124,3 @@ def test_a_command_between_ticks_is_seen_at_the_next(tmp_path) -> None:
             if part == 0:
                 assert angle == plain.output_angle_rad[at]
             assert voltage == plain.voltage_V[at if part else at - 1]
-
-
-# --- the unit inside somebody else's loop ---
-def critical_gain(parts: int) -> float:
-    """Gain of an outer integrator at which emps without friction oscillates, in host steps of parts/FINE Ts.
-
-    The position loop P-P on the force source with its two-sample difference, held over a tick; the host's
-    integrator z' = r - y by the trapezoidal rule from communication point to communication point, K z the
-    command.  Lifted over the common period of both: all states at its beginning, exact in between.
-    """
-    design = load_design("emps")
-    Ts = design.controller.period_s
-
-    def spread(K: float) -> float:
-        map_ = lifted(design, K, Ts, parts, int(np.lcm(parts, FINE)))
-        return float(np.abs(np.linalg.eigvals(map_)).max()) - 1.0
-
-    return float(brentq(spread, 20.0, 200.0, xtol=1e-9))
-
-
-def lifted(design: Design, K: float, Ts: float, parts: int, common: int) -> np.ndarray:
-    """The map over the common period: y, v, u held, z, last y, command, angles of the difference."""
-    c = design.controller
-    J, b = design.motor.rotor_inertia_kgm2, design.friction.viscous_Nms_rad
-    gain = design.motor.source_gain_Nm_V
-    h, m = Ts / FINE, design.encoder.difference_samples
-    y, v, u, z, seen, r = range(6)
-    angles, n = list(range(6, 6 + m)), 6 + m
-    plant, e = np.eye(n), np.exp(-b / J * h)
-    plant[y, v], plant[v, v] = (1.0 - e) * J / b, e
-    plant[v, u] = (1.0 - e) * gain / b
-    plant[y, u] = (h - (1.0 - e) * J / b) * gain / b
-    point = np.eye(n)  # y of the last point and of this one, then the command from z
-    point[z, y] = point[z, seen] = -0.5 * parts * h
-    point[seen] = np.eye(n)[y]
-    point[r] = K * point[z]
-    tick = np.eye(n)
-    tick[u] = 0.0
-    tick[u, r] = c.velocity.gain * c.position.gain
-    tick[u, y] = -c.velocity.gain * (c.position.gain + 1.0 / (m * Ts))
-    tick[u, angles[0]] = c.velocity.gain / (m * Ts)
-    for j in range(m):  # oldest first
-        tick[angles[j]] = np.eye(n)[y if j == m - 1 else angles[j + 1]]
-    total = np.eye(n)
-    for k in range(common):
-        if k % parts == 0:
-            total = point @ total
-        if k % FINE == 0:
-            total = tick @ total
-        total = plant @ total
-    return total
-
-
-@pytest.mark.parametrize("parts", [1, 5, 10, 15, 27])
-def test_an_outer_loop_has_its_critical_gain_at_every_step(parts: int, unfriction: Path) -> None:
-    """0.1 % below the gain of the lifted loop the oscillation dies away, 0.1 % above it grows."""
-    period, known = load_design("emps").controller.period_s, critical_gain(parts)
-    if parts == FINE:
-        assert known == pytest.approx(91.58, rel=1e-4)
-    growth = [oscillation(unfriction, parts / FINE * period, known * factor) for factor in (0.999, 1.001)]
-    assert growth[0] < 1.0 < growth[1]
-
-
-@pytest.fixture(scope="module")
-def unfriction(tmp_path_factory) -> Path:
-    return written(tmp_path_factory.mktemp("emps"), load_design("emps"), 3)
-
-
-def oscillation(path: Path, step: float, gain: float) -> float:
-    """Largest size of the last fifth of a run over that of the one before the last."""
-    z, before, sizes = 1e-6, 0.0, []
-    with hosted(path) as (host,):
-        host.start(**{"friction.dry_torque": 0.0, "friction.offset_torque": 0.0})
-        for n in range(int(5.0 / step)):
-            host.set(command=gain * z)
-            host.step(n * step, step)
-            (now,) = host.get("output.angle")
-            z -= 0.5 * step * (before + now)
-            before = now
-            sizes.append(abs(now))
-    fifth = len(sizes) // 5
-    return max(sizes[-fifth:]) / max(sizes[-2 * fifth : -fifth])

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import inf, pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,102 +21,76 @@ TICKS = 240
 CASES = 120
 
 
-def some_filters(rng: np.random.Generator, T: float) -> tuple[model.Filter, ...]:
-    def w() -> float:
-        return float(rng.uniform(0.02, 0.8) * pi / T)
+class Some:
+    """Values of a generator."""
 
-    kinds = [
-        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 1},
-        lambda: {"kind": "lowpass", "frequency_rad_s": w(), "order": 2, "damping": rng.uniform(0.4, 1.2)},
-        lambda: {"kind": "notch", "frequency_rad_s": w(), "width_rad_s": w(), "depth": rng.uniform(0, 0.5)},
-        lambda: {"kind": "leadlag", "zero_rad_s": w(), "pole_rad_s": w()},
-        lambda: {
-            "kind": "skewed-notch", "zero_rad_s": w(), "pole_rad_s": w(), "width_rad_s": w(), "depth": 0.2
-        },
-        lambda: {"kind": "biquad", "b": (0.3, 0.1, 0.05), "a": (-0.4, 0.15)},
-        lambda: {"kind": "biquad", "b": (0.5,), "a": (-0.5,)},
-    ]  # fmt: skip
-    places = ("torque", "speed")
-    count = int(rng.integers(0, 5))
-    return tuple(
-        model.Filter(on=places[rng.integers(2)], **kinds[rng.integers(len(kinds))]()) for _ in range(count)
-    )
+    def __init__(self, rng: np.random.Generator) -> None:
+        self.rng = rng
 
+    def of(self, *values: Any) -> Any:
+        return values[self.rng.integers(len(values))]
 
-def some_drive(rng: np.random.Generator) -> model.Design:
-    """Any stages, any options, on the motor of the baseline."""
+    def filters(self, T: float) -> tuple[model.Filter, ...]:
+        w, other, width = (self.rng.uniform(0.02, 0.8, 3) * pi / T).tolist()
+        depth, damping = self.rng.uniform(0.0, 0.5), self.rng.uniform(0.4, 1.2)
+        pair, kinds = {"zero_rad_s": w, "pole_rad_s": other}, [{"kind": "biquad", "b": (0.5,), "a": (-0.5,)}]
+        kinds += [{"kind": "lowpass", "frequency_rad_s": w, "order": n, "damping": damping} for n in (1, 2)]
+        kinds += [{"kind": "notch", "frequency_rad_s": w, "width_rad_s": width, "depth": depth}]
+        kinds += [{"kind": "leadlag", **pair}, {"kind": "biquad", "b": (0.3, 0.1, 0.05), "a": (-0.4, 0.15)}]
+        kinds += [{"kind": "skewed-notch", **pair, "width_rad_s": width, "depth": depth}]
+        return (model.Filter(on=self.of("torque", "speed"), **self.of(*kinds)),)
 
-    def pick(*values):
-        return values[rng.integers(len(values))]
+    def command(self, T: float, shaped: bool, rate: float) -> model.Command:
+        own = {"filter_time_s": self.of(0.0, 3 * T, 0.4 * T), "filter_order": self.of(1, 2)}
+        if not shaped:
+            return model.Command(**own, filter_damping=0.8)
+        own |= {"rate_rad_s": self.of(inf, rate)}
+        if bend := self.of(0.0, 0.1 * rate / T):
+            own |= {"acceleration_rad_s2": bend, "jerk_rad_s3": self.of(inf, bend / (4.3 * T))}
+        return model.Command(**own, filter_damping=0.8)
 
-    Ts, n_v, wide = 10 ** rng.uniform(-5, -3), int(pick(1, 2, 5)), 10 ** rng.uniform(-1, 1)
-    laws = ("conditional", "clamped", "back-calculation")
-    has_position, has_velocity, has_current = (pick(True, True, False) for _ in range(3))
-    cascade = model.CurrentLoop(
-        gain_V_A=wide,
-        integral_time_s=pick(None, 20 * Ts),
-        back_emf_feedforward=pick(0.0, 0.7),
-        resistance_feedforward=pick(0.0, 0.5),
-        anti_windup=pick(*laws),
-        tracking_time_s=pick(None, 7 * Ts),
-    )
-    velocity = model.VelocityLoop(
-        sensor=pick("motor", "motor", "output"),
-        gain=0.05 * wide,
-        integral_time_s=pick(None, 50 * Ts),
-        every=n_v,
-        anti_windup=pick(*laws),
-        tracking_time_s=pick(None, 9 * Ts),
-        filters=some_filters(rng, n_v * Ts),
-    )
-    T_p = Ts * n_v * int(pick(1, 3))
-    position = model.PositionLoop(
-        gain=0.02 / Ts if has_velocity else 0.3,
-        every=round(T_p / Ts),
-        feedforward=pick(0.0, 0.6),
-        sensor=pick("motor", "output"),
-        integral_time_s=pick(None, 30 * T_p),
-        derivative_time_s=pick(0.0, 3 * T_p),
-        derivative_filter_s=pick(0.0, 2 * T_p),
-        acceleration_feedforward=pick(0.0, 0.5),
-        friction_feedforward=pick(0.0, 0.2),
-    )
-    T_o = T_p if has_position else (n_v * Ts if has_velocity else Ts)
-    shaped = has_position or has_velocity
-    rate = 2e-4 / T_o if has_position else 0.4
-    command = model.Command(
-        filter_time_s=pick(0.0, 3 * T_o, 0.4 * T_o),
-        filter_order=pick(1, 2),
-        filter_damping=0.8,
-        rate_rad_s=pick(inf, rate) if shaped else inf,
-        acceleration_rad_s2=pick(inf, 0.1 * rate / T_o) if shaped else inf,
-    )
-    if command.acceleration_rad_s2 < inf:
-        command = replace(command, jerk_rad_s3=pick(inf, command.acceleration_rad_s2 / (4.3 * T_o)))
-    limits = model.Limits(
-        voltage_V=20.0,
-        speed_rad_s=pick(inf, 300.0),
-        acceleration_rad_s2=pick(inf, 20.0 / T_p),
-        peak_current_A=pick(inf, 5.0),
-        current_rate_A_s=pick(inf, inf, 3.0 / T_o),
-    )
-    if has_current and np.isfinite(limits.peak_current_A):
-        peak_s, kind = pick(None, 30 * Ts), pick("thermal", "excess")
-        limits = replace(limits, continuous_current_A=2.0, peak_time_s=peak_s, release=0.8, overload=kind)
-    encoder = model.Encoder(
-        counts_per_rev=pick(None, 4096),
-        speed=pick("ideal", "difference", "tracking"),
-        difference_samples=int(pick(1, 3)),
-        filter_time_s=pick(0.0, 4 * Ts),
-        bandwidth_rad_s=0.2 / (n_v * Ts),
-    )
-    control = model.Controller(
-        period_s=Ts, computing_delay_s=0.0, position=position if has_position else None,
-        velocity=velocity if has_velocity else None, current=cascade if has_current else None,
-    )  # fmt: skip
-    behind = model.OutputEncoder(counts_per_rev=pick(None, 10**6))
-    own = {"limits": limits, "encoder": encoder, "command": command, "output_encoder": behind}
-    return replace(load_design("ilr33-amber"), controller=control, **own)
+    def limits(self, T: float, T_p: float, protected: float | None) -> model.Limits:
+        own = {"speed_rad_s": self.of(inf, 300.0), "acceleration_rad_s2": self.of(inf, 20.0 / T_p)}
+        own |= {"peak_current_A": self.of(inf, 5.0), "current_rate_A_s": self.of(inf, inf, 3.0 / T)}
+        if protected is not None and own["peak_current_A"] < inf:
+            own |= {"continuous_current_A": 2.0, "peak_time_s": self.of(None, protected), "release": 0.8}
+            own |= {"overload": self.of("thermal", "excess")}
+        return model.Limits(voltage_V=20.0, **own)
+
+    def drive(self) -> model.Design:
+        """Any stages, any options, on the motor of the baseline."""
+        of, rng = self.of, self.rng
+        Ts, n_v, wide = 10 ** rng.uniform(-5, -3), int(of(1, 2, 5)), 10 ** rng.uniform(-1, 1)
+        with_position, with_velocity, with_current = (of(True, True, False) for _ in range(3))
+        laws, T_p = ("conditional", "clamped", "back-calculation"), Ts * n_v * int(of(1, 3))
+        current = {"gain_V_A": wide, "integral_time_s": of(None, 20 * Ts), "anti_windup": of(*laws)}
+        current |= {"back_emf_feedforward": of(0.0, 0.7), "resistance_feedforward": of(0.0, 0.5)}
+        current |= {"tracking_time_s": of(None, 7 * Ts)}
+        filters = sum((self.filters(n_v * Ts) for _ in range(int(rng.integers(0, 5)))), ())
+        velocity = {"gain": 0.05 * wide, "every": n_v, "sensor": of("motor", "motor", "output")}
+        velocity |= {"integral_time_s": of(None, 50 * Ts), "anti_windup": of(*laws), "filters": filters}
+        velocity |= {"tracking_time_s": of(None, 9 * Ts)}
+        position = {"gain": 0.02 / Ts if with_velocity else 0.3, "every": round(T_p / Ts)}
+        position |= {"feedforward": of(0.0, 0.6), "sensor": of("motor", "output")}
+        position |= {"integral_time_s": of(None, 30 * T_p), "derivative_time_s": of(0.0, 3 * T_p)}
+        position |= {"derivative_filter_s": of(0.0, 2 * T_p), "acceleration_feedforward": of(0.0, 0.5)}
+        position |= {"friction_feedforward": of(0.0, 0.2)}
+        T_o = T_p if with_position else (n_v * Ts if with_velocity else Ts)
+        encoder = {"counts_per_rev": of(None, 4096), "speed": of("ideal", "difference", "tracking")}
+        encoder |= {"difference_samples": int(of(1, 3)), "filter_time_s": of(0.0, 4 * Ts)}
+        stages = {
+            "position": model.PositionLoop(**position) if with_position else None,
+            "velocity": model.VelocityLoop(**velocity) if with_velocity else None,
+            "current": model.CurrentLoop(**current) if with_current else None,
+        }
+        return replace(
+            load_design("ilr33-amber"),
+            controller=model.Controller(period_s=Ts, computing_delay_s=0.0, **stages),
+            limits=self.limits(T_o, T_p, 30 * Ts if with_current else None),
+            encoder=model.Encoder(**encoder, bandwidth_rad_s=0.2 / (n_v * Ts)),
+            command=self.command(T_o, with_position or with_velocity, 2e-4 / T_o if with_position else 0.4),
+            output_encoder=model.OutputEncoder(counts_per_rev=of(None, 10**6)),
+        )
 
 
 def some_measurements(rng: np.random.Generator, design: model.Design) -> np.ndarray:
@@ -136,7 +111,7 @@ def test_random_controllers(part: int) -> None:
     limited = 0
     for case in range(part * CASES // 4, (part + 1) * CASES // 4):
         rng = np.random.default_rng(case)
-        design = some_drive(rng)
+        design = Some(rng).drive()
         drive, plain = Drive(design), Controller(design)
         rows = some_measurements(rng, design)
         result = np.array([drive.control(*row) for row in rows])
@@ -167,7 +142,7 @@ def drives() -> list[model.Design]:
     feeding = {"position": {"acceleration_feedforward": 0.5}}
     weak = changed(load_design("ilr33-amber"), supply=supply, controller=feeding)
     noisy = changed(weak, instruments=NOISE, controller={"computing_delay_s": 1.3e-4})
-    random = [some_drive(np.random.default_rng(case)) for case in range(60)]
+    random = [Some(np.random.default_rng(case)).drive() for case in range(60)]
     return [*map(load_design, shipped_designs()), *random, play, weak, noisy]
 
 
