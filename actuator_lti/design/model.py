@@ -7,6 +7,7 @@ does not have is ``None``; a limit that it does not have is ``inf``.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import pi, prod, sqrt
 from typing import Annotated, Any
 
@@ -246,7 +247,7 @@ class Design:
         behind = self.gears[self.gears_before_coupling :]
         return _train_inertia(behind) + self.load.inertia_kgm2 / self.ratio_behind_coupling**2
 
-    @property
+    @cached_property
     def effective_motor(self) -> Motor:
         """The motor as the model has it: one constant k, phase-phase R and L, at its temperature.
 

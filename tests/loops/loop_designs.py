@@ -1,17 +1,13 @@
-"""Designs for the loop tests, most of them the shipped ones laid bare, and hypothesis strategies for more."""
+"""Designs for the loop tests, most of them the shipped ones laid bare."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 from typing import Any
 
 import numpy as np
-from hypothesis import strategies as st
 
 from actuator_lti.design import load_design, model
 from tests.changed import changed
-
-GAINS = {"current": 0.01, "velocity": 1.0, "current velocity": 0.05}  # of the stage outside the gap
 
 
 def amber(n_v: int = 1, n_p: int = 1, delay_s: float = 0.0001, feedforward: float = 0.0, **changes: Any):
@@ -81,23 +77,3 @@ def ctms_position(gain_V_rad: float = 1.0, delay_s: float = 0.0) -> model.Design
     """CTMS motor position (G6): P position loop on the voltage, no inner loops."""
     loop = {"position": {"gain": gain_V_rad}, "computing_delay_s": delay_s}
     return controlled(load_design("ctms-motor-position"), **loop)
-
-
-def picker(draw: st.DrawFn) -> Callable[..., Any]:
-    return lambda *values: draw(st.sampled_from(values))
-
-
-@st.composite
-def designs(draw: st.DrawFn) -> model.Design:
-    """Valid drives around the baseline: rates, delays, stages left out, speed estimates, loads."""
-    one_of, scale = picker(draw), st.floats(0.5, 2.0)
-    n_v = one_of(1, 2, 3)
-    base = amber(n_v, n_v * one_of(1, 2, 5), draw(st.floats(0.0, 3e-4)), feedforward=one_of(0.0, 0.9))
-    near = ("rotor_inertia_kgm2", "resistance_ohm", "inductance_H")
-    motor = {name: getattr(base.motor, name) * draw(scale) for name in near}
-    samples, filter_time_s = one_of(1, 2, 3, 4), one_of(0.0, 5e-4)
-    difference = {"speed": "difference", "difference_samples": samples, "filter_time_s": filter_time_s}
-    load = one_of({}, {"path": "back-drivable", "moment_slope_Nm_rad": -40.0})
-    design = changed(base, motor=motor, encoder=one_of({}, difference), load=load)
-    left_out = one_of("", "", *GAINS)
-    return without(design, *left_out.split(), gain=GAINS[left_out]) if left_out else design

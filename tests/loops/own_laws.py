@@ -39,6 +39,7 @@ def linear(design: Design) -> Design:
     parts = {"encoder": encoder, "output_encoder": OutputEncoder(), "friction": smooth, "supply": None}
     parts |= {"load": {"gravity": None, "friction": None}, "limits": Limits(voltage_V=1e12)}
     parts |= {"coupling": design.coupling and {"play_rad": 0.0}}
+    parts |= {"controller": {"position": design.controller.position and {"friction_feedforward": 0.0}}}
     return changed(design, command=Command(), instruments=Instruments(), **parts)
 
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 from math import exp
 from typing import Any
 
-import control
 import numpy as np
 import pytest
 from scipy.signal import cont2discrete
@@ -112,14 +111,6 @@ def test_a_current_command_closes_the_current_loop() -> None:
     found = plant(design, "ideal", "locked", command="i_ref")
     assert entry(found, "current", "i_ref") == pytest.approx(L / (1 + L), rel=1e-10)
     assert plant(design, command="i_ref").input_labels == ["i_ref", "load_torque"]
-
-
-def test_a_controller_can_be_closed_around_it() -> None:
-    """Proportional speed feedback by python-control: the poles are those of A - B k C."""
-    system = plant("ilr33-amber")["speed", "u"]
-    found = np.sort_complex(control.feedback(system, 1e-3).poles())
-    wanted = np.sort_complex(np.linalg.eigvals(system.A - 1e-3 * system.B @ system.C))
-    assert found == pytest.approx(wanted, rel=1e-9)
 
 
 @pytest.mark.parametrize(

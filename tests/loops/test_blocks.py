@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from loop_designs import amber, ctms_position, designs, emps
+from loop_designs import amber, ctms_position, emps
 from test_stacked import everything
 
 from actuator_lti import InputError, assemble_loops, delay_budget
@@ -14,6 +14,7 @@ from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.blocks import biquad, pi
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from nonlinear.row.filters import section
+from tests.validation.random_drives import full_drive
 
 RNG = np.random.default_rng(7)
 
@@ -60,13 +61,6 @@ def test_pi_in_z_is_the_recursion() -> None:
     assert pi(2.0, None, 0.01).at_z(np.array([1.0]))[0] == 2
 
 
-def test_pi_forms_agree_up_to_half_a_period_of_gain() -> None:
-    """PI(z) = PI(s) + Kp T/(2 Tn) + O(s T^2)."""
-    law, omega = pi(2.0, 0.05, 0.001), np.array([1.0, 10.0])
-    gap = law.at_z(omega) - law.at_s(omega)
-    np.testing.assert_allclose(gap, 2.0 * 0.001 / 0.1, rtol=5e-3)
-
-
 def skewed(zero: float, pole: float, width: float, depth: float) -> Filter:
     return Filter(kind="skewed-notch", zero_rad_s=zero, pole_rad_s=pole, width_rad_s=width, depth=depth)
 
@@ -96,9 +90,8 @@ def test_with_one_frequency_it_is_the_notch() -> None:
     assert section(one, 2e-4) == pytest.approx(section(notch, 2e-4), rel=1e-12)
 
 
-@settings(max_examples=6)
-@given(designs(), st.floats(0.01, 0.8))
-@example(everything(), 0.02)
+@pytest.mark.parametrize("fraction", [0.02, 0.2, 0.7])
+@pytest.mark.parametrize("design", [everything(), full_drive(90_104), full_drive(90_105)], ids=range(3))
 def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: float) -> None:
     for name, loop in assemble_loops(design).present.items():
         omega = fraction * np.pi / loop.period_s

@@ -54,12 +54,6 @@ def test_friction_behind_the_coupling_counts() -> None:
     assert 0.5 * needed / 0.05 + 0.05 * w == pytest.approx(48.0, rel=1e-12)
 
 
-def test_a_hot_motor_is_weaker() -> None:
-    hot = replace(drive_d(), temperature=model.Temperature(winding_degC=125.0, magnet_degC=75.0))
-    R, kM = 0.5 * (1 + 0.00393 * 100), 0.05 * (1 - 0.0011 * 50)
-    assert stall_torque_Nm(hot) == pytest.approx(kM * 48.0 / R)
-
-
 def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
     design = controlled(drive_e(), current={"integral_time_s": None, "resistance_feedforward": 0.6})

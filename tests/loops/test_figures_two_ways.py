@@ -1,59 +1,35 @@
-"""Every figure that a requirement may name, reached for one design and for many: the two agree on any drive.
-
-Drives of `wide_designs` (any stage outermost, rigid or elastic, any filter, estimator, rate, delay,
-feed-forward), with gravity, a friction map, friction that differs by direction, and numbers over decades.
-"""
-
-from dataclasses import replace
+"""Every figure that a requirement may name, for one design and for many: the two agree on any drive."""
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
 from loop_designs import controlled
-from test_recursion import wide_designs
 from test_stacked import everything
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES
 from actuator_lti.batch import Population, drive_figures, linear_figures
-from actuator_lti.design.model import Design, FrictionPoint, Gravity
+from actuator_lti.design.model import Design
+from tests.validation.random_drives import drives
 
 LOUD = controlled(load_design("ilr33-amber"), position={"gain": 4800.0})  # S of its position loop has no peak
 
 
-@st.composite
-def wider_designs(draw: st.DrawFn) -> Design:
-    """Also under gravity, with a friction map or another friction backwards, sizes over two decades."""
-    design, size = draw(wide_designs()), 10.0 ** draw(st.floats(-1.0, 1.0))
-    torque = design.friction.dry_torque_Nm or 1e-3
-    shape = ((0.0, 1.0), (50.0, 0.6), (400.0, 1.4))
-    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=part * torque) for w, part in shape)
-    other = replace(design.friction, dry_torque_Nm=size * torque, dry_torque_reverse_Nm=0.7 * size * torque)
-    friction = draw(st.sampled_from([design.friction, other, replace(design.friction, points=points)]))
-    gravity = draw(st.sampled_from([None, Gravity(mass_kg=size, arm_m=0.05, offset_rad=2.0)]))
-    load = replace(design.load, inertia_kgm2=size * design.load.inertia_kgm2, gravity=gravity)
-    return replace(design, friction=friction, load=load, name="any")
-
-
-@settings(max_examples=25)
-@given(wider_designs(), st.sampled_from([0.0, 3.0, -20.0]))
-def test_drive_figures(design: Design, load_Nm: float) -> None:
+@pytest.mark.parametrize("load_Nm", [0.0, 3.0, -20.0])
+def test_drive_figures(load_Nm: float) -> None:
     """Speed, current, acceleration, torque margin, stiffness, lost motion."""
-    many = Population(design, {}, 2)
-    for name in DRIVE_QUANTITIES:
-        one = drive_figure(design, name, load_Nm)
-        truth = np.nan if one is None else float(one)
-        if name == "motor_current" and not design.motor.has_electrical_dynamics:
-            continue
-        assert drive_figures(many, name, load_Nm) == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), name
+    for design in drives(90_100, 12):
+        many = Population(design, {}, 2)
+        for name in DRIVE_QUANTITIES:
+            one = drive_figure(design, name, load_Nm)
+            truth = np.nan if one is None else float(one)
+            if name == "motor_current" and not design.motor.has_electrical_dynamics:
+                continue
+            found = drive_figures(many, name, load_Nm)
+            assert found == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), (design.name, name)
 
 
-@settings(max_examples=8)
-@given(wider_designs())
-@example(everything())
-@example(LOUD)
+@pytest.mark.parametrize("design", [everything(), LOUD, *drives(90_209, 8)], ids=lambda each: each.name)
 def test_loop_figures(design: Design) -> None:
     """The margins of every loop; where one of the two withholds them it has no say."""
     figures = linear_figures(Population(design, {}, 1), time_figures=False)

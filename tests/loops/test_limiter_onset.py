@@ -77,6 +77,8 @@ def test_limiters_follow_the_stages() -> None:
     nothing = onset(assemble_loops(free), [1.0])
     assert nothing.active == ("",)
     assert nothing.amplitude_rad[0] == inf
+    with pytest.raises(InputError, match=r"limits\.current_rate"):
+        load_design("ilr33-amber").with_values({"limits.current_rate": "0 A/s"})
 
 
 def test_results_end_at_nyquist() -> None:
@@ -152,12 +154,3 @@ def test_the_integral_of_a_position_controller_waits() -> None:
         drive.control(1.0, 0.0, 0.0, 0.0)
         assert drive.value("position_integrator") == 0.0
         assert drive.value("current_reference") == pytest.approx(1e-4 * k, rel=1e-12)
-
-
-def test_key() -> None:
-    design = load_design("ilr33-amber").with_values({"limits.current_rate": "2 A/ms"})
-    assert design.limits.current_rate_A_s == pytest.approx(2000.0)
-    assert "current-rate" not in assemble_loops(load_design("ilr33-amber")).limiters
-    assert Limits(voltage_V=1.0).current_rate_A_s == inf
-    with pytest.raises(InputError, match=r"limits\.current_rate"):
-        design.with_values({"limits.current_rate": "0 A/s"})

@@ -14,7 +14,6 @@ from actuator_lti.drive.operating import Operating, follows_angle, holding_torqu
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
-from nonlinear._kernels import layout
 from nonlinear.bench.operating_motion import operating_motion
 from tests.changed import changed
 
@@ -113,16 +112,6 @@ def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
 
 
 @each
-def test_slope_at_the_operating_angle(case: Case) -> None:
-    """One tick's derivative of speed over angle is A Z cos(Z th + phase) Ts/J."""
-    design = case.put(rotor())
-    for angle in (0.0, 0.1, -0.7):
-        tick = TickProgram(wire(design, Operating(angle_rad=angle / N)), "voltage").tick(0)
-        expected = A * case.order * cos(case.order * angle + PHASE) * Ts / J
-        assert np.max(np.abs(np.abs(tick.A) - abs(expected)) < 1e-12)
-
-
-@each
 def test_it_is_asked_without_its_name(case: Case) -> None:
     plain = rotor()
     design = case.put(plain)
@@ -150,15 +139,6 @@ def test_energy_balances(case: Case, name: str) -> None:
     without = simulate(load_design(name), commands.sine(amplitude_rad=0.05, frequency_hz=3.0), 0.3)
     assert np.max(np.abs(run.current_A - without.current_A)) > 1e-4
     assert run.energy.relative_error < 1e-9
-
-
-def test_every_wave_has_its_place_in_the_row() -> None:
-    design = load_design("joint")
-    assert design.load.gravity is not None
-    assert len(design.load.over_angle.waves) == layout.MOMENT_WAVES
-    assert len(design.motor.over_angle.waves) == layout.TORQUE_WAVES
-    assert layout.MOMENT_ORDER + 2 * layout.MOMENT_WAVES == layout.TORQUE_ORDER
-    assert layout.TORQUE_ORDER + 2 * layout.TORQUE_WAVES == layout.COMMAND
 
 
 @pytest.mark.parametrize("name", ["load.gear_error", "motor.cogging"])
@@ -279,18 +259,6 @@ def test_energy_of_the_moment_is_work_on_the_load() -> None:
     assert energy.output_work_J == pytest.approx(0.5 * J * (80.0**2 - after[-1] ** 2), rel=1e-12)
     travel = 0.5 * (after[1:] + after[:-1]) * Ts  # under a constant torque
     assert energy.output_work_J == pytest.approx(float(np.sum(D * w / N**2 * travel)), rel=1e-9)
-
-
-def test_the_plant_holds_the_sum() -> None:
-    """Cv + D/N^2 over J, of which the second part comes through the moment."""
-    design = changed(
-        load_design("ilr33-amber"), load={"path": "back-drivable", "moment_damping_Nms_rad": 30.0}
-    )
-    plant = wire(design).plant
-    own = plant.A[1, 1] + plant.B_M[1] * plant.moment["load_speed"] * plant.rows["load_speed"]["w"]
-    assert -own * design.inertia_kgm2 == pytest.approx(
-        design.friction.viscous_Nms_rad + 30.0 / design.total_ratio**2, rel=1e-12
-    )
 
 
 @pytest.mark.parametrize("path", ["back-drivable", "self-locking"])

@@ -11,7 +11,7 @@ from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, delay_budget
 from actuator_lti.design.model import Filter, Limits, PositionLoop
-from actuator_lti.drive.blocks import biquad, lag, tracking
+from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.signals import LIMITERS
 from analyses import survey_loops
 from reports.sections.delays import section
@@ -38,14 +38,17 @@ def test_every_form_of_a_drive_tends_to_the_ideal_one(form, drive, final, order)
     assert worst[0].max() / worst[1].max() < order[1]
 
 
-def test_pid_with_filters_by_hand() -> None:
-    """Ideal form: Kv (1 + 1/(Ti s) + Td s/(TD s + 1)) in front of the closed velocity loop."""
-    base = drive_e()
-    pid = PositionLoop(gain=20.0, integral_time_s=0.2, derivative_time_s=2e-3, derivative_filter_s=1e-3)
+@pytest.mark.parametrize(("Ti", "TD"), [(0.2, 1e-3), (None, 0.0)])
+def test_pid_by_hand(Ti: float | None, TD: float) -> None:
+    """Ideal form: Kv (1 + 1/(Ti s) + Td s/(TD s + 1)) in front of the closed velocity loop.
+
+    A bare D is proper there, as the angle's derivative is a state.
+    """
+    pid = PositionLoop(gain=20.0, integral_time_s=Ti, derivative_time_s=2e-3, derivative_filter_s=TD)
     laws = (PositionLoop(gain=20.0), pid)
-    one, two = (assemble_loops(controlled(base, position=law), "ideal").position for law in laws)
+    one, two = (assemble_loops(controlled(drive_e(), position=law), "ideal").position for law in laws)
     s = 1j * np.geomspace(1, 1000, 10)
-    law = 1 + 1 / (0.2 * s) + 2e-3 * s / (1e-3 * s + 1)
+    law = 1 + (1 / (Ti * s) if Ti else 0.0) + 2e-3 * s / (TD * s + 1)
     np.testing.assert_allclose(two.open_loop(s), law * one.open_loop(s), rtol=1e-9)
 
 
@@ -71,23 +74,6 @@ def test_resistance_and_back_emf_feedforward_make_the_current_loop_ideal() -> No
     assert sampled.periodic  # the speed is measured every other tick
 
 
-def test_faces_of_the_blocks_agree_at_low_frequency() -> None:
-    omega, T = np.array([2.0, 20.0]), 2e-4
-    blocks = [lag(2e-3, T), *(biquad(item, T) for item in FILTERS)]
-    for block in blocks:
-        np.testing.assert_allclose(block.at_z(omega), block.at_s(omega), rtol=1e-3)
-    # the tracking loop takes the angle gained when sampled, the speed when continuous
-    block, z = tracking(400.0, T), np.exp(1j * omega * T)
-    gained = (1 - 1 / z) / (1j * omega)
-    np.testing.assert_allclose(block.at_z(omega) * gained, block.at_s(omega), rtol=5e-3)
-    for item in FILTERS:  # Tustin, prewarped: exact at its own frequency
-        centre, block = item.frequency_rad_s or (500.0 * 1500.0) ** 0.5, biquad(item, T)
-        at = np.array([centre])
-        np.testing.assert_allclose(block.at_z(at), block.at_s(at), rtol=1e-10)
-    with pytest.raises(InputError, match="below pi/T"):
-        biquad(Filter(kind="lowpass", frequency_rad_s=2e4), T)
-
-
 def test_the_given_biquad_goes_to_continuous_time_and_back() -> None:
     item = Filter(kind="biquad", b=(0.2, 0.1, 0.05), a=(-0.9, 0.25))
     block, T = biquad(item, 1e-3), 1e-3
@@ -97,6 +83,8 @@ def test_the_given_biquad_goes_to_continuous_time_and_back() -> None:
     z = np.exp(1j * omega * T)
     by_hand = (0.2 * z**2 + 0.1 * z + 0.05) / (z**2 - 0.9 * z + 0.25)
     np.testing.assert_allclose(block.at_z(omega), by_hand, rtol=1e-12)
+    with pytest.raises(InputError, match="below pi/T"):
+        biquad(Filter(kind="lowpass", frequency_rad_s=2e4), 2e-4)
 
 
 def test_the_budget_has_a_share_for_each_filter() -> None:
@@ -153,14 +141,6 @@ def test_any_loop_goes_through_python_control() -> None:
         assert len(loop.closed_loop.poles()) == loop.closed_loop.nstates
     assert "W" in loops.velocity.open_loop.state_labels
     assert "torque2_0" in assemble_loops(everything(), "ideal").velocity.open_loop.state_labels
-
-
-def test_a_derivative_without_a_filter_is_refused_only_where_it_is_improper() -> None:
-    """A bare D is proper in front of this plant, as the angle's derivative is a state."""
-    base, bare = drive_e(), PositionLoop(gain=20.0, derivative_time_s=2e-3)
-    loop = assemble_loops(controlled(base, position=bare), "ideal").position
-    plain, s = assemble_loops(base, "ideal").position, 1j * np.geomspace(1, 1000, 10)
-    np.testing.assert_allclose(loop.open_loop(s), (1 + 2e-3 * s) * plain.open_loop(s), rtol=1e-8)
 
 
 def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
