@@ -108,9 +108,7 @@ def test_an_override_of_an_unknown_key_is_refused(path: str) -> None:
 def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
     respelled = with_overrides(AMBER, {"motor.inductance": "0.006 mH", "motor.resistance": "0.055 ohm"})
     assert design_hash(respelled) == design_hash(AMBER)
-    text = "# a comment\n" + design_text("ilr33-amber").replace(
-        'source = "tuned here"', 'source = "elsewhere"'
-    )
+    text = "# mine\n" + design_text("ilr33-amber").replace('source = "tuned here"', 'source = "elsewhere"')
     assert design_hash(read_design_text(text, "elsewhere")) == design_hash(AMBER)
     for change in (
         {"motor.inductance": "6.1 uH"},

@@ -141,7 +141,7 @@ def test_correlations_that_contradict_each_other_are_refused() -> None:
         (
             "[motor]",
             "[motor]\nresistance = '1 ohm'",
-            "resistance = 1.0: not allowed beside motor.source_gain",
+            "resistance = 1.0: not allowed beside motor.s",
         ),
         ("243.45 V*s/m", "1 A*s/m", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
     ],
