@@ -31,13 +31,10 @@ def test_every_numeric_key_can_be_read_and_changed(path: str) -> None:
     assert others == {p: parameter_value(AMBER, p) for p in paths_of(AMBER) if p != path}
 
 
-def test_a_changed_value_says_what_it_was() -> None:
+def test_a_changed_value_says_what_it_was_with_its_relative_tolerance_or_the_absolute_one() -> None:
     parameter = with_values(AMBER, {"motor.resistance": 0.06}).parameters["motor.resistance"]
     assert (parameter.value, parameter.text) == (0.06, "0.06 ohm")
     assert parameter.source == "changed from 55 mohm"
-
-
-def test_the_relative_tolerance_follows_and_the_absolute_one_stays() -> None:
     relative = with_values(AMBER, {"load.inertia": 4e-4}).parameters["load.inertia"].tolerance
     assert relative.half_width == pytest.approx(2e-4)
     emps = load_design("emps")
