@@ -130,7 +130,7 @@ def _load(asked: Asked, duration: float) -> LoadMoment:
     # The first time of a recorded command is where the run's clock has its zero
     shift = asked.start - (0.0 if asked.record is None else float(read_columns(asked.record, (0,))[0][0]))
     if not (times[0] + shift < duration and times[-1] + shift >= 0.0):
-        span = f"its rows are from {times[0]:g} to {times[-1]:g} s, the run from {0.0 - shift:g} s"
+        span = f"its rows are from {times[0]:g} to {times[-1]:g} s, the run from {0.0 - shift:g}"
         clock = " on the record's clock" if shift else ""
         raise InputError(f"{span} to {duration - shift:g} s{clock}: no load would act", str(asked.load_file))
     series = loads.series(times + shift, values, where=str(asked.load_file)).series
