@@ -52,9 +52,12 @@ def between_two_gears() -> model.Design:
     return replace(base, gears=(first, second), coupling=replace(base.coupling, after="first"))
 
 
+SKEWED = model.Filter(
+    kind="skewed-notch", zero_rad_s=2500.0, pole_rad_s=3500.0, width_rad_s=2000.0, depth=0.1
+)
 OPEN = replace(drive_d(), controller=model.Controller(period_s=1e-4, computing_delay_s=1.5e-4))
 KINDS = {"open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
-KINDS |= {"every slot": everything(), "two masses": drive_d(), "force source": emps(delay_s=5e-4)}
+KINDS |= {"every slot": everything(), "two masses": drive_d(SKEWED), "force source": emps(delay_s=5e-4)}
 DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
 ESTIMATES = (
     model.Encoder(speed="difference"),
