@@ -2,13 +2,14 @@
 
 from pathlib import Path
 
+from actuator_lti.asked.quantities import shown_unit, with_unit
 from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.result import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import output_unit, unit_words
+from reports.sections.names import in_shown, output_unit
 
 
 def section(result: TuningResult) -> doc.Section:
@@ -66,7 +67,7 @@ def _amount(r: BindingRequirement) -> str:
         return "an unstable loop" if r.relative < 0 else "plenty"
     if _at_limit(r):
         return "nothing"
-    return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
+    return with_unit(abs(r.distance), r.unit, ".3g")
 
 
 def _at_limit(r: BindingRequirement) -> bool:
@@ -105,13 +106,14 @@ def gains(result: TuningResult) -> doc.Block:
 
 def confirmed(result: TuningResult) -> doc.Block:
     def limit(v: RequirementVerdict) -> float | None:
-        return v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum
+        of = v.requirement
+        return in_shown(of.minimum if of.minimum is not None else of.maximum, of.unit)
 
     columns = [
         doc.of("id", "label", "Requirement"),
-        doc.of("value", "value", "Certified", format="sig:4"),
+        doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Certified", format="sig:4"),
         doc.of(limit, "limit", "Limit", format="sig:4"),
-        doc.of(lambda v: unit_words(v.requirement.unit), "unit", "Unit"),
+        doc.of(lambda v: shown_unit(v.requirement.unit)[0], "unit", "Unit"),
         doc.of(lambda v: v.verdict == "met", "met", "Met", format="yesno"),
     ]
     return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)

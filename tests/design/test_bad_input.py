@@ -76,7 +76,15 @@ CASES = {
     "limit in a wrong unit": ([('"15 Hz"', '"15 dB"')], ["requirement.position-bandwidth.minimum", "Hz"]),
     "ratio for decibel": ([('"6 dB"', '"2"')], ["requirement.gain-margin.minimum", "6 dB"]),
     "no limit": ([('minimum = "15 Hz"', "")], ["requirement.position-bandwidth: missing limit"]),
-    "crossed limits": ([('"15 Hz"', '"15 Hz"\nmaximum = "1 Hz"')], ["minimum = 15.0", "at most maximum"]),
+    "crossed limits": ([('"15 Hz"', '"15 Hz"\nmaximum = "1 Hz"')], ["minimum = 15 Hz", "at most maximum = 1 Hz"]),
+    "negative overshoot": (
+        [(FACTS, '[[requirement]]\nid="o"\nquantity="overshoot"\nloop="position"\nmaximum="-3 %"\n[[fact]]')],
+        ["requirement.o.maximum = -3 %", "allowed: at least 0 %"],
+    ),
+    "negative time": (
+        [(FACTS, '[[requirement]]\nid="t"\nquantity="rise_time"\nloop="position"\nmaximum="-20 ms"\n[[fact]]')],
+        ["requirement.t.maximum = -20 ms", "allowed: at least 0 ms"],
+    ),
     "loop for a drive figure": ([('"output_rate"', '"output_rate"\nloop = "every"')], ["output-rate.loop", "no loop"]),
     "tolerance too wide": ([(TOLERANCE, 'tolerance = "150 %"')], ["input_inertia.tolerance", "0, or at least"]),
     "tolerance of a wrong kind": ([(TOLERANCE, 'tolerance = { kind = "gauss" }')], ["tolerance.kind", '"normal"']),

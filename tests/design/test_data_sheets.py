@@ -334,16 +334,6 @@ def test_a_source_that_only_begins_as_those_of_a_sheet_stays() -> None:
     assert again.parameters["friction.dry_torque"] == drive.parameters["friction.dry_torque"]
 
 
-@pytest.mark.parametrize(
-    ("path", "first", "warned"),
-    [("self-locking", "80 %", True), ("self-locking", "50 %", False), ("back-drivable", "80 %", False)],
-)
-def test_a_self_locking_drive_of_good_gears_is_warned_of(path: str, first: str, warned: bool) -> None:
-    """A load drives a stage of efficiency eta with 2 - 1/eta, which is above 0 from one half on."""
-    drive = read_design_text(SHEET.replace("back-drivable", path).replace("80 %", first), "sheet")
-    assert any(line.startswith("load.path: self-locking") for line in warnings_of(drive)) == warned
-
-
 VELOCITY = "[control.velocity]\n"
 CURRENT = f'[control.current]\ngain = "1 V/A"\n{VELOCITY}'
 SPEED_LOOP = f'{VELOCITY}gain = "9 Hz"'

@@ -11,7 +11,6 @@ from actuator_lti.design import (
     with_values,
     write_design,
 )
-from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import write_changed
 from actuator_lti.errors import InputError, Mistakes
 from actuator_lti.loops import assemble_loops
@@ -213,17 +212,6 @@ def test_a_linear_motor_is_asked_for_the_period_of_its_cogging(key: str) -> None
     assert read_design_text(write_design(one), one.origin) == one
 
 
-@pytest.mark.parametrize(("peak", "shown"), [("2.034 A", "2.034 A, but the supply gives only 2.0339 A"),
-    ("3 A", "3 A, but the supply gives only 2.03 A"), ("2.03 A", "")])  # fmt: skip
-def test_amperes_that_differ_are_told_with_digits_that_do(peak: str, shown: str) -> None:
-    """12 V/5.9 ohm are 2.033898 A."""
-    current = '[control.current]\ngain = "9 V/A"\n'
-    lines = warnings_of(
-        read_design_text(DRIVE.replace("[control]", f'peak_current = "{peak}"\n[control]') + current)
-    )
-    assert any(f"limits.peak_current: {shown} at stall" in line for line in lines) is bool(shown)
-
-
 @pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
 @pytest.mark.parametrize(
     ("ampere", "volt", "constants", "units"),
@@ -251,13 +239,6 @@ def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
     drive = read_design_text(motor(constants, torque_constant=kM_text, back_emf_constant=kE_text))
     assert drive.effective_motor.back_emf_constant_Vs_rad == pytest.approx(3**0.5 * 0.02, rel=1e-12)
     assert drive.effective_motor.torque_constant_Nm_A == pytest.approx(3**0.5 * 0.02, rel=1e-12)
-
-
-@pytest.mark.parametrize(("gain", "short"), [("2 V/A", "74.7"), ("53 V/A", ""), ("54 V/A", "")])
-def test_a_current_loop_that_is_short_at_rest_is_warned_of(gain: str, short: str) -> None:
-    """1/(1 + gain/R), R 5.9 ohm, from a tenth on."""
-    lines = warnings_of(read_design_text(f'{DRIVE}[control.current]\ngain = "{gain}"\n'))
-    assert any(f"{short} % short at rest" in line for line in lines) is (gain != "54 V/A")
 
 
 def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> None:
@@ -302,28 +283,6 @@ def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -
     text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
     told_of = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
     assert told_of.endswith("in SI, 0.0127 V*s/rad")
-
-
-@pytest.mark.parametrize(
-    ("ratio", "told_of"), [('"1/86"', True), ('"86/1"', False), ("0.5", True), ("1", False)]
-)
-def test_a_gear_that_speeds_up_is_suspicious(ratio: str, told_of: bool) -> None:
-    warnings = warnings_of(read_design_text(DRIVE.replace("ratio = 19.2", f"ratio = {ratio}")))
-    assert any("faster than the motor" in line for line in warnings) is told_of
-    assert (ratio != '"1/86"') or any('written "86:1"' in line for line in warnings)
-
-
-GEAR = '[[gear]]\nname = "R22"\nratio = 19.2\n'
-SAFE = {"": True, '[load]\npath = "back-drivable"\n': False, "[friction]\nload_coefficient = 1\n": False}
-
-
-@pytest.mark.parametrize(("more", "warned"), SAFE.items())
-@pytest.mark.parametrize("gear", ["", GEAR])
-def test_a_load_that_nothing_feels_is_warned_of(more: str, warned: bool, gear: str) -> None:
-    """Where friction takes less than 1/N of it no drive locks itself."""
-    lines = warnings_of(read_design_text(DRIVE.replace(GEAR, gear + more)))
-    assert any('load.path = "back-drivable"?' in line for line in lines) is warned
-    assert any("load.path: self-locking is assumed" in line for line in lines) is (warned and not gear)
 
 
 def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:

@@ -7,7 +7,6 @@ import pytest
 from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, write_design
 from actuator_lti.design.key_reference import key_reference
-from actuator_lti.design.suspicions import warnings_of
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from nonlinear import commands, simulate
@@ -101,23 +100,6 @@ def test_records_that_are_none(command: list[str], tmp_path, cli) -> None:
     said = cli.refused(*command, table)
     if command[0] == "simulate":
         assert "separate the columns with commas, and write numbers with a decimal point" in said
-
-
-HELD = 5.9e-3 * 12.0 * 2376  # kM i_peak N, without losses
-MOVED = (5.9e-3 * 12.0 - 2.25e-3) / 1.34e-3  # where C0 + CM M is kM i_peak
-
-
-@pytest.mark.parametrize(
-    ("path", "most", "words"),
-    [
-        ("back-drivable", HELD, "more than the drive can hold"),
-        ("self-locking", MOVED, "holds the drive fast"),
-    ],
-)
-def test_more_load_than_the_drive_holds_or_moves_is_warned_of(path: str, most: float, words: str) -> None:
-    for moment, warned in ((0.99 * most, False), (1.01 * most, True)):
-        design = with_overrides(AMBER, {"load.path": path, "load.moment_max": f"{moment} N*m"})
-        assert any(words in line for line in warnings_of(design)) is warned
 
 
 def test_a_command_warns_and_goes_on(cli) -> None:

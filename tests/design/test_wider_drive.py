@@ -13,7 +13,6 @@ from actuator_lti.design.checks_control import TRACKING_LIMIT
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.sections import part_at, template_of, with_part
-from actuator_lti.design.suspicions import elastic_warnings
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive
@@ -157,17 +156,6 @@ SPRING = {"coupling": {**STIFF, "play": "2 mrad"}}
 )  # fmt: skip
 def test_a_drive_train_that_can_be(changes: dict[str, object]) -> None:
     assert with_overrides(AMBER, changes).coupling is not None or not changes
-
-
-def test_a_rigid_stage_that_cannot_hold_its_load_is_warned_of() -> None:
-    low = {"friction.load_coefficient": 0.9 / 2376}
-    (line,) = elastic_warnings(with_overrides(AMBER, low))
-    assert line.startswith("friction.load_coefficient: ")
-    damped = {"coupling": {**SPRING["coupling"], "damping": "0.1 N*m*s/rad"}, "load.path": "back-drivable"}
-    (line,) = elastic_warnings(with_overrides(AMBER, {**damped, **low}))
-    assert line.startswith("coupling.play: ")
-    rubbing = {"load.friction.dry_torque": "0.1 N*m"}
-    assert list(elastic_warnings(with_overrides(AMBER, {**damped, **low, **rubbing}))) == []
 
 
 def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:

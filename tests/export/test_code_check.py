@@ -1,6 +1,5 @@
 """Margins of the compiled code: the exported code meets the loops, and a wrong one would be seen."""
 
-import re
 import zipfile
 
 import pytest
@@ -11,34 +10,8 @@ import reports.exports as exports
 from actuator_lti import load_design
 from actuator_lti.compiled.library import Library
 from analyses.linear.code_check import CodeCheck, check_code
-from nonlinear.export import c_export
 from nonlinear.native import LIBRARY
 from reports.export_documents import check_text, summary
-
-
-def functions_of(text: str) -> dict[str, str]:
-    """Bodies of the functions of a C file by name, however they are linked."""
-    plain = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
-    # of two constants of one name the second carries its module's, whichever comes second
-    plain = re.sub(r"\b(?:ELASTIC_)?LAYOUT_", "", plain)
-    result = re.findall(
-        r"^(?:static )?\w+ \*?(drive_\w+)\(([^)]*)\)\n\{\n(.*?)^\}", plain, re.DOTALL | re.MULTILINE
-    )
-    return {name: f"{arguments}\n{body}" for name, arguments, body in result}
-
-
-def test_what_is_measured_is_what_is_exported() -> None:
-    """Function by function the measured library holds the text of drive.c: tick and preparation."""
-    exported = functions_of(c_export(load_design("ilr33-amber"))["drive.c"])
-    measured = functions_of(LIBRARY.text())
-    both = set(exported) & set(measured)
-    assert {"drive_derive", "drive_init", "drive_prepare_sizes", "drive_motion", "drive_decide"} <= both
-    assert all(exported[name] == measured[name] for name in both)
-    # what only the exported file has: entries that the run does without
-    assert set(exported) - both <= {
-        "drive_retune", "drive_retune_rigid", "drive_retune_elastic",
-        "drive_get", "drive_set_state", "drive_part_of_tick",
-    }  # fmt: skip
 
 
 @needs_compiler

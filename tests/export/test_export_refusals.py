@@ -17,15 +17,14 @@ FILES = {"c emps --no-check": "main.c", "linear emps": "a.json", "fmu emps": "d.
 FMU = ("fmu", "emps", "--plain", "--platform", "linux64")
 
 
-@pytest.mark.parametrize("command", [("c", "emps", "--no-check"), FMU])
 @needs_compiler
+@pytest.mark.parametrize("command", [("c", "emps", "--no-check"), FMU])
 def test_a_folder_that_cannot_be_written(command: tuple[str, ...], tmp_path, cli) -> None:
     """A file in the place of a folder stops the super-user too; ``/proc`` takes no new files from anyone."""
     (tmp_path / "file").write_text("mine")
     for folder in (tmp_path / "file", Path("/proc/1")):
         assert str(folder) in cli.refused("export", *command, "--out", folder / "drive.fmu")
-    assert [path.name for path in tmp_path.iterdir()] == ["file"]
-    assert (tmp_path / "file").read_text() == "mine"
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {"file": "mine"}
 
 
 @pytest.mark.parametrize("command", FILES)
@@ -34,8 +33,7 @@ def test_one_file_that_exists_and_no_other_is_written(command: str, tmp_path, cl
     out = "" if file == "main.c" else file
     (tmp_path / file).write_text("mine")
     assert f"{file}: exists already" in cli.refused("export", *command.split(), "--out", tmp_path / out)
-    assert [path.name for path in tmp_path.iterdir()] == [file]
-    assert (tmp_path / file).read_text() == "mine"
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {file: "mine"}
 
 
 def test_no_compiler_for_a_unit(tmp_path, cli, monkeypatch) -> None:

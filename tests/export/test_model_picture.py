@@ -4,6 +4,7 @@ import io
 import zipfile
 from dataclasses import replace
 from importlib.util import find_spec
+from typing import Any
 
 import matplotlib.image
 import pytest
@@ -48,12 +49,12 @@ def test_names_cannot_break_the_picture() -> None:
 
 @needs_typesetter
 @needs_compiler
-def test_units_carry_it() -> None:
+@pytest.mark.parametrize(("version", "name"), [(2, "model.png"), (3, "documentation/diagram.png")])
+def test_units_carry_it(version: Any, name: str) -> None:
     design = load_design("ctms-motor-position")
-    for version, name in ((2, "model.png"), (3, "documentation/diagram.png")):
-        data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))
-        with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            assert archive.read(name).startswith(b"\x89PNG")
+    data = fmu_bytes(design, version, ("linux64",), picture=model_png(design))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        assert archive.read(name).startswith(b"\x89PNG")
 
 
 def test_without_the_typesetter_there_is_none(monkeypatch) -> None:

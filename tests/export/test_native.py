@@ -159,28 +159,32 @@ def test_a_checkout_compiles_at_its_first_call_and_drops_what_is_old(library: Li
     assert [path.name for path in old.parent.iterdir()] == [library.path().name]
 
 
-def test_without_a_compiler_an_error_says_which(library: Library, monkeypatch) -> None:
-    monkeypatch.setattr(compiler, "system_compiler", lambda: None)
-    monkeypatch.setattr(compiler, "zig_command", lambda: None)
-    with pytest.raises(
-        InputError,
-        match=r"allowed: gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins",
-    ):
-        _ = library.functions
-    assert not library.path().parent.exists()
+def no_compiler(patch: pytest.MonkeyPatch, _: Library) -> None:
+    for name in ("system_compiler", "zig_command"):
+        patch.setattr(compiler, name, lambda: None)
 
 
-def test_a_package_that_cannot_be_written_is_left_alone(library: Library, monkeypatch) -> None:
-    monkeypatch.setattr(os, "access", lambda *_: False)
-    with pytest.raises(
-        InputError, match=r"no compiled kernels of these sources; allowed: python -m nonlinear"
-    ):
-        _ = library.functions
-    assert not library.path().parent.exists()
-
-
-def test_a_library_of_another_machine_is_an_error_of_one_line(library: Library) -> None:
+def of_another_machine(_: pytest.MonkeyPatch, library: Library) -> None:
     library.path().parent.mkdir()
     library.path().write_bytes(b"\x7fELF of another machine")
-    with pytest.raises(InputError, match="does not load"):
+
+
+@pytest.mark.parametrize(
+    ("lack", "words"),
+    [
+        (no_compiler, r"gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins"),
+        (
+            lambda patch, _: patch.setattr(os, "access", lambda *_: False),
+            "no compiled kernels of these sources",
+        ),
+        (of_another_machine, "does not load"),
+    ],
+)
+def test_a_library_that_cannot_be_had_is_one_line_and_none_is_made(
+    lack: Callable[..., None], words: str, library: Library, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lack(monkeypatch, library)
+    before = library.path().parent.exists()
+    with pytest.raises(InputError, match=words):
         _ = library.functions
+    assert library.path().parent.exists() is before

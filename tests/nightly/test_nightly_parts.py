@@ -2,7 +2,6 @@
 
 import subprocess
 
-import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -12,8 +11,8 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
 from analyses.slugs import hashed, slug
 from analyses.validation.row import judged
+from reports import document as doc
 from reports.nightly.cache import Cache, CorruptEntry, sealed
-from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, digest, figures_of
 from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.source import code_version, commits_between
@@ -110,6 +109,15 @@ def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple
     assert found == [(pytest.approx(value, rel=1e-12), "s") for value in night]
 
 
+def test_a_column_without_a_name_of_its_own_is_named_by_the_one_before_it() -> None:
+    columns = [doc.column("loop", "Loop"), *MARGIN_COLUMNS[3:9]]  # gain margin to samples
+    block = doc.table("Margins", columns, [("velocity", 23.1, 997.0, 73.7, 88.5, 2.31, 23.1)])
+    made = figures_of({"sections": [{"id": "margins", "blocks": [block]}]})
+    names = ["Gain margin", "Gain margin at", "Phase margin", "Phase margin at", "Delay margin"]
+    names.append("Delay margin in samples")
+    assert [one.name for one in made] == [f"margins / Margins / velocity / {name}" for name in names]
+
+
 def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(tmp_path) -> None:
     told = pytest.raises(InputError, match=r"process \d+ on .+ since 20\d\d-.*--wait")
     with hold(tmp_path), told, hold(tmp_path):  # by another handle, as another process has
@@ -159,12 +167,6 @@ def test_every_heading_is_a_column_of_the_report_with_its_tolerance() -> None:
         figure = Figure(name=f"margins / A table / Current loop / {column['label']}", value=1.0, unit=unit)
         factor = {"ms": 1e3}.get(unit, 1.0)
         assert Tolerances().pair(figure) == (pytest.approx(quantity.tolerance * factor, rel=1e-12), 1e-3)
-    units = {"dB": 0.01, "deg": 0.05, "%": 0.05, "s": 1e-7, "samples": 0.01, "A": 1e-9}
-    for unit, absolute in units.items():  # a figure of another name has the tolerance of its unit
-        figure = Figure(name="drive / something else", value=1.0, unit=unit)
-        assert Tolerances().pair(figure) == (absolute, 1e-3)
-        allowed = Columns([figure], Tolerances()).allowed(np.array([1e6]), np.array([np.nan]))
-        assert allowed == pytest.approx([1e3])
 
 
 def test_quantities_have_one_tolerance_a_unit_and_a_rule_of_the_study_comes_first() -> None:

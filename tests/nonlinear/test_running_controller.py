@@ -125,12 +125,6 @@ def test_random_controllers(part: int) -> None:
 
 STATE_TICKS, MORE_THAN_A_BLOCK = 60, layout.BLOCK + 44
 NOISE = {"current_noise_A": 0.01, "angle_noise_rad": 1e-4, "output_angle_noise_rad": 1e-6, "jitter_s": 1e-6}
-NAMED = [
-    (part, name)
-    for part, begin in ((layout, "S_"), (elastic_layout, "ES_"))
-    for name in vars(part)
-    if name.startswith(begin) and name != "ES_END"
-]
 
 
 def drives() -> list[model.Design]:
@@ -153,7 +147,6 @@ def command(tick: int) -> float:
 def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space() -> None:
     """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
     assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE
-    assert all(name in part.__annotations__ for part, name in NAMED)
     for design in drives():
         plain, spoilt = Drive(design), Drive(design)
         kinds = state_kinds(plain._p)
@@ -180,29 +173,3 @@ def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space()
         rows["ticks"] = ticks
         rows.series("command", np.array([command(k) for k in range(ticks)]))
         assert rows.trajectory().final.motor_angle_rad == plain.value("angle")
-
-
-def test_something_goes_on_from_every_continuous_number() -> None:
-    """Each of them, moved in one drive or the other, moves another number."""
-    idle = {getattr(part, name): name for part, name in NAMED}
-    for design in drives():
-        drives_of_it = [Drive(design) for _ in range(3)]
-        kinds = state_kinds(drives_of_it[0]._p)
-        idle = {place: name for place, name in idle.items() if kinds[place] == CONTINUOUS}
-        for k in range(0, STATE_TICKS, 4):
-            idle = {place: name for place, name in idle.items() if not moves(*drives_of_it, place, k)}
-            for j in range(4):
-                drives_of_it[0].step(command(k + j))
-    assert list(idle.values()) == ["S_QUEUE"]  # the oldest voltage, which the delay line drops
-
-
-def moves(drive: Drive, twin: Drive, changed: Drive, place: int, tick: int) -> bool:
-    """Whether a number of the state of ``drive`` changes another one within three ticks."""
-    state = drive.get()
-    twin.set(state)
-    state[place] += 2.0 if place == layout.S_OVERLOAD else 1e-3 * (abs(state[place]) + 1e-3)  # felt at 1
-    changed.set(state)
-    for k in range(3):
-        twin.step(command(tick + k))
-        changed.step(command(tick + k))
-    return not np.array_equal(np.delete(twin.get(), place), np.delete(changed.get(), place))

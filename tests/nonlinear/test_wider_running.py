@@ -101,24 +101,6 @@ def test_supply(supply: model.Supply) -> None:
     assert energy.relative_error < 1e-9
 
 
-@pytest.mark.parametrize(("overload", "tau"), [("thermal", 8.490187), ("excess", 8.0)])
-def test_overload_time_at_the_peak(overload: str, tau: float) -> None:
-    """r = 3, 1 s: after one second at the peak the limit falls to the continuous current."""
-    protected = {"peak_current_A": 6.0, "continuous_current_A": 2.0, "peak_time_s": 1.0, "release": 0.5}
-    design = torque_drive(1.0, None, voltage_V=24.0, overload=overload, **protected)
-    Ts = design.controller.period_s
-    drive = Drive(design)
-    out = np.array([drive.control(6.0, 6.0, 0.0, 0.0) for _ in range(round(1.2 / Ts))])
-    at = int(np.argmax(out < 0.0))  # i_ref falls from 6 to 2 while 6 A are measured
-    expected = 1.0 if overload == "thermal" else -8.0 * np.log(1 - 1 / 9)
-    assert at * Ts == pytest.approx(expected, abs=3 * Ts)
-    assert out[at] == 2.0 - 6.0
-    assert drive.value("overloaded") == 1.0
-    x = drive.value("overload")
-    back = next(k for k in range(10**6) if drive.control(6.0, 0.0, 0.0, 0.0) == 6.0)
-    assert back * Ts == pytest.approx(tau * np.log(x / 0.5), abs=3 * Ts)
-
-
 @pytest.mark.parametrize(("amperes", "peak_s"), [(5.0, 0.0), (9.0, 1.0)])
 def test_the_overload_protection_is_not_called_the_current_limit(amperes: float, peak_s: float) -> None:
     """Demand below the peak: the peak never acts; above it: until the protection takes over after 1 s.
@@ -219,25 +201,15 @@ def test_profile_leaves_a_command_within_its_limits_untouched_and_holds_that_of_
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
 
 
-def filtered(count: int = 1, **item: object) -> model.Design:
-    return changed(AMBER, controller={"velocity": {"filters": (model.Filter(**item),) * count}})
-
-
 REFUSED = {
     "need a position or a velocity loop": replace(TORQUE, command=model.Command(rate_rad_s=1.0)),
-    "needs command.acceleration": replace(AMBER, command=model.Command(jerk_rad_s3=1.0)),
     "a mean over": replace(AMBER, command=model.Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
-    "supply.capacitance: missing": replace(AMBER, supply=model.Supply(regenerative=False)),
-    "encoder.bandwidth: missing": changed(AMBER, encoder={"speed": "tracking"}),
-    "below pi/T": filtered(kind="notch", frequency_rad_s=4e4, width_rad_s=1.0),
-    "width = None": filtered(kind="notch", frequency_rad_s=400.0),
-    "at most 8": filtered(9, kind="lowpass", frequency_rad_s=400.0),
-    "unit circle": filtered(kind="biquad", b=(1.0,), a=(-1.0,)),
     "needs a current loop": changed(AMBER, controller={"current": None}, limits={"peak_time_s": 1.0}),
 }
 
 
 @pytest.mark.parametrize("what", REFUSED)
 def test_refusals(what: str) -> None:
+    """Others of a design's own are in tests/design."""
     with pytest.raises(InputError, match=what):
         simulate(REFUSED[what], commands.hold(), 0.01)

@@ -165,16 +165,6 @@ def test_a_chart_is_well_formed_and_says_every_label_once(write) -> None:
     assert "one <b>" in words
 
 
-def test_pictures_and_panels_have_ids_of_their_own() -> None:
-    chart = Chart()
-    for panel in chart.column(1.0, 1.0):
-        panel.points([1, 2], [1, 2], "a")
-        panel.points([1, 2], [2, 1], "b")
-        panel.bar(0.0, 1.0, 2.0, "c", hatch="x")
-    ids = re.findall(r' id="([^"]*)"', page_svg(chart, "f1", "") + page_svg(chart, "f2", ""))
-    assert len(ids) == len(set(ids)) > 10
-
-
 def outlines(centre_deg: float) -> list[tuple[str, np.ndarray, np.ndarray]]:
     panel = Chart().panel()
     nichols_regions(panel, centre_deg, named=False)

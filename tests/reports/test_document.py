@@ -88,10 +88,6 @@ def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
         doc.plain([1j])
 
 
-def test_a_document_survives_writing_and_reading() -> None:
-    assert doc.loads(doc.dumps(made())) == made()
-
-
 @pytest.mark.parametrize(
     ("content", "words"),
     [

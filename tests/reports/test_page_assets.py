@@ -4,7 +4,6 @@ import re
 import shutil
 import subprocess
 from html import unescape
-from importlib.resources import files
 
 import pytest
 
@@ -22,7 +21,6 @@ PAIRS = [
     ("pass", "pass-bg"), ("fail", "fail-bg"), ("warn", "warn-bg"), ("info", "info-bg"),
     ("ink", "fail-bg"), ("muted", "fail-bg"), ("ink", "info-bg"), ("paper", "c1"),
 ]  # fmt: skip
-ROOM = files("reports").joinpath("templates", "page")
 AMBER = load_design("ilr33-amber")
 
 
@@ -65,20 +63,6 @@ def test_text_and_figures_stand_out(scheme: str) -> None:
 def test_nothing_moves_for_a_reader_who_wants_no_motion() -> None:
     assert "prefers-reduced-motion: reduce" in asset("style.css")
     assert "smooth" not in script(live=True)
-
-
-def test_every_module_is_on_the_page_once_behind_its_imports() -> None:
-    text = script(live=True)
-    names = sorted(one.name.removesuffix(".js") for one in ROOM.iterdir() if one.name.endswith(".js"))
-    places = {name: text.index(f"const {name}$ = ") for name in names}
-    assert all(text.count(f"const {name}$ = ") == 1 for name in names)
-    for name in names:
-        source = ROOM.joinpath(f"{name}.js").read_text(encoding="utf-8")
-        assert len(source.splitlines()) <= 250
-        wanted = re.findall(r'^import .* from "\./(\w+)\.js";$', source, re.MULTILINE)
-        assert len(wanted) == source.count("import {"), name
-        assert all(places[other] < places[name] for other in wanted), name
-    assert not re.search(r"^\s*(import|export)\b", text, re.MULTILINE)
 
 
 def test_modules_in_a_circle_are_refused(monkeypatch) -> None:

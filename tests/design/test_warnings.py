@@ -1,0 +1,98 @@
+"""What is only suspicious is warned of, and what is right is not."""
+
+from typing import Any
+
+import pytest
+from test_data_sheets import SHEET
+from test_first_files import DRIVE
+
+from actuator_lti.design import load_design, read_design_text, shipped_designs, warnings_of
+from actuator_lti.design.loader import design_text
+
+GEAR = '[[gear]]\nname = "R22"\nratio = 19.2\n'
+BASES = {
+    "first": DRIVE,
+    "direct": DRIVE.replace(GEAR, ""),
+    "sheet": SHEET,
+    "bare": design_text("ctms-motor-position").partition("[validation]")[0],
+}
+HELD = 5.9e-3 * 12.0 * 2376  # kM i_peak N, without losses
+MOVED = (5.9e-3 * 12.0 - 2.25e-3) / 1.34e-3  # where C0 + CM M is kM i_peak
+BACK = {"load.path": "back-drivable"}
+LOW = {"friction.load_coefficient": 0.9 / 2376}
+PLAY = {"coupling": {"stiffness": "100 N*m/rad", "play": "2 mrad", "damping": "0.1 N*m*s/rad"}, **BACK, **LOW}
+RUBBING = PLAY | {"load.friction.dry_torque": "0.1 N*m"}
+CLAMPED = {"limits.speed": "100 rad/s", "limits.peak_current": "1 A"}
+FEELS, ASSUMED = 'load.path = "back-drivable"?', "load.path: self-locking is assumed"
+
+
+def peak(ampere: str) -> dict[str, Any]:
+    return {"limits.peak_current": ampere, "control.current.gain": "9 V/A"}
+
+
+CASES: list[tuple[str, dict[str, Any], str, bool]] = [
+    ("ilr33-amber", {"control.velocity.integral_time": 5e-5}, "\ncontrol.velocity.integral_time", True),
+    ("ilr33-amber", {"control.computing_delay": 3e-4}, "\ncontrol.computing_delay", True),
+    ("ilr33-amber", {"control.current.gain": 0.2}, "\ncontrol.current.gain", True),
+    ("ilr33-amber", {"control.velocity.gain": 2.0}, "\ncontrol.velocity.gain", True),
+    ("ilr33-amber", {"limits.peak_current": 300.0}, "\nlimits.peak_current", True),
+    ("ilr33-amber", {"load.moment_max": 4.0}, "\nvalidation.loads", True),
+    ("ilr33-amber", {"encoder.speed": "difference"}, "\nencoder.counts_per_rev", True),
+    (
+        "ilr33-amber",
+        {"motor.resistance": {"value": "50 mohm", "grade": "Z"}},
+        "\nmotor.resistance: grade 'Z'",
+        True,
+    ),
+    ("ilr33-amber", {"gear.worm.input_inertia": {"value": "5 g*cm^2", "grade": "X"}}, "\ngear.worm", True),
+    # more than the drive can hold, and than it can move
+    ("ilr33-amber", {**BACK, "load.moment_max": 0.99 * HELD}, "more than the drive can hold", False),
+    ("ilr33-amber", {**BACK, "load.moment_max": 1.01 * HELD}, "more than the drive can hold", True),
+    ("ilr33-amber", {"load.moment_max": 0.99 * MOVED}, "holds the drive fast", False),
+    ("ilr33-amber", {"load.moment_max": 1.01 * MOVED}, "holds the drive fast", True),
+    # a rigid stage that cannot hold its load, and what lets play swing
+    ("ilr33-amber", LOW, "\nfriction.load_coefficient: ", True),
+    ("ilr33-amber", PLAY, "\ncoupling.play: ", True),
+    ("ilr33-amber", PLAY, "\nfriction.load_coefficient: ", False),
+    ("ilr33-amber", RUBBING, "\ncoupling.play: ", False),
+    # limits that clamp nothing where there is nothing that they limit
+    ("bare", CLAMPED, "\nlimits.speed: ", True),
+    ("bare", CLAMPED, "\nlimits.peak_current: ", True),
+    ("bare", {}, "\nvalidation.full_deflection: ", True),
+    # a load drives a stage of efficiency eta with 2 - 1/eta, which is above 0 from one half on
+    ("sheet", {"load.path": "self-locking"}, "\nload.path: self-locking", True),
+    ("sheet", {"load.path": "self-locking", "gear.first.efficiency": "50 %"}, "\nload.path: self", False),
+    ("sheet", {}, "\nload.path: self-locking", False),
+    # 12 V/5.9 ohm are 2.033898 A, told with digits that differ
+    ("first", peak("2.034 A"), "2.034 A, but the supply gives only 2.0339 A at", True),
+    ("first", peak("3 A"), "3 A, but the supply gives only 2.03 A at", True),
+    ("first", peak("2.03 A"), "at stall", False),
+    # a current loop short at rest by 1/(1 + gain/R), R 5.9 ohm, from a tenth on
+    ("first", {"control.current.gain": "2 V/A"}, "74.7 % short at rest", True),
+    ("first", {"control.current.gain": "53 V/A"}, " % short at rest", True),
+    ("first", {"control.current.gain": "54 V/A"}, " % short at rest", False),
+    ("first", {"gear.R22.ratio": "1/86"}, "faster than the motor", True),
+    ("first", {"gear.R22.ratio": "1/86"}, 'written "86:1"', True),
+    ("first", {"gear.R22.ratio": "86/1"}, "faster than the motor", False),
+    ("first", {"gear.R22.ratio": 0.5}, "faster than the motor", True),
+    ("first", {"gear.R22.ratio": 1}, "faster than the motor", False),
+    # a load that nothing feels; where friction takes less than 1/N of it no drive locks itself
+    ("first", {}, FEELS, True),
+    ("first", {}, ASSUMED, False),
+    ("first", BACK, FEELS, False),
+    ("first", {"friction.load_coefficient": 1}, FEELS, False),
+    ("direct", {}, FEELS, True),
+    ("direct", {}, ASSUMED, True),
+    ("direct", BACK, ASSUMED, False),
+    ("direct", BACK, FEELS, False),
+    ("direct", {"friction.load_coefficient": 1}, ASSUMED, False),
+    ("direct", {"friction.load_coefficient": 1}, FEELS, False),
+]
+
+
+@pytest.mark.parametrize(("name", "changes", "words", "warned"), CASES)
+def test_what_is_only_suspicious_is_warned_of(name: str, changes: Any, words: str, warned: bool) -> None:
+    base = load_design(name) if name in shipped_designs() else read_design_text(BASES[name], name)
+    before, after = (words in "\n".join(("", *warnings_of(one))) for one in (base, base.with_values(changes)))
+    assert after is warned
+    assert not (warned and changes and before)
