@@ -62,6 +62,11 @@ class Mistakes(InputError):
         return Mistakes, (self.mistakes,)
 
 
+def as_one(errors: Sequence[InputError]) -> InputError:
+    """One refusal of at least one: itself, or all in their order."""
+    return errors[0] if len(errors) == 1 else Mistakes(errors)
+
+
 class UnstableError(InputError):
     """A question that only a stable closed loop answers; the input is sound, the drive fails (status 1)."""
 

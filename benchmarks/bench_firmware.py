@@ -8,7 +8,7 @@ from actuator_lti import load_design
 from benchmarks.row import Row
 from examples import firmware_controller as firmware
 
-TICKS = 300_000  # half a minute of the drive
+TICKS = 100_000  # ten seconds of the drive
 
 
 def rows() -> Iterator[Row]:

@@ -30,7 +30,7 @@ print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0, counts.rows_o
 def rows(quick: bool = False) -> Iterable[Row]:
     """The rows of this group."""
     yield from _campaign(quick)
-    yield from _intervals(20 if quick else 100)
+    yield from _intervals(20 if quick else 40)
     if EMPS.exists():
         yield _emps()
     yield from _streaming(quick)

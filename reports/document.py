@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
@@ -221,6 +222,8 @@ def facts(items: Iterable[FactItem]) -> Block:
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
 
+GOES_ON = ("", "at")
+"""Labels of columns that go on with the column before them."""
 COMPARISONS = {">=": "≥", "<=": "≤"}
 
 
@@ -242,7 +245,10 @@ def verdict(
 
     ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
     the limit, ``">="`` or ``"<="``; it is kept as it is printed. ``waiver``: see `actuator_lti` ``Waiver``.
+    Times are told in ms.
     """
+    unit, factor = shown_unit(unit)
+    value, limit, distance = (one if one is None else factor * one for one in (value, limit, distance))
     if distance is None and value is not None and limit is not None and comparison in COMPARISONS:
         distance = value - limit if comparison == ">=" else limit - value
     return {

@@ -170,7 +170,7 @@ def _side_by_side(side: SideBySide) -> Table:
 
 def _label(column: Mapping[str, Any]) -> str:
     """Write a column's label and unit in one line; a continuation is set back."""
-    name = column["label"] if column["label"] not in ("", "at") else f"  {column['label']}".rstrip() or " "
+    name = column["label"] if column["label"] not in doc.GOES_ON else f"  {column['label']}".rstrip() or " "
     return f"{name}, {column['unit']}" if column["unit"] and name.strip() else f"{name} {column['unit']}"
 
 

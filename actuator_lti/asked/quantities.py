@@ -16,6 +16,23 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Axis
 
 
+def shown_unit(unit: str) -> tuple[str, float]:
+    """The unit in which reports write figures and limits of a unit, and the factor to it: times are ms."""
+    return ("ms", 1e3) if unit == "s" else ("" if unit == "1" else unit, 1.0)
+
+
+def with_unit(value: float, unit: str, format: str = "g") -> str:
+    """A figure or limit as reports write it.
+
+    Examples
+    --------
+    >>> with_unit(0.0123, "s"), with_unit(-0.5, "1")
+    ('12.3 ms', '-0.5')
+    """
+    name, factor = shown_unit(unit)
+    return f"{value * factor:{format}} {name}".rstrip()
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A figure of merit."""
@@ -33,6 +50,7 @@ class Quantity:
     better: Literal[1, -1]  # whether larger or smaller is better
     linear_unit: str = ""  # in reports of a linear axis, where that differs
     absolute: bool = False  # whether its magnitude counts: a gain margin down as one up, a lead as a lag
+    signed: bool = False  # whether it may be negative, and with it a limit on it
     closed: bool = True  # whether it is a figure of the closed loop, which an unstable one has not
     timed: bool = False  # whether it is one of the step response: stairs of samples, without a slope
     size: float = 1.0  # its usual size: what a distance to a limit of 0 is measured by
@@ -58,8 +76,8 @@ class Quantity:
 
     @property
     def shown(self) -> tuple[str, float]:
-        """The unit in which reports write it, and the factor from its own: times of loops are ms."""
-        return ("ms", 1e3) if self.unit == "s" else ("" if self.unit == "1" else self.unit, 1.0)
+        """The unit in which reports write it, and the factor from its own."""
+        return shown_unit(self.unit)
 
     @property
     def direction(self) -> int:
@@ -107,7 +125,7 @@ _LIST = (
     Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
              "margins.modulus_margin", 1, closed=False, size=0.5, heading="Modulus margin"),
     Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
-             "margins.sensitivity_peak_db", -1, size=6.0, heading="Peak of S",
+             "margins.sensitivity_peak_db", -1, signed=True, size=6.0, heading="Peak of S",
              at_a_glance="fix:2", followed=True, tolerance=0.01),
     Quantity("bandwidth", "Hz", "loop", "closed loop -3 dB", "bandwidth (\N{MINUS SIGN}3 dB)",
              "bandwidth.minus3db_hz", 1, heading="\N{MINUS SIGN}3 dB",
@@ -127,7 +145,7 @@ _LIST = (
     Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
              "output_rate_rad_s", 1, "m/s", source="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
-             "motor current at top speed", "motor_current_A", -1, source="capability"),
+             "motor current at top speed", "motor_current_A", -1, signed=True, source="capability"),
     Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
              "acceleration", "acceleration_rad_s2", 1, "m/s^2", source="capability"),
     Quantity("torque_margin", "1", "drive", "motor torque at rest over what it takes to start against a load",
@@ -148,7 +166,8 @@ _LIST = (
     Quantity("duty_current", "A", "analysis", "rms of the motor current under [duty]",
              "rms current of the duty", "duty.rms_A", -1, source="analysis"),
     Quantity("winding_temperature", "degC", "analysis", "winding under [duty], in the long run",
-             "winding temperature of the duty", "duty.heating.final_degC", -1, source="analysis"),
+             "winding temperature of the duty", "duty.heating.final_degC", -1,
+             signed=True, source="analysis"),
     Quantity("limit_cycle", "deg", "analysis", "largest swing, peak, that a step ends in; judges rest",
              "swing after a step", "limit_cycle_rad", -1, "m", size=0.01, source="analysis"),
     Quantity("corner_gain_margin", "dB", "analysis", "smallest hot, cold, at the worst tolerances",

@@ -1,12 +1,13 @@
 """Physics across keys: what cannot be is refused; what is only suspicious is warned of (`suspicions`)."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
-from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.asked.quantities import QUANTITIES, with_unit
 from actuator_lti.design.checks_control import CONTROL_CHECKS
 from actuator_lti.design.checks_plant import (
     PLANT_CHECKS,
@@ -18,9 +19,10 @@ from actuator_lti.design.checks_plant import (
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
 from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
 from actuator_lti.design.model import Correlation, Design, Requirement
-from actuator_lti.design.sections import part_at, parts_of
+from actuator_lti.design.sections import part_at, parts_of, template_of
 from actuator_lti.files.reading import shown
 
+_NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?\Z")
 CHECKS = "validation"  # what the ids of checks by simulation begin with
 
 
@@ -61,7 +63,22 @@ def out_of_range(design: Design) -> Iterator[Refusal]:
 
 
 def contradictions(design: Design) -> Iterator[Refusal]:
-    """What the relations between keys refuse, of all those whose own keys are read."""
+    """What the relations between keys refuse, of all those whose own keys are read; numbers with units."""
+    for refusal in _contradictions(design):
+        yield _with_unit(design, *refusal)
+
+
+def _with_unit(design: Design, path: str, given: object, allowed: str) -> Refusal:
+    """A refusal whose value, where it is a number alone, has the unit of its key."""
+    field = FIELDS.get(template_of(path))
+    number = isinstance(given, float) or (isinstance(given, str) and _NUMBER.match(given))
+    with suppress(UnreadError):
+        if number and field is not None and (unit := field.unit(Structure.of(design))) != "1":
+            given = f"{float(f'{given}'):g} {unit}"
+    return path, given, allowed
+
+
+def _contradictions(design: Design) -> Iterator[Refusal]:
     for check in FIRST_RELATIONS:
         refused = tuple(readable(check(design)))
         yield from refused
@@ -101,43 +118,56 @@ def _cogging(design: Design) -> Iterator[Refusal]:
 
 
 def _requirements(design: Design) -> Iterator[Refusal]:
-    for number, item in enumerate(design.requirements):
-        for check in (_named_once, _limit, _asked_of):
-            yield from readable(check(design, number, item))
+    known: list[str] = []
+    for number, item in enumerate(design.requirements, 1):
+        named = item.id is not UNREAD and item.id not in known
+        path = f"requirement.{item.id}" if named else f"requirement[{number}]"
+        if not named and item.id is not UNREAD:
+            yield f"{path}.id", shown(item.id), "allowed: each id once"
+        known += [item.id] if named else []
+        for check in (_limited, _not_negative, _in_order, _of_loop, _of_rotor, _of_response):
+            yield from readable(check(design, path, item))
 
 
-def _path_of(design: Design, number: int, item: Requirement) -> str:
-    """A requirement by its id; by its number where an earlier one has the same."""
-    again = any(item.id == other.id for other in design.requirements[:number])
-    return f"requirement[{number + 1}]" if again else f"requirement.{item.id}"
-
-
-def _named_once(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
-    if (path := _path_of(design, number, item)) != f"requirement.{item.id}":
-        yield f"{path}.id", shown(item.id), "allowed: each id once"
-
-
-def _limit(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
-    path = _path_of(design, number, item)
+def _limited(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     if item.minimum is None and item.maximum is None:
         yield path, "", "missing limit; allowed: minimum, maximum or both"
-    elif item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
-        yield f"{path}.minimum", item.minimum, f"allowed: at most maximum = {item.maximum}"
 
 
-def _asked_of(design: Design, number: int, item: Requirement) -> Iterator[Refusal]:
-    """The loop, the rotor and the response that it is of."""
-    path, quantity = _path_of(design, number, item), QUANTITIES[item.quantity]
+def _not_negative(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
+    signed = QUANTITIES[item.quantity].signed
+    for key, limit in (("minimum", item.minimum), ("maximum", item.maximum)):
+        if limit is not None and limit is not UNREAD and limit < 0.0 and not signed:
+            allowed = f"allowed: at least {with_unit(0.0, item.unit)}"
+            yield f"{path}.{key}", with_unit(limit, item.unit), allowed
+
+
+def _in_order(_: Design, path: str, item: Requirement) -> Iterator[Refusal]:
+    if item.minimum is not None and item.maximum is not None and item.minimum > item.maximum:
+        least, most = with_unit(item.minimum, item.unit), with_unit(item.maximum, item.unit)
+        yield f"{path}.minimum", least, f"allowed: at most maximum = {most}"
+
+
+def _of_loop(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
     present = {"every", *design.controller.stages}
-    if quantity.scope == "loop" and item.loop not in present:
+    unsaid = item.quantity is UNREAD  # a loop that is named is one all the same
+    of_loop = item.loop is not None if unsaid else QUANTITIES[item.quantity].scope == "loop"
+    if of_loop and item.loop not in present:
         given = "missing" if item.loop is None else shown(item.loop)
         yield f"{path}.loop", given, f"allowed: {', '.join(sorted(present))}"
-    elif quantity.scope != "loop" and item.loop is not None:
+    elif not of_loop and item.loop is not None:
         yield f"{path}.loop", told(item.loop), f"{item.quantity} is of the drive, no loop"
-    if item.rotor is not None and not ("current" in present and item.loop in ("current", "every")):
+
+
+def _of_rotor(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
+    there = "current" in design.controller.stages
+    if item.rotor is not None and not (there and item.loop in ("current", "every")):
         yield f"{path}.rotor", told(item.rotor), "allowed: of the current loop only"
-    answers = item.loop in ("position", "every") and quantity.of_response
-    if item.to is not None and not (answers and "position" in present):
+
+
+def _of_response(design: Design, path: str, item: Requirement) -> Iterator[Refusal]:
+    there = "position" in design.controller.stages and item.loop in ("position", "every")
+    if item.to is not None and not (there and QUANTITIES[item.quantity].of_response):
         allowed = "allowed: of bandwidth, resonance and step of the position loop only"
         yield f"{path}.to", told(item.to), allowed
 

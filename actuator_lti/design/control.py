@@ -4,6 +4,7 @@ A stage that the drive does not have is ``None``; a limit that it does not have 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import inf, pi
 from typing import Annotated, Any, Literal
 
@@ -255,13 +256,13 @@ class Controller:
     velocity: VelocityLoop | None = None
     current: CurrentLoop | None = None
 
-    @property
+    @cached_property
     def stages(self) -> tuple[Stage, ...]:
         """The loops that there are, outermost first; empty for an open-loop voltage drive."""
         names: tuple[Stage, ...] = ("position", "velocity", "current")
         return tuple(name for name in names if getattr(self, name) is not None)
 
-    @property
+    @cached_property
     def own_law(self) -> tuple[Stage, Law] | None:
         """The stage that has a law of one's own, and the law; None where no stage has."""
         laws = ((stage, getattr(self, stage).law) for stage in self.stages)

@@ -60,9 +60,9 @@ def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) 
     parts = {}
     for name, given in zip((*PARTS, "L"), (A, B, C, D, L), strict=True):
         try:
-            parts[name] = np.asarray(given, dtype=float)
+            parts[name] = np.asarray_chkfinite(given, dtype=float)
         except (ValueError, TypeError):
-            raise InputError(f"{name}: allowed: a matrix of real numbers") from None
+            raise InputError(f"{name}: allowed: a matrix of finite real numbers") from None
     n = isqrt(parts["A"].size)
     if parts["A"].size != n * n or (parts["A"].ndim == 2 and parts["A"].shape != (n, n)):
         raise InputError(f"A: {_shape(parts['A'])}; allowed: as many rows as columns")

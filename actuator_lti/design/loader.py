@@ -113,7 +113,11 @@ def design_from_tree(
     tree: Tree, origin: str, lines: Mapping[str, int] | None = None, folder: Path = Path()
 ) -> Design:
     """Build and check a design from a parsed TOML tree, whose keys stand on these lines of a text."""
-    findings = Findings(origin, lines, folder)
+    return found_design(tree, origin, Findings(origin, lines, folder))
+
+
+def found_design(tree: Tree, origin: str, findings: Findings) -> Design:
+    """The design of a tree, refused with all that is found wrong in it."""
     design = read_tree(tree, origin, findings)
     findings.extend(contradictions(design))
     findings.refuse()

@@ -13,7 +13,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from actuator_lti.errors import InputError, Mistakes
+from actuator_lti.errors import InputError, as_one
 from actuator_lti.files.reading import shown
 from actuator_lti.files.tree import Tree
 
@@ -138,7 +138,7 @@ class Findings:
         if len(errors) > MOST:
             errors[MOST:] = [InputError(f"and {len(errors) - MOST} more mistakes", where=self.where)]
         if errors:
-            raise errors[0] if len(errors) == 1 else Mistakes(errors)
+            raise as_one(errors)
 
     def _line(self, path: str) -> int:
         while path and path not in self.lines:

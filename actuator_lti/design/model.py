@@ -7,6 +7,7 @@ does not have is ``None``; a limit that it does not have is ``inf``.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from math import pi, prod, sqrt
 from typing import Annotated, Any
 
@@ -172,7 +173,7 @@ class Design:
         Raises
         ------
         InputError
-            For a system of another period or shape, and as `with_values`.
+            For a system of another period or shape, an unknown setting, and as `with_values`.
 
         Examples
         --------
@@ -182,9 +183,9 @@ class Design:
         >>> mine.controller.position.law.D
         (60.0,)
         """
-        from actuator_lti.design.with_law import with_law
+        from actuator_lti.design.with_law import with_settings
 
-        return with_law(self, stage, system, inputs, **settings)
+        return with_settings(self, stage, system, inputs, settings)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""
@@ -192,7 +193,7 @@ class Design:
 
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""
-        names = (id, id.rpartition("/")[0])
+        names = (id, f"{id}".rpartition("/")[0])
         return next((item for item in self.waivers if item.requirement in names), None)
 
     @property
@@ -246,7 +247,7 @@ class Design:
         behind = self.gears[self.gears_before_coupling :]
         return _train_inertia(behind) + self.load.inertia_kgm2 / self.ratio_behind_coupling**2
 
-    @property
+    @cached_property
     def effective_motor(self) -> Motor:
         """The motor as the model has it: one constant k, phase-phase R and L, at its temperature.
 

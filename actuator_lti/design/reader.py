@@ -334,11 +334,13 @@ class Reader:
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:
         """A limit in the unit in which its quantity is reported."""
-        known = QUANTITIES.get(quantity) if isinstance(quantity, str) else None
+        near = get_close_matches(f"{quantity}", QUANTITIES, 1, _VERY_NEAR)
+        known = QUANTITIES[near[0]] if near else None
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             return self.refuse(path, raw, "allowed: a number with its unit, as text")
         try:
-            return UNREAD if known is None else self.frame.limit(raw, known.unit_for(self.structure.axis))
+            value = self.frame.limit(raw, known.unit_for(self.structure.axis)) if known else UNREAD
+            return value if known and quantity == known.name else UNREAD
         except (InputError, ValueError) as error:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 
@@ -409,7 +411,7 @@ class Reader:
         if not key:
             return f"{section.path}.{index}"
         if section.label or not isinstance(table, dict):
-            return path if isinstance(name, str) and path not in before else numbered
+            return path if isinstance(name, str) and name and path not in before else numbered
         if name is None:
             self.unread(f"{numbered}.name", 'missing; example: name = "planetary"')
         elif not (isinstance(name, str) and _NAME.match(name)):

@@ -6,6 +6,7 @@ from math import isfinite, nan
 from actuator_lti.files.reading import shown
 
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
+_NOT_FINITE = re.compile(r"\s*[+-]?(?:nan|inf(?:inity)?)\b", re.IGNORECASE)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
 _MILLIONS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3}){2,}(?![0-9,])")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
@@ -110,7 +111,7 @@ def split_quantity(text: str) -> tuple[float, str]:
     text = _POWER_OF_TEN.sub(r"e\1", text.translate(_RAISED) if "10" in text else text)
     match = _NUMBER.match(text)
     if match is None:
-        raise ValueError("a number and a unit are wanted")
+        raise ValueError("must be finite" if _NOT_FINITE.match(text) else "a number and a unit are wanted")
     if millions := _MILLIONS.match(text):
         plain = millions[0].replace(",", "") + text[millions.end() :]
         raise ValueError(f"commas; write {shown(plain)}")

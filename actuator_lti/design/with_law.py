@@ -8,6 +8,7 @@ import numpy as np
 from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS
 from actuator_lti.design.law_sources import PARTS, law_tree
+from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_tree, with_overrides
 from actuator_lti.errors import InputError
@@ -28,7 +29,7 @@ def _columns(system: Any) -> tuple[Any, ...]:
     return block_diag(*A), block_diag(*B), np.hstack(C), np.hstack(D)
 
 
-def _state_space(system: Any) -> tuple[Any, Any, Any, Any, Any]:
+def _state_space(system: Any, name: str = "system") -> tuple[Any, Any, Any, Any, Any]:
     """A, B, C, D and dt of what somebody calls a system; dt is ``None`` where it does not say."""
     if isinstance(system, tuple | list) and len(system) in (4, 5):
         return (*system[:4], system[4] if len(system) == 5 else None)
@@ -40,7 +41,7 @@ def _state_space(system: Any) -> tuple[Any, Any, Any, Any, Any]:
         return (*_columns(system), dt)
     if not all(hasattr(system, part) for part in PARTS):
         raise InputError(
-            f"system = {shown(system)}: allowed: a state space or transfer function of python-control or "
+            f"{name} = {shown(system)}: allowed: a state space or transfer function of python-control or "
             "scipy.signal, or (A, B, C, D, dt)"
         )
     return system.A, system.B, system.C, system.D, dt
@@ -87,17 +88,30 @@ def with_law(
         )
     law = {**law_tree(A, B, C, D, L, dt), "inputs": _inputs(system, inputs), "gain": gain}
     if continuous is not None:
-        *parts, step = _state_space(continuous)
+        *parts, step = _state_space(continuous, "continuous")
         if step:
             raise InputError(f"continuous: sampled, dt = {step}; allowed: a continuous system")
         law["continuous"] = law_tree(*parts)
     return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
 
 
+def with_settings(
+    design: Design, stage: str, system: Any, inputs: Any, settings: Mapping[str, Any]
+) -> Design:
+    """As `with_law`; a setting that it does not take is refused with those that it does."""
+    known = tuple(with_law.__kwdefaults__ or ())
+    for name, value in settings.items():
+        if name not in known:
+            allowed = f"unknown{nearest(name, known)}; allowed: {', '.join(known)}"
+            raise InputError(f"{name} = {shown(value)}: {allowed}")
+    return with_law(design, stage, system, inputs, **settings)
+
+
 def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> tuple[Any, ...]:
     """A continuous system sampled by a stated method."""
     from scipy.signal import cont2discrete
 
+    law_tree(*parts)
     if method not in METHODS:
         raise InputError(f"method = {shown(method)}: allowed: {' or '.join(METHODS)}")
     if dt not in (None, 0) or dt is False:

@@ -84,6 +84,8 @@ class Asked:
                 raise InputError(f"--{name} {value:g}: allowed with --command {', '.join(kinds)}")
         if not self.frequency > 0.0:
             raise InputError(f"--frequency {self.frequency:g}: must be positive")
+        if self.plot is not None and self.plot.suffix.lower() != ".svg":
+            raise InputError(f"--plot {self.plot}: allowed: a name that ends in .svg")
         if self.cycles is not None and self.cycles < 1:
             raise InputError(f"--cycles {self.cycles}: must be at least 1")
 

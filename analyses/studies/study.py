@@ -51,9 +51,11 @@ import numpy as np
 from actuator_lti.bounds import AXIS_POINTS, GRID_AXES, SAMPLES, STUDY_VARIANTS
 from actuator_lti.design import design_tree, load_design, shipped_designs, with_overrides
 from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.loader import found_design
+from actuator_lti.design.mistakes import Findings, lines_of
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_toml, shown, shown_path
+from actuator_lti.errors import InputError, as_one
+from actuator_lti.files.reading import parse_toml, read_text, read_toml, shown, shown_path
 from actuator_lti.files.tree import Tree
 from analyses.slugs import slug
 from analyses.toml_tables import Table
@@ -150,8 +152,12 @@ def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
     With ``keep_going`` a variant that its design's checks refuse is kept, with its error; without, and for
     all else, an `InputError` says file, key, value and what is allowed.
     """
-    tree = read_toml(path, "study file")
-    return study_from_tree(tree, shown_path(path), Path(path).parent, keep_going=keep_going)
+    text, where = read_text(path, "study file"), shown_path(path)
+    tree = parse_toml(text, where)
+    root = Table(tree, "", where)
+    root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
+    extra = [dict(table.data) for table in root.tables("requirement")]
+    return _study(root, _Asked(extra, where, lines_of(text, tree)), Path(path).parent, keep_going=keep_going)
 
 
 def study_of(design: Design) -> Study:
@@ -180,15 +186,31 @@ class _Written:
     motor: str | None = None
 
 
-def study_from_tree(tree: Tree, where: str, folder: Path, *, keep_going: bool = False) -> Study:
-    """Build a study from its parsed tree; designs are looked for beside the file."""
-    root = Table(tree, "", where)
-    root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
-    head = root.table("study").read(_Head)
-    extra = [dict(table.data) for table in root.tables("requirement")]
-    base = _required(_design(head.base, folder), extra, where)
+@dataclass(frozen=True)
+class _Asked:
+    """The requirements of a study, and the lines of its keys."""
+
+    requirements: list[Tree]
+    where: str
+    lines: Mapping[str, int]
+
+    def of(self, design: Design) -> Design:
+        """The design with them, in place of its own with the same id."""
+        if not self.requirements:
+            return design
+        tree = design_tree(design)
+        replaced = [item.get("id") for item in self.requirements]
+        kept = [item for item in tree.get("requirement", []) if item.get("id") not in replaced]
+        tree["requirement"] = [*self.requirements, *kept]  # numbered as in the study
+        return found_design(tree, design.origin or design.name, Findings(self.where, self.lines))
+
+
+def _study(root: Table, asked: _Asked, folder: Path, *, keep_going: bool) -> Study:
+    """Build a study from its tree; designs are looked for beside the file."""
+    where, head = root.origin, root.table("study").read(_Head)
+    base = asked.of(_design(head.base, folder))
     variants = list[Variant]()
-    for variant in _Maker(base, where, folder, extra, keep_going).made(root):
+    for variant in _Maker(base, where, folder, asked, keep_going).made(root):
         variants.append(variant)
         STUDY_VARIANTS.check(len(variants), where)
     first = Variant(base.name, slug(base.name), base)
@@ -225,16 +247,10 @@ def _located(place: str, where: str, make: Callable[[], Design]) -> Design:
     try:
         return make()
     except InputError as error:
-        raise InputError(f"{place}: {error}", where=where) from error
-
-
-def _required(design: Design, extra: list[Tree], where: str) -> Design:
-    """Add the study's requirements, in place of those with the same id."""
-    if not extra:
-        return design
-    replaced = [item.get("id") for item in extra]  # as written: what is no text is refused with its place
-    kept = [item for item in design_tree(design).get("requirement", []) if item.get("id") not in replaced]
-    return _located("requirement", where, lambda: with_overrides(design, {"requirement": [*kept, *extra]}))
+        told = [
+            one.message if one.where == where else str(one) for one in getattr(error, "mistakes", [error])
+        ]
+        raise as_one([InputError(f"{place}: {one}", where=where) for one in told]) from error
 
 
 @dataclass(frozen=True)
@@ -242,7 +258,7 @@ class _Maker:
     base: Design
     where: str
     folder: Path
-    requirements: list[Tree]
+    asked: _Asked
     keep_going: bool
 
     def made(self, root: Table) -> Iterator[Variant]:
@@ -277,7 +293,7 @@ class _Maker:
         def make() -> Design:
             start = self.base
             if origin is not None:
-                start = _required(_design(origin, self.folder), self.requirements, self.where)
+                start = self.asked.of(_design(origin, self.folder))
             return with_overrides(start, overrides) if overrides else start
 
         try:

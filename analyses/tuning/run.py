@@ -7,7 +7,7 @@ from os import PathLike
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.loader import as_design
@@ -217,7 +217,7 @@ def _notes(
         yield f"At the end of what may be set, and so binding too: {', '.join(ends)}."
     for one in confirmed:
         if one.verdict != "met":
-            said = one.reason if one.value is None else f"{one.value:.6g} {one.requirement.unit}"
+            said = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".6g")
             yield f"Not confirmed by certified margins: {one.id}: {said}"
     of_loops = [item for item in problem.design.requirements if item.quantity in LOOP_QUANTITIES]
     if names := [item.id for item in of_loops if not in_populations(item, problem.design)]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from math import isfinite
 
 import numpy as np
@@ -107,7 +108,7 @@ class Run:
     def row(self, tables: Tables) -> Floats:
         """The parameter row of this run; time series go into ``tables``."""
         design = self.design
-        row = design_row(design, friction_on=self.friction_on, limits_on=self.limits_on)
+        row = _design_row(design, self.friction_on, self.limits_on).copy()
         row[at.TICKS] = ticks_of(self.duration_s, design.controller.period_s)
         for place, signal in ((at.COMMAND, self.command), (at.BIAS, self.bias)):
             if signal is not None:
@@ -121,6 +122,12 @@ class Run:
             raise InputError(f"{message} {row[at.TICKS]:.0f} ticks", where=design.name)
         self.reducers.write(row)
         return row
+
+
+@lru_cache(maxsize=16)
+def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
+    """The row of a design alone, kept: a design is mostly run more than once."""
+    return design_row(design, friction_on=friction_on, limits_on=limits_on)
 
 
 def ticks_of(duration_s: float, period_s: float) -> int:

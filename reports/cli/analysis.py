@@ -91,8 +91,7 @@ def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
     if paged:
         made["out"] = (FolderOption, Path(one.out) if one.out else None)
     made["as_json"] = (JsonOption, False)
-    if paged or one.doing:
-        made["quiet"] = (QuietOption, False)
+    made["quiet"] = (QuietOption, False)
     if one.example:
         made["example"] = (_example(one), False)
     return made

@@ -2,7 +2,7 @@
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -51,6 +51,7 @@ AveragesOption = Annotated[
 ]
 PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
 
+OWN = ("report", "margins", "stiffness", "validate")  # documents of sections that a report has by itself
 SHOWN = 8  # of what is not met or not proven
 
 
@@ -82,7 +83,7 @@ def report(
     from reports.cli.errors import leave_with
     from reports.cli.output import print_line
     from reports.cli.progress import progress
-    from reports.document import dumps, load
+    from reports.document import dumps
     from reports.terminal import print_verdict
     from reports.verdict_summary import open_items, verdict_words
 
@@ -94,7 +95,7 @@ def report(
         out,
         validation=validation,
         also=FURTHER if also and "all" in also else also or (),
-        added=[p for path in include or () for p in load(path)["sections"] if p["id"] != "provenance"],
+        added=[part for path in include or () for part in _sections(path)],
         response=response,
         response_of=response_of,
         averages=averages,
@@ -115,3 +116,15 @@ def report(
         left = [f"{len(open_ones) - SHOWN} more, see the page"] * (len(open_ones) > SHOWN)
         print_line("\n".join([*more, *open_ones[:SHOWN], *left, *map(str, written)]))
     leave_with(made["verdict"]["passed"])
+
+
+def _sections(path: Path) -> list[Any]:
+    """The sections of a document that a report may include."""
+    from reports.document import load
+
+    made = load(path)
+    if made["kind"] in OWN:
+        which = "whole report" if made["kind"] == "report" else f"document of {made['kind']}"
+        words = f"--include: a {which}, whose sections a report has by itself"
+        raise InputError(f"{words}; allowed: what identify or correlate wrote with --out", where=str(path))
+    return [part for part in made["sections"] if part["id"] != "provenance"]

@@ -10,6 +10,7 @@ from actuator_lti.asked.quantities import (
     QUANTITIES,
     Quantity,
     judged_loops,
+    shown_unit,
 )
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.signals import LIMITERS
@@ -25,6 +26,7 @@ from reports.live.charts import BORDERS
 from reports.live.keys import Figure, followed
 from reports.live.text import patches
 from reports.sections.limits import COLOURS, WORDS
+from reports.sections.requirements import limit_words
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
 MAP = "The friction of the loops has the slope of the first piece of its map."
@@ -97,12 +99,14 @@ def _point(design: Design, held: Collection[str]) -> str:
 
 def _limit(item: Requirement) -> Tree:
     """Give a requirement as the page judges it: of the whole drive where no ``loop`` is put in."""
-    quantity = QUANTITIES[item.quantity]
+    quantity, (unit, factor) = QUANTITIES[item.quantity], shown_unit(item.unit)
     return {
         **{name: getattr(item, name) for name in ("id", "quantity", "minimum", "maximum")},
         **{name: getattr(quantity, name) for name in ("words", "absolute", "timed")},
         "loop": None,
-        "unit": "" if item.unit == "1" else item.unit,
+        "unit": unit,
+        "factor": factor,
+        "limit": limit_words(item),
     }
 
 

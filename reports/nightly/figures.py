@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import islice
 from typing import Any, TypeGuard
@@ -10,6 +10,7 @@ from typing import Any, TypeGuard
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Tally
 from actuator_lti.files.tree import Tree
+from reports import document as doc
 from reports.nightly.text import one_line
 from reports.verdict_summary import role, verdict_words, walk, why
 
@@ -129,14 +130,24 @@ def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
         counts[label] += 1
         if counts[label] > 1:
             label = f"{label} ({counts[label]})"
-        for column in numeric:
+        for column, heading in zip(numeric, _headings(numeric), strict=True):
             value, shown = row.get(column["key"]), column
-            name = f"{section} / {caption} / {label} / {one_line(column['label'] or column['key'], 40)}"
+            name = f"{section} / {caption} / {label} / {one_line(heading, 40)}"
             if not column["unit"] and "_scale" in row:  # to the unit of the row, whichever tonight's is
                 shown = {**column, "unit": row["_unit"]}
                 value = value / row["_scale"] if _is_number(value) else value
             if value is None or _is_number(value):
                 yield _figure(name, value, shown)
+
+
+def _headings(columns: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Name each column by its label; one that goes on with the column before it by that label as well."""
+    before = ""
+    for column in columns:
+        goes_on = column["label"] in doc.GOES_ON
+        before = before if goes_on else column["label"]
+        more = column["label"] or f"in {column['unit']}"
+        yield f"{before} {more}".strip() if goes_on else before
 
 
 def _figure(name: str, value: object, shown: Mapping[str, Any]) -> Figure:

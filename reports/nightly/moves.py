@@ -20,9 +20,9 @@ from reports.nightly.text import one_line, to_seconds
 
 RELATIVE = 1e-3
 FLOOR = 1e-9  # below it a figure is rounding, whatever its unit
-_IN_UNIT = {("s", "ms"): 1e3}
 _BY_HEADING = {quantity.heading: quantity for quantity in QUANTITIES.values() if quantity.heading}
 _BY_UNIT = {quantity.unit: quantity.tolerance for quantity in LOOP_QUANTITIES.values()} | {"samples": 0.01}
+_BY_UNIT["ms"] = 1e3 * _BY_UNIT["s"]
 MAX_RULES = 200
 
 
@@ -51,7 +51,8 @@ class Tolerances:
         quantity = _BY_HEADING.get(figure.name.rpartition(" / ")[2])
         if quantity is None:
             return _BY_UNIT.get(figure.unit, FLOOR), RELATIVE
-        scale = 1.0 if figure.unit in (quantity.unit, "") else _IN_UNIT.get((quantity.unit, figure.unit), 0.0)
+        shown, factor = quantity.shown
+        scale = 1.0 if figure.unit in (quantity.unit, "") else factor * (figure.unit == shown)
         return quantity.tolerance * scale or FLOOR, RELATIVE
 
 

@@ -23,7 +23,7 @@ from actuator_lti.files.reading import read_toml, shown_path
 from actuator_lti.files.tree import Tree
 from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
-from analyses.studies.study import Variant, is_study, study_from_tree, study_of
+from analyses.studies.study import Variant, is_study, load_study, study_of
 from analyses.toml_tables import Table
 from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.text import one_line, sha256
@@ -143,9 +143,8 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     """
     table = Table({}, "nightly", shown_path(path))
     if is_study(path):
-        tree = read_toml(path, "study file")
-        table = replace(table, data=tree.pop("nightly", {}))
-        file = study_from_tree(tree, table.origin, Path(path).parent, keep_going=True)
+        table = replace(table, data=read_toml(path, "study file").get("nightly", {}))
+        file = load_study(path, keep_going=True)
     else:
         file = replace(study_of(load_design(path)), validation=True)
     plan = table.read(_Nightly, beside=("tolerance",))

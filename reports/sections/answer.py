@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve
+from actuator_lti.asked.quantities import AT_A_GLANCE, QUANTITIES, reserve, shown_unit
 from actuator_lti.design.model import Design
 from analyses.corners.run import Corners
 from analyses.linear.loop_figures import HELD, LoopFigures
@@ -99,7 +99,8 @@ def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]
     for corner in bounds.corners if bounds else ():
         for one in corner.verdicts:
             if one.value is not None and math.isfinite(one.value):
-                found.setdefault((one.id, one.loop), []).append(one.value)
+                factor = shown_unit(one.requirement.unit)[1]
+                found.setdefault((one.id, one.loop), []).append(factor * one.value)
     bars = []
     for item in sorted(known, key=_nearness):
         values = found.get((item["id"], item.get("loop")), [])

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
@@ -136,7 +137,8 @@ def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
     if verdict is None or verdict.value is None:
         return {"text": "none", "status": verdict.role if verdict else "info"}
     change = 0.0 if wanted.value is None else verdict.value - wanted.value
-    return {"text": _with_change(verdict.value, change), "status": verdict.role}
+    factor = shown_unit(wanted.requirement.unit)[1]
+    return {"text": _with_change(factor * verdict.value, factor * change), "status": verdict.role}
 
 
 def _with_change(value: float, change: float) -> str:

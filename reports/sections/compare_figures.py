@@ -5,14 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, drive_cases, shown_unit
 from analyses.comparison.variants import Compared, Comparison
 from analyses.linear.responses import answer_curve, curve, frequency_grid
 from analyses.specification.sensitivity import Sensitivity
 from reports import document as doc
 from reports.charts import style
 from reports.sections.loop_charts import both
-from reports.sections.names import LOOPS
+from reports.sections.names import LOOPS, in_shown
 
 MOST_CURVES = 7
 MOST_BARS = 10
@@ -123,12 +123,15 @@ def _tornado(
 ) -> doc.Block:
     name = next((n for n in comparison.names if n.key == key), None)
     words = f"{LOOPS.get(key.partition('.')[0], 'Drive')}: {name.label if name else key}"
-    base = comparison.sensitivities.base[key]
+    own = name.unit if name else ""
+    unit, factor = shown_unit(own)
+    base, limit = factor * comparison.sensitivities.base[key], in_shown(limit, own)
+    bars = tuple(replace(bar, low=factor * bar.low, high=factor * bar.high) for bar in bars)
     ends = [v for bar in bars for v in (bar.low, bar.high)]
     low, high = min(ends), max(ends)
     near = limit is not None and low - 3 * abs(base - low) <= limit <= high + 3 * abs(high - base)
     chart = style.Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
-    panel = chart.panel(f"{words}, {name.unit}" if name and name.unit else words)
+    panel = chart.panel(f"{words}, {unit}" if unit else words)
     look: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
         panel.bar(float(k), base, bar.low, "parameter low", **look)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from typing import Any
 
+from actuator_lti.asked.quantities import shown_unit, with_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
@@ -19,7 +20,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital, or_none
 from reports.sections.margins import finite
-from reports.sections.names import unit_words
+from reports.sections.names import in_shown, unit_words
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
 from reports.verdict_summary import why
@@ -119,7 +120,8 @@ def _why(result: MonteCarloResult, odds: Odds) -> str:
         return ""
     if case.value is None:
         return "every sample passes, but a loop is unstable in the worst case of the tolerance box"
-    return f"every sample passes, but the worst case of the tolerance box fails: {case.value:.4g} {case.unit}"
+    said = with_unit(case.value, case.unit, ".4g")
+    return f"every sample passes, but the worst case of the tolerance box fails: {said}"
 
 
 def _unproven(odds: Odds, enough: float) -> str:
@@ -134,6 +136,9 @@ def _unproven(odds: Odds, enough: float) -> str:
 
 
 def _odds_table(result: MonteCarloResult) -> doc.Block:
+    def worst_case(odds: Odds) -> float | None:
+        return in_shown(getattr(result.case(odds), "value", None), odds.unit)
+
     share: dict[str, Any] = {"unit": "%", "scale": 100.0, "format": "fix:3"}
     columns = [
         doc.of("label", "label", "Requirement"),
@@ -142,11 +147,11 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
         doc.of("probability", "probability", "Probability met", **share, better=1),
         doc.of("low", "low", "95\u00a0% lower bound", **share),
         doc.of("high", "high", "95\u00a0% upper bound", **share),
-        doc.of("nominal", "nominal", "Nominal", format="sig:4"),
-        doc.of("worst", "sampled", "Worst sample", format="sig:4"),
+        doc.of(lambda odds: in_shown(odds.nominal, odds.unit), "nominal", "Nominal", format="sig:4"),
+        doc.of(lambda odds: in_shown(odds.worst, odds.unit), "sampled", "Worst sample", format="sig:4"),
         doc.of("worst_sample", "number", "No.", align="right"),
-        doc.of(lambda odds: getattr(result.case(odds), "value", None), "worst", "Worst case", format="sig:4"),
-        doc.of("unit", "unit", "Unit"),
+        doc.of(worst_case, "worst", "Worst case", format="sig:4"),
+        doc.of(lambda odds: shown_unit(odds.unit)[0], "unit", "Unit"),
     ]
     note = "A dash in the worst case: not computed, or a loop is unstable there."
     return doc.listing(
@@ -205,22 +210,24 @@ def _figures(result: MonteCarloResult) -> list[doc.Block]:
 
 def _histogram(panel: style.Panel, result: MonteCarloResult, odds: Odds, column: ColumnStatistics) -> None:
     """Fill the counts under a line; mark limits, nominal design and worst case, each with its own dash."""
-    edges, counts = [e for e in column.edges if math.isfinite(e)], column.counts
+    unit, scale = shown_unit(column.unit)
+    edges, counts = [scale * e for e in column.edges if math.isfinite(e)], column.counts
     x = [edges[0], *(e for edge in edges[1:-1] for e in (edge, edge)), edges[-1]]
     y = [float(c) for count in counts for c in (count, count)]
     panel.shape([([x[0], *x, x[-1]], [0.0, *y, 0.0])], colour=style.SKY, opacity=0.45)
     panel.curve(x, y, colour=style.BLUE, width=1.3, read=False)
     panel.y.limits(0.0, 1.35 * max(counts))
     case, alone = result.case(odds), len(odds.columns) == 1
-    nominal = finite(result.nominal.get(column.name))
-    worst = finite(case.value) if case is not None and alone else None
+    nominal = in_shown(finite(result.nominal.get(column.name)), column.unit)
+    worst = in_shown(finite(case.value), column.unit) if case is not None and alone else None
     for name, value, colour, dash in (("nominal", nominal, style.INK, 0), ("worst", worst, style.ORANGE, 1)):
         if value is not None:
             panel.rule_x(value, label=name, seen=True, colour=colour, dash=dash, width=1.7)
     known = [*edges, *style.known((nominal, worst))]
     low, high = min(known), max(known)
-    width, unit = max(high - low, 1e-3 * max(abs(high), 1e-9)), unit_words(column.unit)
-    for name, value in (("minimum", odds.minimum), ("maximum", odds.maximum)):
+    width = max(high - low, 1e-3 * max(abs(high), 1e-9))
+    for name, limit in (("minimum", odds.minimum), ("maximum", odds.maximum)):
+        value = in_shown(limit, column.unit)
         if value is not None and low - 2 * width <= value <= high + 2 * width:
             panel.rule_x(value, label="limit", seen=True, colour=style.RED, dash=2, width=1.7)
         elif value is not None:

@@ -6,6 +6,7 @@ import math
 from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import QUANTITIES as REGISTRY
+from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.design.model import Design
 from reports import document as doc
 
@@ -75,6 +76,11 @@ def push_words(design: Design) -> str:
 def unit_words(unit: str) -> str:
     """A unit as it is printed: of a ratio none."""
     return "" if unit == "1" else unit
+
+
+def in_shown(value: float | None, unit: str) -> float | None:
+    """A figure in the unit in which reports write those of a unit."""
+    return None if value is None else shown_unit(unit)[1] * value
 
 
 def hertz(omega_rad_s: float | None) -> float | None:

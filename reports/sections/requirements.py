@@ -4,12 +4,13 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Requirement
 from analyses.monte_carlo.result import Odds
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
-from reports.sections.names import QUANTITIES, unit_words
+from reports.sections.names import QUANTITIES
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
@@ -40,7 +41,7 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
     source += f" ({note})" if note and note != source else ""
     waiver = verdict.waiver.words if verdict.waiver else ""
     known: dict[str, Any] = {"value": verdict.value, "limit": limit, "distance": verdict.distance}
-    known |= {"comparison": comparison, "unit": unit_words(requirement.unit), "source": source}
+    known |= {"comparison": comparison, "unit": requirement.unit, "source": source}
     known |= {"reason": verdict.reason or unlimited, "waiver": waiver}
     made = doc.verdict(verdict.id, label(verdict, load_unit), passed=None, **known)
     return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
@@ -58,10 +59,11 @@ def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:
 
 
 def limit_words(of: Requirement | Odds) -> str:
-    """Write both limits of a requirement as the design file has them, with the unit."""
-    parts = [f"≥ {of.minimum:g}"] if of.minimum is not None else []
-    parts += [f"≤ {of.maximum:g}"] if of.maximum is not None else []
-    return f"{' and '.join(parts)} {unit_words(of.unit)}".rstrip()
+    """Write both limits of a requirement with the unit."""
+    unit, factor = shown_unit(of.unit)
+    limits = (("≥", of.minimum), ("≤", of.maximum))
+    parts = [f"{sign} {factor * limit:g}" for sign, limit in limits if limit is not None]
+    return f"{' and '.join(parts)} {unit}".rstrip()
 
 
 def _limit(verdict: RequirementVerdict) -> tuple[float | None, str]:

@@ -2,17 +2,21 @@
 
 from pathlib import Path
 
+from actuator_lti.asked.quantities import shown_unit, with_unit
+from actuator_lti.design.access import located
+from actuator_lti.design.fields import Structure
+from actuator_lti.design.model import Design
 from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.result import BindingRequirement, TuningResult
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import output_unit, unit_words
+from reports.sections.names import in_shown, output_unit
 
 
 def section(result: TuningResult) -> doc.Section:
-    verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
+    verdicts = doc.verdicts(_verdict(r, result.before) for r in result.requirements)
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
         *([confirmed(result)] if result.confirmed else []),
@@ -66,7 +70,7 @@ def _amount(r: BindingRequirement) -> str:
         return "an unstable loop" if r.relative < 0 else "plenty"
     if _at_limit(r):
         return "nothing"
-    return f"{abs(r.distance):.3g}{'' if r.unit == '1' else ' ' + r.unit}"
+    return with_unit(abs(r.distance), r.unit, ".3g")
 
 
 def _at_limit(r: BindingRequirement) -> bool:
@@ -74,8 +78,11 @@ def _at_limit(r: BindingRequirement) -> bool:
     return 0.0 <= r.relative < 1e-4
 
 
-def _verdict(r: BindingRequirement) -> doc.VerdictItem:
-    corner = "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
+def _verdict(r: BindingRequirement, design: Design) -> doc.VerdictItem:
+    structure = Structure.of(design)
+    units = {path: located(design, path)[0].unit(structure) for path in r.corner}
+    said = (f"{path} {with_unit(value, units[path], '.4g')}" for path, value in r.corner.items())
+    corner = "; ".join(said) or "nominal"
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,
@@ -105,13 +112,14 @@ def gains(result: TuningResult) -> doc.Block:
 
 def confirmed(result: TuningResult) -> doc.Block:
     def limit(v: RequirementVerdict) -> float | None:
-        return v.requirement.minimum if v.requirement.minimum is not None else v.requirement.maximum
+        of = v.requirement
+        return in_shown(of.minimum if of.minimum is not None else of.maximum, of.unit)
 
     columns = [
         doc.of("id", "label", "Requirement"),
-        doc.of("value", "value", "Certified", format="sig:4"),
+        doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Certified", format="sig:4"),
         doc.of(limit, "limit", "Limit", format="sig:4"),
-        doc.of(lambda v: unit_words(v.requirement.unit), "unit", "Unit"),
+        doc.of(lambda v: shown_unit(v.requirement.unit)[0], "unit", "Unit"),
         doc.of(lambda v: v.verdict == "met", "met", "Met", format="yesno"),
     ]
     return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)

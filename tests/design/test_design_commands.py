@@ -55,7 +55,7 @@ def test_init_does_not_overwrite_without_being_told(tmp_path, cli) -> None:
     path.write_text("precious")
     assert "--force" in cli.refused("init", path)
     assert path.read_text() == "precious"
-    assert main(["init", str(path), "--force"]) == 0
+    assert main(["init", str(path), "--force", "--quiet"]) == 0
     assert load_design(path).name == "mine"
 
 

@@ -12,6 +12,7 @@ from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.sections import template_of
 from actuator_lti.design.writing import _override
 from actuator_lti.errors import InputError, Mistakes
+from analyses.studies.study import load_study
 
 AMBER = load_design("ilr33-amber")
 RATIO = {"gear.planetary.ratio", "gear.worm.ratio"}
@@ -153,6 +154,52 @@ def test_a_motor_with_a_mistake_does_not_hide_that_its_supply_cannot_reach_the_s
     assert key in wrong
     assert "limits.speed = 3142 rad/s: the supply cannot reach it" in speed
     assert f"= {top_rad_s:.4g} rad/s" in speed
+
+
+REQUIREMENTS = """
+[[requirement]]
+id = "a"
+quantity = "phase_margn"
+loop = "positon"
+rotor = "locked"
+minimum = "30 mm"
+colour = "red"
+[[requirement]]
+id = ""
+quantity = "overshoot"
+loop = "spin"
+maximum = "-3 %"
+to = "reference"
+[[requirement]]
+quantity = "rise_time"
+loop = "position"
+minimum = "30 ms"
+maximum = "20 ms"
+rotor = "free"
+"""
+WRONG = {
+    "quantity": (3, "phase_margin"), "loop": (4, "every, position"), "rotor": (5, "current loop only"),
+    "minimum": (6, "deg"), "colour": (7, "unknown key"), "[2].id": (9, "allowed: a text"),
+    "[2].loop": (11, "every, position"), "[2].maximum": (12, "at least 0 %"),
+    "[2].to": (13, "position loop only"),
+    "[3].id": (14, "missing"), "[3].minimum": (17, "at most maximum = 20 ms"),
+    "[3].rotor": (19, "current loop only"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("study", [False, True])
+def test_all_mistakes_of_requirements_are_told_with_their_lines(study: bool, tmp_path: Any) -> None:
+    head = '[study]\nbase = "emps"' if study else design_text("emps").partition("[[requirement]]")[0]
+    path = tmp_path / "my.toml"
+    path.write_text(head + REQUIREMENTS, encoding="utf-8")
+    with pytest.raises(Mistakes) as caught:
+        (load_study if study else load_design)(path)
+    told, above = str(caught.value).split("\n"), head.count("\n") + 1
+    assert len(told) == len(WRONG)
+    for (key, (line, words)), said in zip(WRONG.items(), told, strict=True):
+        assert f"my.toml: line {above + line}: requirement" in said
+        assert f".{key}".replace(".[", "[") in said
+        assert words in said
 
 
 def _told_lines(text: str) -> list[str]:

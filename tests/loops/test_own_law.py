@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import replace
-from math import floor, inf, pi
+from math import floor, inf, nan, pi
 from pathlib import Path
 from typing import Any
 
@@ -244,7 +244,18 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "as many rows as columns" in made(([[0.5, 1.0]], [[1.0]], [[1.0]], [[0.0]], T))
     assert "real numbers" in made(([["a"]], [[1.0]], [[1.0]], [[0.0]], T))
     assert "real numbers" in made(([[1j]], [[1.0]], [[1.0]], [[0.0]], T))
-    assert "number" in made(([[inf]], [[1.0]], [[1.0]], [[0.0]], T))
+    for bad in (nan, inf):
+        sheet = ([[bad]], [[1.0]], [[1.0]], [[0.0]])
+        said = [
+            made((*sheet, T)),
+            made(sheet, method="zoh"),
+            made(unit, continuous=sheet),
+            made(unit, L=[bad]),
+        ]
+        said += [made(unit, gain=bad), made(unit, every=bad), made((*unit[:4], bad))]
+        assert all("finite" in words and "allowed" in words for words in said)
+    assert made(unit, gian=1).startswith('gian = 1: unknown (nearest known: "gain"); allowed: L, gain, every')
+    assert "continuous = nan: allowed: a state space" in made(unit, continuous=nan)
     assert "at most 16" in made((np.eye(17), np.ones((17, 1)), np.ones((1, 17)), [[0.0]], T))
     assert "one a state" in made(unit, L=[1.0, 2.0])
     for none in ("k.mat", lambda e: e, 3.0, (1, 2)):
@@ -257,6 +268,9 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
         assert said.split("control.velocity.", 1)[1].startswith(key)
         assert "not allowed beside control.velocity.law" in said
     notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz"}
+    for bad in (nan, inf):
+        words = f'.frequency = "{bad} rad/s": must be finite; allowed: a number with a unit like rad/s'
+        assert words in refused(lambda: base.add_filter("velocity", **{**notch, "frequency": bad}))  # noqa: B023
     assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
     assert "without encoder.filter_time" in refused(twice.with_values, {"encoder.filter_time": "1 ms"})
     force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, emps, sprung, without
+from loop_designs import controlled, sprung
 from two_mass import drive_d, drive_e
 
 from actuator_lti import InputError, assemble_loops, stability_margins
@@ -13,22 +13,19 @@ from actuator_lti.batch import Population, drive_figures, linear_figures, variab
 from actuator_lti.batch._figures import DC_GAIN
 from actuator_lti.design import load_design, parameter_value, with_overrides, with_values
 from actuator_lti.design.access import stacked
-from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
+from actuator_lti.design.model import Command, Design, Encoder, Filter, PositionLoop
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
+from tests.validation.random_drives import drives
 
 FILTERS = (
     Filter(kind="lowpass", frequency_rad_s=2000.0, order=2),
     Filter(kind="notch", frequency_rad_s=900.0, width_rad_s=300.0, depth=0.1),
     Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=1500.0),
     Filter(kind="lowpass", frequency_rad_s=3000.0, on="speed"),
-)
-MAP = tuple(
-    FrictionPoint(speed_rad_s=speed, torque_Nm=torque)
-    for speed, torque in ((0.0, 3e-3), (20.0, 2e-3), (90.0, 2.6e-3), (400.0, 4e-3))
 )
 STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
@@ -57,20 +54,7 @@ def bent() -> Design:
     return replace(base, coupling=replace(base.coupling, **bends))
 
 
-DRIVES = {
-    "cascade": amber(2, 10, delay_s=1.5e-4),
-    "difference": amber(encoder=Encoder(speed="difference", difference_samples=3, filter_time_s=2e-4)),
-    "elastic load": amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0)),
-    "no current": without(amber(), "current", gain=0.01),
-    "no velocity": without(amber(), "velocity", gain=1.0),
-    "position only": without(amber(), "current", "velocity", gain=0.05),
-    "force source": emps(delay_s=5e-4),
-    "speed drive": drive_d(),
-    "torque drive": controlled(drive_d(), velocity=None),
-    "everything": everything(),
-    "friction map": replace(amber(), friction=replace(amber().friction, points=MAP)),
-    "bent spring": bent(),
-}
+DRIVES = {one.name: one for one in (everything(), replace(bent(), name="bent"), *drives(90_310, 10))}
 
 
 def scattered(design: Design, count: int) -> dict[str, Any]:
@@ -130,7 +114,7 @@ def same(blocks: list[Any], k: int) -> None:
 @pytest.mark.parametrize(
     ("design", "k", "loop", "told"),
     [
-        (DRIVES["speed drive"], 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
+        (drive_d(), 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
         (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
         (sprung("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
         (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there

@@ -121,28 +121,6 @@ def test_a_direct_feed_through_next_to_minus_one_is_well_posed_until_the_data_ca
         stability_margins(control.tf([-1 + 1e-15, 1], [1, 2]))
 
 
-@pytest.mark.parametrize("sampled", [False, True])
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("seed", range(12))
-def test_state_spaces_with_integrators_have_an_answer(
-    order: int, seed: int, sampled: bool, capfd: pytest.CaptureFixture[str]
-) -> None:
-    rng = np.random.default_rng([order, seed])
-    zeros, lag = 10.0 ** rng.uniform(-1, 0, order - 1), 10.0 ** rng.uniform(1, 2)
-    crossover = 10.0 ** rng.uniform(0.3, 0.7)
-    loop = control.tf(crossover * np.poly(-zeros), [1, *[0] * order]) * control.tf([lag], [1, lag])
-    states, Q = control.ss(loop), np.linalg.qr(rng.standard_normal((order + 1, order + 1)))[0]
-    if sampled:
-        states, Q = control.c2d(states, 0.3 / lag), np.eye(order + 1)
-    parts = (Q.T @ states.A @ Q, Q.T @ states.B, states.C @ Q, states.D)
-    given = control.StateSpace(*parts, states.dt, remove_useless_states=False)
-    m = stability_margins(given)
-    expected = truth_of(given)
-    assert m.stable is (expected.unstable == 0)
-    assert [p.deg for p in m.phase_margins] == pytest.approx([deg for _, deg in expected.phases], abs=1e-6)
-    assert capfd.readouterr() == ("", "")
-
-
 @pytest.mark.parametrize("seed", range(24))
 def test_slow_sampled_loops_keep_thirteen_digits(seed: int) -> None:
     loop = sampled_slowly_moving(np.random.default_rng([seed, 5]))  # poles down to 1e-6 a sample

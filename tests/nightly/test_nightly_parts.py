@@ -11,6 +11,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
 from analyses.slugs import hashed, slug
 from analyses.validation.row import judged
+from reports import document as doc
 from reports.nightly.cache import Cache, CorruptEntry, sealed
 from reports.nightly.figures import Figure, digest, figures_of
 from reports.nightly.moves import Tolerances, read_tolerances
@@ -106,6 +107,15 @@ def test_a_time_is_compared_in_seconds_whatever_unit_it_is_shown_in(night: tuple
         made = figures_of({"sections": [{"id": "validation", "blocks": [block]}]})
         found += [(f.value, f.unit) for f in made if f.name.endswith("/ Predicted")]
     assert found == [(pytest.approx(value, rel=1e-12), "s") for value in night]
+
+
+def test_a_column_without_a_name_of_its_own_is_named_by_the_one_before_it() -> None:
+    columns = [doc.column("loop", "Loop"), *MARGIN_COLUMNS[3:9]]  # gain margin to samples
+    block = doc.table("Margins", columns, [("velocity", 23.1, 997.0, 73.7, 88.5, 2.31, 23.1)])
+    made = figures_of({"sections": [{"id": "margins", "blocks": [block]}]})
+    names = ["Gain margin", "Gain margin at", "Phase margin", "Phase margin at", "Delay margin"]
+    names.append("Delay margin in samples")
+    assert [one.name for one in made] == [f"margins / Margins / velocity / {name}" for name in names]
 
 
 def test_the_second_nightly_says_who_holds_the_lock_and_gets_it_once_it_is_free(tmp_path) -> None:

@@ -62,6 +62,7 @@ def test_json_and_files_and_a_linear_axis_in_metres(run, tmp_path) -> None:
         ("--frequency 2", "--frequency 2: allowed with --command sine, triangle"),
         ("--command sine --to 20", "--to 20: allowed with --command chirp"),
         ("--command chirp --seed 4", "--seed 4: allowed with --command multisine"),
+        ("--plot run.png", "--plot run.png: allowed: a name that ends in .svg"),
         ("--command sine --frequency -2", "--frequency -2: must be positive"),
     ],
 )

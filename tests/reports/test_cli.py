@@ -132,6 +132,10 @@ def test_report_writes_both_files_and_gives_the_document(tmp_path, cli) -> None:
     told = cli.data("report", "ctms-motor-position", "--out", tmp_path, "--no-validation")
     assert told == json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert sorted(os.listdir(tmp_path)) == ["report.html", "report.json"]
+    said = cli.refused("report", "--include", tmp_path / "report.json", "--out", tmp_path / "again")
+    assert "report.json: --include: a whole report" in said
+    assert "allowed: what identify or correlate wrote" in said
+    assert not (tmp_path / "again").exists()
 
 
 def test_an_interrupted_command_says_so(monkeypatch, cli) -> None:

@@ -21,8 +21,8 @@ COMMANDS = commands()
 @pytest.mark.parametrize("one", ANALYSES, ids=lambda one: one.name)
 def test_every_field_of_a_request_is_an_option_of_the_command(one: Analysis) -> None:
     given = {parameter.name: parameter for parameter in COMMANDS[one.name].params}
-    common = {"as_json", *(["example"] if one.example else []), *(["quiet"] if one.doing else [])}
-    common |= set() if one.alone else {"design", "changes"} | ({"out", "quiet"} if one.page else set())
+    common = {"as_json", "quiet", *(["example"] if one.example else [])}
+    common |= set() if one.alone else {"design", "changes"} | ({"out"} if one.page else set())
     if one.request is None:
         assert set(given) == common
         return

@@ -45,13 +45,12 @@ const placed = (item) => (item.loop ? LOOP_NAMES[item.loop] : item.load ? `at ${
 const demands = (all, was) => {
   const box = find("table.demands"), right = (words, bad) => html("td", bad ? "right bad" : "right", words);
   box.closest("details").hidden = !all.length;
-  const limit = ({ minimum, maximum }) => [minimum !== null ? `≥ ${minus(String(minimum))}` : "", maximum !== null ? `≤ ${minus(String(maximum))}` : ""].filter(Boolean).join(", ");
-  const found = ({ item, value, words }) => words || `${digits(calm(value, item.unit), 4)} ${item.unit}`;
+  const found = ({ item, value, words }) => words || `${digits(calm(value * item.factor, item.unit), 4)} ${item.unit}`;
   const rows = all.map((one, k) => {
     const { item, value, met } = one, th = heading(item.words[0].toUpperCase() + item.words.slice(1), "left", "row");
     th.title = item.id;
     const verdict = html("span", `mark ${met === null ? "warn" : met ? "pass" : "fail"}`, met === null ? "not proven" : met ? "met" : was[k].met === false ? "not met" : "now not met");
-    return html("tr", { dataset: { id: item.id, loop: item.loop || "", value, met } }, th, html("td", "left", placed(item)), right(`${limit(item)} ${item.unit}`), right(found(was[k])), right(found(one), met === false), html("td", "left", verdict));
+    return html("tr", { dataset: { id: item.id, loop: item.loop || "", value, met } }, th, html("td", "left", placed(item)), right(minus(item.limit)), right(found(was[k])), right(found(one), met === false), html("td", "left", verdict));
   });
   fill(box, [...["Requirement", "Where"].map((words) => heading(words)), ...["Limit", "As designed", "As changed"].map((words) => heading(words, "right")), heading("Verdict")], rows);
 };
