@@ -52,26 +52,6 @@ def crossings(loop: control.TransferFunction) -> list[float]:
     return [g.frequency_rad_s for g in stability_margins(loop).gain_margins if g.frequency_rad_s > 0]
 
 
-TUSTIN = np.polymul([1, 1], [1, -0.3])
-ENDS = {
-    "a negative gain at rest": control.tf([-0.5], [1, 1]),
-    "a negative feed-through": control.tf([-0.5, 1], [1, 2]),
-    "a Tustin derivative, a pole at z = -1": control.tf([-0.05, 0.05], TUSTIN, 0.01),
-    "the same, unstable": control.tf([0.05, -0.05], TUSTIN, 0.01),
-    "a hidden unstable mode": control.StateSpace(
-        np.diag([-2.0, 1.0]), [[3.0], [0.0]], [[1.0, 1.0]], [[0.0]], remove_useless_states=False
-    ),
-}
-
-
-@pytest.mark.parametrize("name", ENDS)
-def test_ends_of_the_axis_and_modes_beside_it_against_exact_rationals(name: str) -> None:
-    for loop in (ENDS[name], control.ss(ENDS[name])):
-        m = stability_margins(loop)
-        assert m.agreement.agree
-        assert difference(m, truth_of(loop)) is None
-
-
 def test_closed_loop_pole_on_the_border_is_not_stable() -> None:
     m = stability_margins(control.tf([1], [1, 0, 0]))
     assert m.stable is False
