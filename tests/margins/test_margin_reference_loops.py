@@ -75,6 +75,9 @@ LOOPS = {
     "L11, one": PI_ON_ZERO,
     "L11, two": PI_ON_ZERO * control.tf([2, 1], [1, 0]) * control.tf([1, 0], [1, 1]),
     "L11, a pair": control.tf([1, 0, 4], np.polymul([1, 2, 1, 0], [1, 0, 4])),
+    "-199.969 dB on a flank, where the gain changes by half over 2e-6 of the frequency": control.tf(
+        [176428.16345642603], [1.0, 1.3639956574524499, 90.6503255340668, 0.020975871825282644,
+                               1.3937895453163396]),
     "a negative gain at rest": control.tf([-0.5], [1, 1]),
     "a negative feed-through": control.tf([-0.5, 1], [1, 2]),
     "a Tustin derivative, a pole at z = -1": control.tf([-0.05, 0.05], TUSTIN, 0.01),
