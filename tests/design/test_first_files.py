@@ -287,9 +287,7 @@ def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -
 
 def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
     file = tmp_path / "direct.toml"
-    file.write_text(
-        DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n', encoding="utf-8"
-    )
+    file.write_text(DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n')
     data = cli.data("keys", "--explain", f"{file}")
     rows = {one["path"]: (one["written"], one["read"]) for one in data["keys"]}
     assert rows["load.path"] == ("not written", "self-locking, assumed")
