@@ -514,7 +514,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
         'back_emf_constant = "317',
         'speed_constant = "107',
         'which takes "107 rpm/V" too',
-        "within 10 % of 0.0302",
+        "within 10 %",
     ),
     ('torque_constant = "30', 'Kt = "30', "(it is torque_constant)\n"),
     ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),

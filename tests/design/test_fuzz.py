@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 import tomli_w
 from design_strategies import design_trees
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 
 from actuator_lti.design import (
@@ -147,7 +147,10 @@ def test_the_order_of_keys_does_not_matter(tree: dict[str, Any], random: Any) ->
 def test_a_changed_design_survives_too_and_can_be_changed_back(tree: dict[str, Any], factor: float) -> None:
     design = read_design_text(tomli_w.dumps(tree), "any")
     nominal = {path: value for path, value, _ in tolerances(design)}
-    changed = with_values(design, {path: value * factor for path, value in nominal.items()}, check=False)
+    try:
+        changed = with_values(design, {path: value * factor for path, value in nominal.items()})
+    except InputError:  # a supply that no longer reaches the speed, say
+        reject()
     assert read_design_text(write_design(changed), "any") == changed
     back = with_values(changed, nominal, check=False)
     assert design_hash(back) == design_hash(design)

@@ -7,7 +7,7 @@ from math import pi
 import pytest
 
 from actuator_lti.design import read_design_text
-from actuator_lti.design.units import parse_quantity, parse_unit, scaled
+from actuator_lti.design.units import parse_quantity, parse_unit
 from actuator_lti.errors import InputError
 
 OZ, LB, INCH, G = 0.45359237 / 16, 0.45359237, 0.0254, 9.80665
@@ -218,11 +218,6 @@ def test_a_unit_is_the_product_of_its_parts_rounded_once(seed: int) -> None:
     assert found.factor == float(exact)
     there = dict(found.dimension)
     assert [there.get(key, 0) for key in ("[mass]", "[length]", "[time]")] == powers
-
-
-def test_scaling_by_a_large_factor_is_a_product() -> None:
-    assert scaled(2.5, 1000.0) == 2500.0
-    assert scaled(2.0, 0.3) == 0.6
 
 
 TEXT = """
