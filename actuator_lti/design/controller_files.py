@@ -224,10 +224,10 @@ FORMATS = (
         ),
         {}, _torque_mode,
         {"torque_controller": "", "pole_pairs": "",
-         "phase_resistance": "by voltage the gain is taken times it, as in the library up to 2.3; from 2.4 on "
-         "that is right by estimated_current only",
-         "KV_rating": "by voltage the library adds the back-EMF, which a design without [control.current] has "
-         "no key for: not carried over"},
+         "phase_resistance": "by voltage the gain is taken times it, as by the library up to 2.3; from 2.4 "
+         "on that is right by estimated_current only",
+         "KV_rating": "by voltage the library adds the back-EMF, which a design without [control.current] "
+         "has no key for: not carried over"},
         {"phase_resistance": 1.0},
     ),
 )  # fmt: skip
