@@ -20,6 +20,7 @@ from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from benchmarks.random_records import KINDS, VALUES, random_records
 from nonlinear import Trajectory, commands, simulate
+from tests.changed import changed
 from tests.identification.bench_records import NOISE_A, Columns, motion, record_of
 
 BASE = load_design("ilr33-amber")
@@ -229,22 +230,19 @@ SLOW = {
 
 
 def test_steps_of_the_voltage_between_the_samples_are_no_lag() -> None:
-    """A motor of L/R = 0.3 ms by Euler's rule at 20 kHz, sampled at 1 kHz: the intervals hold the truth."""
-    drive, step = with_values(BASE, SLOW, check=False), 5e-5
-    time = step * np.arange(60_000)
+    """A motor of L/R = 0.3 ms on steps at 20 kHz, sampled at 1 kHz: the intervals hold the truth."""
+    drive, time = with_values(BASE, SLOW, check=False), 5e-5 * np.arange(60_000)
     slow, fast = (np.sign(np.sin(2.0 * np.pi * f * time + 0.1)) for f in (0.837, 1.913))
-    u = 6.0 * slow + 3.0 * fast
-    inertia, dry, seen = drive.inertia_kgm2, drive.friction.dry_torque_Nm, np.zeros((len(time), 2))
-    i = w = angle = 0.0
-    for k, volt in enumerate(u.tolist()):
-        seen[k] = angle, i
-        i += step / 2.1e-4 * (volt - 0.66 * i - 0.0257 * w)
-        w += step / inertia * (0.0257 * i - drive.friction.viscous_Nms_rad * w)
-        w = max(abs(w) - step / inertia * dry, 0.0) * np.sign(w)
-        angle += step * w
-    angle, current = seen[::20].T
-    current = current + NOISE_A * np.random.default_rng(1).standard_normal(len(current))
-    record = record_of(time[::20], voltage_reference=u[::20], angle=angle, current=current)
+    control = {
+        **dict.fromkeys(("position", "velocity", "current")),
+        "period_s": 5e-5,
+        "computing_delay_s": 0.0,
+    }
+    on_a_voltage = commands.sampled(time, 6.0 * slow + 3.0 * fast)
+    run = simulate(changed(drive, controller=control), on_a_voltage, 3.0, record_every=20)
+    current = run.current_A + NOISE_A * np.random.default_rng(1).standard_normal(len(run.time_s))
+    inertia, angle = drive.inertia_kgm2, run.motor_angle_rad
+    record = record_of(run.time_s, voltage_reference=run.reference_rad, angle=angle, current=current)
     result = identify_bench(drive, [record])
     assert "taken back" not in _said(result)
     model = result.model

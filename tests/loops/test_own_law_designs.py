@@ -1,4 +1,4 @@
-"""Four controllers made outside and brought in as a law of one's own, each with a truth of its own."""
+"""Three controllers made outside and brought in as a law of one's own, each with a truth of its own."""
 
 from dataclasses import replace
 
@@ -128,29 +128,3 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)
-
-
-def test_torque_loop_on_the_twist() -> None:
-    """PI on the spring's torque: the loop is k times the plant's response; at rest the torque is exact."""
-    base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
-    coupling = base.coupling
-    base = replace(controlled(base, position=None), load=replace(base.load, inertia_kgm2=1e9))
-    T, k = period_s(base, "velocity"), coupling.stiffness_Nm_rad
-    kp, ki, per_command = 2e-3, 0.4, 5.0  # A/(N m), A/(N m s), N m per rad/s of the command
-    row = np.array([per_command, -k / base.ratio_to_coupling, k * base.ratio_behind_coupling])
-    law = ([[1.0]], [ki * T * row], [[1.0]], [(kp + ki * T) * row], T)
-    mine = base.with_law("velocity", law, ["command", "angle", "output_angle"])
-    loop = assemble_loops(mine).velocity
-    assert stability_margins(loop.open_loop).stable
-    system, ticks = plant(base, command="i_ref"), round(T / base.controller.period_s)
-    A, B, C = system.A, system.B[:, :1], system.C[[system.output_labels.index("twist")]]
-    z = np.exp(1j * np.geomspace(1e-2, 3.0, 40))
-    held = sum(np.linalg.matrix_power(A, j) @ B for j in range(ticks))
-    over = np.linalg.matrix_power(A, ticks)
-    P = np.array([(C @ np.linalg.solve(one * np.eye(len(A)) - over, held)).item() for one in z])
-    np.testing.assert_allclose(loop.open_loop(z), k * P * (kp + ki * T * z / (z - 1.0)), rtol=1e-6)
-    rows = Rows.of(mine, limits_on=False)
-    rows["ticks"] = int(4.0 / base.controller.period_s)
-    rows.step("command", 3.0 / base.total_ratio)
-    run = rows.trajectory()
-    assert abs(run.coupling_torque_Nm[-1] / (3.0 * per_command) - 1.0) < 1e-6

@@ -32,7 +32,7 @@ RANDOM = range(300_000, 300_030)
 FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
                741_646, 90_006, 770_155, 910_883, 1_010_043,
                1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068,
-               5_300_352]  # fmt: skip
+               5_300_352, 1_211_006, 1_211_041]  # fmt: skip
 
 
 def stood(design: Design) -> tuple[Design, Loops]:
@@ -95,14 +95,6 @@ def test_a_gain_at_the_place_is_a_gain_of_the_controller() -> None:
     assert radii[0] == pytest.approx(radii[1], rel=1e-9)
 
 
-def test_spectral_radius_crosses_one_at_the_gain_margin() -> None:
-    bench, loops = stood(load_design("ilr33-amber"))
-    ratio = min(m.ratio for m in stability_margins(loops.position.open_loop).gain_margins if m.ratio > 1.0)
-    found = tangent(bench, "position")
-    radii = [np.max(np.abs(np.linalg.eigvals(found.at_gain(ratio * x)))) for x in (1.0 - 1e-6, 1.0 + 1e-6)]
-    assert radii[0] < 1.0 < radii[1]
-
-
 def test_python_control_draws_it() -> None:
     found, w = tangent("ilr33-amber", "velocity"), 300.0
     assert (found.system.nstates, found.system.dt) == (len(found.states), found.period_s)
@@ -112,14 +104,11 @@ def test_python_control_draws_it() -> None:
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
 def test_drives_that_failed_once(seed: int) -> None:
-    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle.
-
-    A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
-    A slow pole was taken for the one that passes 1 beside it; a quotient of roundings led away from a margin.
-    A mode at rest was taken out over an integrator that hardly takes part in it, or a soft spring was one.
-    """
+    """Slow poles beside 1, modes at rest, figures of roundings; gains beyond 200 dB are not listed."""
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
+    assert all(row.verdict == Verdict.MET for row in result.rows)
+    assert all(row.predicted > 1e-10 for row in result.rows if row.name == "gain_margin")
 
 
 def test_a_slow_pole_is_judged_by_its_own_error() -> None:
@@ -136,15 +125,6 @@ def test_a_slow_pole_is_judged_by_its_own_error() -> None:
     assert rows[1].allowed > abs(seen[1] - seen[0])
 
 
-@pytest.mark.parametrize("seed", [1_211_006, 1_211_041])
-def test_a_gain_margin_beyond_200_db_is_no_check(seed: int) -> None:
-    """268 dB at 0 Hz: a gain that moves a pole by less than rounding is not listed; all else is met."""
-    result = validate(full_drive(seed), CHECKS)
-    assert result.passed, [str(row) for row in result.not_met]
-    assert all(row.verdict == Verdict.MET for row in result.rows)
-    assert all(row.predicted > 1e-10 for row in result.rows if row.name == "gain_margin")
-
-
 NOT_PROVEN_ONCE = {
     730_131: ("command", "load"), 730_124: ("position", "w_ref", "command"), 720_019: ("velocity", "i_ref"),
     240: ("command", "load"), 800_742: ("u",), 1_010_199: ("position", "i_ref"),
@@ -157,15 +137,10 @@ NOT_PROVEN_ONCE = {
 
 @pytest.mark.parametrize("seed", NOT_PROVEN_ONCE)
 def test_drives_that_were_not_proven_once(seed: int) -> None:
-    """Cogging of which large steps saw the mean; a twist beside a large angle; angles moved by 1e-13.
+    """Steps that are large beside cogging or tanh, or lost beside a large angle or speed.
 
-    A drive that stands with its coupling pressed was fed forward to the angle of its output (240).  The pole
-    that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).  Within a long period the
-    speed left the flat part of tanh unseen (1 010 199, 1 010 254); a pressed coupling parted at steps of
-    which tenths were lost in rounding (1 010 187).  What pressed a coupling was 5e-10 to 9e-5 of its play
-    (1 500 430, 1 400 122, 1 700 648).  An output moved by 1e-15 was lost beside the speed (1 400 214,
-    1 400 330); the motion began with a jump of its feed-forward (1 400 195).  A rest that an integral and a
-    hanging load hold was sought evenly in all rows; some are known to rounding (1 500 506, 1 500 082).
+    Couplings pressed by next to nothing (240, 1 500 430, 1 400 122, 1 700 648); rests that an integral and a
+    hanging load hold (1 500 506, 1 500 082); a pole at 0 Hz beside a mode at rest (800 742).
     """
     design = full_drive(seed)
     bench = Bench(design, design)
