@@ -267,10 +267,6 @@ def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, k
     assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
 
 
-def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings(cli) -> None:
-    assert "objects import" in cli.refused("keys", "odrive")
-
-
 @pytest.mark.parametrize(
     ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
 )
