@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import date
 from difflib import get_close_matches
+from math import inf
 from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
@@ -333,7 +334,9 @@ class Reader:
             unit = field.unit(self.structure)
             share = unit == "1" and field.high == 1.0 and 2.0 <= value <= 100.0 and BARE.match(f"{raw}")
             percent = f'; or is it "{value:g} %"' if share else ""
-            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}")
+            off = value == 0.0 and field.default in (None, inf) and not field.required
+            none = "; for none leave the key out" * off
+            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}{none}")
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:

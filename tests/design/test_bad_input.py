@@ -55,6 +55,7 @@ CASES = {
     "negative friction": ([('"2.25e-3 N*m"', '"-1 N*m"')], ["friction.dry_torque", "0, or at least 1e-18 N*m"]),
     "a time next to zero": ([("[control.position]", '[control.position]\nderivative_time = "1e-308 s"')],
                             ["control.position.derivative_time", "0, or at least 1e-18 s"]),
+    "no integral": ([("[control.current]", "[control.current]\ntracking_time = \"0 s\"")], ["for none leave the key out"]),
     "n_p no multiple of n_v": (
         [("[control.position]", "[control.position]\nevery = 3"), ("[control.velocity]", "[control.velocity]\nevery = 2")],
         ["control.position.every = 3", "a multiple of control.velocity.every = 2"],
@@ -148,11 +149,7 @@ def test_correlations_that_contradict_each_other_are_refused() -> None:
     ("old", "new", "says"),
     [
         ("[control]", "[control.current]\ngain = '1 ohm'\n[control]", "control.current"),
-        (
-            "[motor]",
-            "[motor]\nresistance = '1 ohm'",
-            "resistance = 1 ohm: not allowed beside motor.source_gain",
-        ),
+        ("[motor]", "[motor]\nresistance = '1 ohm'", "resistance = 1 ohm: not allowed beside motor.s"),
         ("243.45 V*s/m", "1 A*s/m", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
     ],
 )

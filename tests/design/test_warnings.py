@@ -42,7 +42,7 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     (
         "ilr33-amber",
         {"motor.resistance": {"value": "50 mohm", "grade": "Z"}},
-        "\nmotor.resistance: grade 'Z'",
+        "\nmotor.resistance: grade",
         True,
     ),
     ("ilr33-amber", {"gear.worm.input_inertia": {"value": "5 g*cm^2", "grade": "X"}}, "\ngear.worm", True),

@@ -79,13 +79,6 @@ def test_an_ac_motor_keeps_torque_losses_and_voltage_limit(constants: str) -> No
     assert motor.torque_constant_Nm_A == pytest.approx(motor.back_emf_constant_Vs_rad, rel=1e-14)
 
 
-def test_a_mixed_up_convention_is_named() -> None:
-    with pytest.raises(InputError, match=r'motor\.constants = "rms-line"'):
-        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"})
-    with pytest.raises(InputError, match=r"60/\(2 pi\)"):
-        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"})
-
-
 def test_a_warm_motor() -> None:
     warm = {"temperature.winding": "125 degC", "temperature.magnet": "75 °C"}
     motor = with_overrides(AMBER, warm).effective_motor
@@ -132,12 +125,23 @@ def test_a_speed_drive_has_no_position_loop() -> None:
         ({"coupling": STIFF, "friction.load_coefficient": 0.9 / 2376}, "gives energy"),
         ({"load.friction": {"dry_torque": "1 N*m"}}, "allowed behind a coupling"),
         ({"coupling": {"stiffness": "1 N*m/rad"}, "load.friction": {"breakaway_ratio": 0.9}}, "at least 1"),
+        ({"motor.resistance": "0,6 ohm"}, 'motor.resistance.*use a decimal point: "0.6 ohm"'),
+        ({"motor.inductance": "6 ohm"}, 'motor.inductance.*"ohm" is the unit of a resistance'),
+        ({"motor.rotor_inertia": "3 kg"}, r"motor.rotor_inertia.*m \(p/2 pi\)\^2"),
+        ({"limits.voltage": "3 vots"}, 'limits.voltage.*nearest known: "volt'),
+        ({"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"}, r'motor\.constants = "rms-line"'),
+        ({"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"}, r"60/\(2 pi\)"),
     ],
 )  # fmt: skip
 def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         with_overrides(AMBER, changes)
     assert "\n" not in str(caught.value) or len(changes) == 1  # another key contradicts it too
+
+
+def test_a_rotary_inertia_on_a_linear_axis_is_told_its_mass() -> None:
+    with pytest.raises(InputError, match=r"motor.rotor_inertia.*J \(2 pi/p\)\^2"):
+        load_design("emps").with_values({"motor.rotor_inertia": "3 kg*cm^2"})
 
 
 SPRING = {"coupling": {**STIFF, "play": "2 mrad"}}

@@ -1,6 +1,5 @@
 """Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
 
-import json
 import shutil
 from pathlib import Path
 
@@ -83,7 +82,7 @@ def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
         assert reason in cli.refused(*common, "--fix", wrong)
 
 
-def test_a_torque_command_is_the_drive_and_a_contradiction_fails(identify, tmp_path, cli) -> None:
+def test_a_torque_command_is_the_drive(identify) -> None:
     columns = columns_of(motion(2))
     columns["torque_command_Nm"] = 5.9e-3 * columns.pop("current_A")
     result = identify(columns).data
@@ -93,10 +92,6 @@ def test_a_torque_command_is_the_drive_and_a_contradiction_fails(identify, tmp_p
     assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
         load_design("ilr33-amber").inertia_kgm2, rel=0.01
     )
-    columns = columns_of(motion(2))
-    columns["motor_speed_rad_s"] = columns.pop("motor_speed_rpm")
-    told = cli.data("correlate", "ilr33-amber", write(tmp_path / "r.csv", columns), status=1)
-    assert "60/2 pi" in json.dumps(told["records"][0]["findings"])
 
 
 @pytest.mark.parametrize("name", ["one way", "one speed"])

@@ -9,7 +9,8 @@ from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import Drive, State, commands, loads, simulate
+from nonlinear import Drive, Probe, Reducers, Run, State, commands, loads, simulate, simulate_many
+from nonlinear._kernels import layout
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
@@ -18,6 +19,12 @@ from tests.refusals import refused
 AMBER = load_design("ilr33-amber")
 TS = 1e-3
 T = np.arange(2000) * TS
+SHORT = {"design": AMBER, "command": commands.hold(), "duration_s": 0.1}
+TORQUE = {"position": None, "velocity": None}
+
+
+def run(controller: dict[str, None], **parts: dict[str, float]) -> object:
+    return simulate(changed(AMBER, controller=controller, **parts), commands.hold(), 0.01)
 
 
 @pytest.mark.parametrize(
@@ -90,6 +97,16 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: loads.proportional(float("nan")), "finite"),
         (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
         (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
+        (lambda: simulate_many([]), "at least one"),
+        (lambda: simulate_many([Run(**SHORT, reducers=Reducers(window_ticks=800))]), "must fit twice"),
+        (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
+        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="i_ref")]), "no such stage"),
+        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="u")] * 2), "one a point"),
+        (lambda: Probe(point="v"), "must be one of"),
+        (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
+        (lambda: run(TORQUE, command={"rate_rad_s": 1.0}), "need a position or a velocity loop"),
+        (lambda: run({}, command={"acceleration_rad_s2": 1.0, "jerk_rad_s3": 1e-4}), "a mean over"),
+        (lambda: run({"current": None}, limits={"peak_time_s": 1.0}), "needs a current loop"),
     ],
 )
 def test_refusals(make: Callable[[], object], words: str) -> None:

@@ -42,16 +42,6 @@ def test_an_interrupt_while_writing_leaves_the_old_file(tmp_path, monkeypatch) -
     assert os.listdir(tmp_path) == ["a"]
 
 
-def test_who_reads_the_old_file_reads_on_in_it(tmp_path) -> None:
-    target = tmp_path / "a"
-    target.write_text("old" * 10_000)
-    with target.open() as reader:
-        begun = reader.read(3)
-        atomic.write_text(target, "new")
-        assert begun + reader.read() == "old" * 10_000
-    assert target.read_text() == "new"
-
-
 def test_all_is_on_the_disk_before_anything_is_in_its_place(tmp_path, monkeypatch) -> None:
     steps: list[str] = []
     fsync, replace = os.fsync, os.replace

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from actuator_lti.design import load_design, write_design
 from reports import document as doc
 from reports.cli.app import PANELS, flowed
 from reports.terminal import SideBySide, print_blocks
@@ -117,14 +116,6 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, printed)
     assert all(row["name"] in out and row["pm"] in out for row in rows)
     if width < 100:
         assert not re.search(r"^\s*\w\s*$", out, re.M)
-
-
-def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
-    file = tmp_path / "d.toml"
-    file.write_text(write_design(load_design("emps")))
-    said = cli.refused("identify", file, "--set", "nothing")
-    said += cli.refused("correlate", file, "none.csv", "--set", "limits.voltage")
-    assert "allowed: KEY=VALUE" in said
 
 
 @pytest.mark.parametrize("width", [40, 60, 80, 200])

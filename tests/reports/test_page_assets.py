@@ -1,8 +1,6 @@
 """Style and scripts of a page: contrast, the bundle of its modules, ranges of sliders, the glossary."""
 
 import re
-import shutil
-import subprocess
 from html import unescape
 
 import pytest
@@ -71,16 +69,6 @@ def test_modules_in_a_circle_are_refused(monkeypatch) -> None:
     monkeypatch.setattr(scripts, "asset", texts.__getitem__)
     with pytest.raises(ValueError, match="a -> b -> a"):
         scripts.bundled.__wrapped__("a")
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_a_bundle_runs_as_its_modules_would(monkeypatch, tmp_path) -> None:
-    texts = {"page/a.js": 'import { two } from "./b.js";\nconst own = 3;\nconsole.log(own * two());\n',
-             "page/b.js": "const own = 2;\nexport const two = () => own;\n"}  # fmt: skip
-    monkeypatch.setattr(scripts, "asset", texts.__getitem__)
-    (tmp_path / "a.js").write_text(scripts.bundled.__wrapped__("a"), encoding="utf-8")
-    done = subprocess.run(["node", str(tmp_path / "a.js")], capture_output=True, text=True, check=True)
-    assert done.stdout == "6\n"
 
 
 @pytest.mark.parametrize("value", [-1e-3, 1e-3])
