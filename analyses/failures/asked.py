@@ -33,8 +33,8 @@ class Asked:
         float,
         Option('Deflection to which times are given, such as "2 deg"; stop/10.', "ANGLE", kind="output"),
     ]
-    detection_s: Annotated[float, Option("Seconds from the failure to its detection; 0.1.", "S")] = 0.1
-    watched_s: Annotated[float, Option("How long each failure is followed; 1.", "S", flag="duration")] = 1.0
+    detection_s: Annotated[float, Option("Seconds from the failure to its detection; 0.1.", "s")] = 0.1
+    watched_s: Annotated[float, Option("How long each failure is followed; 1.", "s", flag="duration")] = 1.0
     load_Nm: Annotated[
         float,
         Option(

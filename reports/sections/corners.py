@@ -33,7 +33,9 @@ def summary(result: Corners) -> str:
     count = len(result.corners)
     if not failed:
         every = "every other requirement" if more else "every requirement"
-        return f"Every loop is stable and {every} met at all {count} corners.{more}"
+        judged = result.corners[0].verdicts
+        met, none = (f" and {every} met", "") if judged else ("", " No requirement is judged there.")
+        return f"Every loop is stable{met} at all {count} corners.{none}{more}"
     where = f"{len(failed)} of {count} corners ({'; '.join(failed)})"
     where = f"all {count} corners" if len(failed) == count else where
     what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))

@@ -6,7 +6,7 @@ import numpy as np
 
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import DesignValue
+from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
@@ -37,6 +37,8 @@ def section(result: BenchResult) -> doc.Section:
         )
         ended = "ended at a bound of its key: these records do not tell it."
         note += "".join(f" {key} {ended}" for key in refined.at_bound)
+        if (kept := given_constant(model)) is not None:
+            note += f" {parameter(kept, axis).label}, fixed: {model.fixed[kept].reason}."
         blocks.append(parameter_table("Refined by simulation", refined, note, axis=axis))
     if result.electrical is not None:
         residual = 100.0 * result.electrical.relative_residual

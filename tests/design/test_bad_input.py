@@ -55,6 +55,7 @@ CASES = {
     "negative friction": ([('"2.25e-3 N*m"', '"-1 N*m"')], ["friction.dry_torque", "0, or at least 1e-18 N*m"]),
     "a time next to zero": ([("[control.position]", '[control.position]\nderivative_time = "1e-308 s"')],
                             ["control.position.derivative_time", "0, or at least 1e-18 s"]),
+    "no integral": ([("[control.current]", "[control.current]\ntracking_time = \"0 s\"")], ["for none leave the key out"]),
     "n_p no multiple of n_v": (
         [("[control.position]", "[control.position]\nevery = 3"), ("[control.velocity]", "[control.velocity]\nevery = 2")],
         ["control.position.every = 3", "a multiple of control.velocity.every = 2"],

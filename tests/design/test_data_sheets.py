@@ -135,6 +135,7 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
         ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
         ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
+        ("motor.torque_constant", f"{0.93 / sqrt(1.5)} Nm/A dc", 0.93),
         ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vp/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vpeak/1000rpm", 59.9 * 60 / (2000 * pi)),
         ("control.period", "16 kHz", 62.5e-6),

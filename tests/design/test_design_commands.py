@@ -68,3 +68,5 @@ def test_settings_go_out_and_come_in(tmp_path, cli) -> None:
     report = cli.data("objects", "import", xdc, "--velocity-gain-per", "rpm")
     assert list(report["changed"]) == ["control.velocity.gain"]
     assert any("9.549" in note for note in report["notes"])
+    ran = cli("objects", "export", "--velocity-gain-per", "rpm", "--out", xdc, "--force")
+    assert "has no place for that factor: import it with --velocity-gain-per rpm" in ran.err

@@ -69,6 +69,20 @@ def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) 
     assert (first.kind, first.worse) == ("verdict", True)
 
 
+def test_what_is_not_stable_is_the_worst_and_a_comparison_that_fails_is_counted_apart(nights) -> None:
+    whole = replace(job("All compared", 5.0), kind="comparison")
+    night = nights(job("far", -9.0), job("torn", unstable=True), job("good", 12.0), whole)
+    assert [d.name for d in night.designs] == ["torn", "far", "All compared", "good"]
+    assert (night.designs[0].result.worst, night.designs[0].result.worst_id) == (None, "GM")
+    assert night.counts == "2 failing, 1 passing; All compared: failing"
+    assert "| torn | ✗ failing | GM | not met | 0 |" in (nights.site / "summary.md").read_text()
+    torn = next(nights.site.glob("nights/*/torn-*.html")).read_text()
+    assert "the position loop is unstable" in torn
+    assert "of a margin, in % of the distance from −1 that the limit keeps" in torn
+    index = (nights.site / "index.html").read_text()
+    assert '<span class="worst neg">not met</span>' in index
+
+
 def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -> None:
     nights(job("a", 10.0))
     (design,) = nights(job("a", 9.0)).designs

@@ -108,7 +108,13 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("tune --place spring", "--place 'spring': allowed: notch"),
         ("tune --aim least", "Invalid value for '--aim': 'least' is not one of"),
         ("montecarlo --samples 1e3", "'--samples': allowed: a whole number, such as 1000"),
-        ("montecarlo --at-least x", "'--at-least': allowed: a number, such as 0.5, without its unit"),
+        (
+            "montecarlo --at-least x",
+            "--at-least 'x': a number and a unit are wanted; allowed: a number such as",
+        ),
+        ("duty --share '4 kg'", '"kg" is the unit of a mass; allowed: a number such as 0.5 or "50 %"'),
+        ("duty --frequency '4 s'", '"s" is the unit of a time; allowed: "5 Hz", or 5 in Hz'),
+        ("--time-limit x designs", "'--time-limit': allowed: a number, such as 0.5, without its unit"),
         ("compare emps --workers 2", "--workers 2: computes variants, and emps has none"),
         ("identify emps --set nothing", "allowed: KEY=VALUE"),
         ("correlate emps none.csv --set limits.voltage", "allowed: KEY=VALUE"),
@@ -165,6 +171,16 @@ def test_bad_input_is_one_line_and_status_2_and_writes_nothing(
     monkeypatch.chdir(tmp_path)
     assert words in cli.refused(*shlex.split(arguments))
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "given", [("2", "0.5", "20"), ("120 rpm", "50 %", "20 s"), ("2 Hz", "0.5", "20000 ms")]
+)
+def test_a_number_may_have_its_unit(given: tuple[str, str, str], cli) -> None:
+    options = zip(("--frequency", "--share", "--cycle"), given, strict=True)
+    told = cli.text("duty", "ilr33-amber", "--amplitude", "1 deg", *(word for one in options for word in one))
+    assert "±1 deg at 2 Hz" in told
+    assert "50 % of every 20 s" in told
 
 
 def test_a_bad_file_is_named_and_nothing_is_written(tmp_path, cli) -> None:

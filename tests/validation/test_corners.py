@@ -72,6 +72,8 @@ def test_command_and_section(cli) -> None:
     assert told["nominal"]["passed"]
     assert not told["cold"]["passed"]
     assert section(corners(EMPS))["result"].startswith("Every loop is stable")
+    unasked = section(corners(replace(EMPS, requirements=())))["result"]
+    assert unasked.endswith(" corners. No requirement is judged there.")
     fin = corners(FIN)
     words = section(fin)["result"]
     fails = "The drive fails at 3 of 7 corners (cold; worst gain margin; worst phase margin): "
