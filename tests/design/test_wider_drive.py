@@ -144,11 +144,6 @@ def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
     assert "\n" not in str(caught.value) or len(changes) == 1  # another key contradicts it too
 
 
-def test_a_rotary_inertia_on_a_linear_axis_is_told_its_mass() -> None:
-    with pytest.raises(InputError, match=r"motor.rotor_inertia.*J \(2 pi/p\)\^2"):
-        load_design("emps").with_values({"motor.rotor_inertia": "3 kg*cm^2"})
-
-
 SPRING = {"coupling": {**STIFF, "play": "2 mrad"}}
 
 
@@ -228,6 +223,8 @@ def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(
         assert str(made.value).rpartition("allowed: ")[2] == str(read.value).rpartition("allowed: ")[2]
 
 
-def test_an_axis_that_is_none_is_refused_before_its_units_are_asked() -> None:
+def test_an_axis_that_is_none_is_refused_before_its_units_are_asked_and_a_linear_one_has_masses() -> None:
     with pytest.raises(InputError, match='axis = "round": allowed: "rotary" or "linear"'):
         check_design(replace(AMBER, axis="round"), "drive")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"motor.rotor_inertia.*J \(2 pi/p\)\^2"):
+        load_design("emps").with_values({"motor.rotor_inertia": "3 kg*cm^2"})
