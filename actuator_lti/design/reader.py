@@ -80,7 +80,8 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     design = reader.with_gains(
         model.Design(**{**head, "validation": fallback, **parts, **records}, objects=objects, origin=origin)
     )
-    design = replace(design, parameters=FrozenMap(reader.parameters))
+    written = frozenset(reader.written)
+    design = replace(design, parameters=FrozenMap(reader.parameters), written=written)
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
@@ -95,6 +96,7 @@ class Reader:
     def __init__(self, tree: Tree, findings: Findings) -> None:
         self.findings, self.tree = findings, tree
         self.guessed: set[str] = set()
+        self.written: set[str] = set()
         self.ticks: dict[str, int] = {}
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
@@ -179,6 +181,7 @@ class Reader:
         for field in fields:
             where = f"{path}.{field.key}"
             if field.key in table:
+                self.written.add(where)
                 values[field.attribute] = self.value(field, table, where)
             elif meant.get(field.key):
                 self.findings.alias(where, f"{path}.{meant[field.key]}")
@@ -269,7 +272,7 @@ class Reader:
             text = table["value"] if isinstance(table["value"], str) else si_text(table["value"], unit)
             into[path] = model.Parameter(
                 path=path, text=text, value=value, unit=unit, symbol=field.symbol, tolerance=tolerance,
-                source=table.get("source", ""), grade=table.get("grade", ""),
+                source=table.get("source", ""), grade=table.get("grade", ""), stated=table.get("stated", ""),
             )  # fmt: skip
         return value
 
@@ -284,7 +287,8 @@ class Reader:
                     continue
                 text = si_text(value, ampere_unit(path, unit, self.frame.constants))
                 source = "; ".join(filter(None, (f"from {table['value']}", table.get("source"))))
-                self.kept(field, {**table, "value": text, "source": source}, value, path, self.parameters)
+                made = {**table, "value": text, "source": source, "stated": f"from {table['value']}"}
+                self.kept(field, made, value, path, self.parameters)
                 part = replace(part_at(design, field.section), **{field.attribute: value})
                 design = with_part(design, field.section, part)
         return design

@@ -86,7 +86,7 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
 
 
 def left(verdict: Mapping[str, Any]) -> float:
-    """What a verdict is ranked by: minus infinity if not met without a figure, infinity if by none."""
+    """What a verdict is ranked by: minus infinity where not met without a figure, infinity if by none."""
     lost = verdict["value"] is None and verdict["verdict"] == "not met" and verdict["what"] == REQUIREMENTS
     known = -math.inf if lost else verdict["relative"]
     return math.inf if known is None else float(known)

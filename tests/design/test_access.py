@@ -1,6 +1,7 @@
 """Changing a design by dotted path, its tolerances, its hash and its warnings."""
 
 import pickle
+from contextlib import nullcontext
 
 import pytest
 
@@ -58,14 +59,12 @@ def test_a_changed_value_says_what_it_was_with_its_relative_tolerance_or_the_abs
     ],
 )
 def test_an_impossible_change_is_refused(values: dict[str, float], says: str) -> None:
+    """Relations may be left unchecked for sampling, but not ranges."""
     with pytest.raises(InputError, match=says):
         with_values(AMBER, values)
-
-
-def test_relations_may_be_left_unchecked_for_sampling_but_not_ranges() -> None:
-    assert with_values(AMBER, {"motor.back_emf_constant": 0.01}, check=False)
-    with pytest.raises(InputError):
-        with_values(AMBER, {"motor.resistance": -1.0}, check=False)
+    relation = says in ("within 10 %", "supply cannot reach")
+    with nullcontext() if relation else pytest.raises(InputError, match=says):
+        with_values(AMBER, values, check=False)
 
 
 def test_text_overrides_change_any_key_as_a_file_would() -> None:

@@ -126,15 +126,12 @@ def test_a_bad_value_is_refused_in_one_line(case: str) -> None:
         assert part in line
 
 
-def test_the_terminal_tells_all_mistakes(capsys, tmp_path) -> None:
+def test_the_terminal_tells_all_mistakes_and_many_are_cut_short(capsys, tmp_path) -> None:
     path = tmp_path / "my.toml"
     text = changed(('"942.5 rad/s"', '"30000 rpm"'), ('"4 A", source', '"14 A", source'))
     path.write_text(text, encoding="utf-8")
     assert main(["margins", str(path)]) == 2
     assert capsys.readouterr().err.count("\nactuator-lti: ") == 1
-
-
-def test_many_mistakes_are_cut_short() -> None:
     assert refused(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
 
 

@@ -67,13 +67,10 @@ OF_AN_INTEGRAL: dict[str, object] = {
 }  # fmt: skip
 
 
-def test_keys_that_need_others_survive() -> None:
+def test_keys_that_need_others_and_tables_without_keys_survive() -> None:
     """None of them is drawn alone: each is refused, or means nothing, without its neighbour."""
     for name, values in (("joint", NEEDING_OTHERS), ("ilr33-amber", OF_AN_INTEGRAL)):
         survives(load_design(name).with_values(values))
-
-
-def test_a_table_without_keys_survives() -> None:
     empty: dict[str, object] = {name: {} for name in ("supply", "temperature", "failure", "duty")}
     drive = load_design("ilr33-amber").with_values(empty)
     assert None not in [getattr(drive, name) for name in empty]

@@ -50,13 +50,10 @@ def test_python_names_its_arguments() -> None:
         simulate(AMBER, commands.step(0.01), float("nan"))
 
 
-def test_a_load_with_its_unit_is_the_load(cli) -> None:
+def test_a_load_and_an_amplitude_may_have_their_units(cli) -> None:
     texts = ("4 N*m", "4", "4000 mN*m")
     result = [cli.data("margins", "--load", text)["asked"]["load_Nm"] for text in texts]
     assert result == pytest.approx([4.0] * 3, rel=1e-12)
-
-
-def test_an_amplitude_with_its_unit_is_the_amplitude(cli) -> None:
     said = []
     for words in ("5deg", "5", "300 arcmin", "0.08726646259971647 rad"):
         ran = cli("simulate", "--amplitude", words, "--duration", "0.02", "--json")

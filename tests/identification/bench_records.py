@@ -27,20 +27,28 @@ def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = Non
     return simulate(drive, command, 4.0, load_Nm)
 
 
+def signals_of(run: Trajectory, seed: int) -> Columns:
+    """What is seen at 1 kHz, in SI, the current with white noise of 20 mA."""
+    signals = {
+        "time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad,
+        "speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V,
+    }  # fmt: skip
+    table = {name: values[::10] for name, values in signals.items()}
+    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(table["time"]))
+    return {**table, "current": table["current"] + noise}
+
+
 def columns_of(run: Trajectory, seed: int = 0, load_Nm: float | None = None) -> Columns:
-    """Columns at 1 kHz in a recorder's units, the current with white noise of 20 mA."""
-    every = slice(None, None, 10)
-    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(run.time_s[every]))
+    """The same in a recorder's units, without the voltage."""
+    seen = signals_of(run, seed)
     columns = {
-        "time_s": run.time_s[every],
-        "reference_deg": np.degrees(run.reference_rad[every]),
-        "motor_angle_rad": run.motor_angle_rad[every],
-        "motor_speed_rpm": run.motor_speed_rad_s[every] * 30.0 / np.pi,
-        "current_A": run.current_A[every] + noise,
+        "time_s": seen["time"],
+        "reference_deg": np.degrees(seen["reference"]),
+        "motor_angle_rad": seen["angle"],
+        "motor_speed_rpm": seen["speed"] * 30.0 / np.pi,
+        "current_A": seen["current"],
     }
-    if load_Nm is not None:
-        columns["load_Nm"] = np.full(len(noise), load_Nm)
-    return columns
+    return columns if load_Nm is None else {**columns, "load_Nm": np.full(len(seen["time"]), load_Nm)}
 
 
 def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Record:

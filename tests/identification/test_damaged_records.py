@@ -19,9 +19,9 @@ from analyses.identification.joint_model import NAMES
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from benchmarks.random_records import KINDS, VALUES, random_records
-from nonlinear import Trajectory, commands, simulate
+from nonlinear import commands, simulate
 from tests.changed import changed
-from tests.identification.bench_records import NOISE_A, Columns, motion, record_of
+from tests.identification.bench_records import NOISE_A, Columns, motion, record_of, signals_of
 
 BASE = load_design("ilr33-amber")
 TRUTH = {"friction.dry_torque": 3e-3, "friction.viscous": 4e-6, "motor.rotor_inertia": 1.3e-6}
@@ -33,20 +33,9 @@ BARE = ("angle", "current")
 Damage = Callable[[Columns], Columns]
 
 
-def _columns(run: Trajectory, seed: int) -> Columns:
-    """In SI at 1 kHz, the current with white noise of 20 mA."""
-    signals = {
-        "time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad,
-        "speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V,
-    }  # fmt: skip
-    table = {name: values[::10] for name, values in signals.items()}
-    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(table["time"]))
-    return {**table, "current": table["current"] + noise}
-
-
 @pytest.fixture(scope="module")
 def columns() -> Columns:
-    return _columns(motion(2, design=DRIVE), 1)
+    return signals_of(motion(2, design=DRIVE), 1)
 
 
 def _record(columns: Columns, names: tuple[str, ...] = ALL) -> Record:
@@ -97,7 +86,7 @@ def _range_from(share: float, factor: float) -> Damage:
 
 def _of_another_run(name: str) -> Damage:
     """A signal of the same drive's other motion."""
-    return lambda columns: {**columns, name: _columns(motion(7, design=DRIVE), 5)[name]}
+    return lambda columns: {**columns, name: signals_of(motion(7, design=DRIVE), 5)[name]}
 
 
 def _said(result: BenchResult) -> str:
@@ -206,7 +195,7 @@ def test_a_voltage_tells_the_constant_a_drift_widens_and_a_load_not_recorded_is_
     assert "drift along the record: all torques change by +1" in _said(result)
     low, high = result.model.interval("dry")
     assert low < WANTED["dry"] < high
-    loaded = _columns(motion(2, load_Nm=6.0, design=DRIVE), 1)
+    loaded = signals_of(motion(2, load_Nm=6.0, design=DRIVE), 1)
     result = identify_bench(DRIVE, [_record(loaded, BARE)])
     assert not result.passed
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
@@ -342,7 +331,7 @@ def test_what_cannot_be_put_right_gives_no_design(name: str, columns: Columns) -
 @pytest.mark.parametrize("factor", [100.0, 1e-3])
 def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns) -> None:
     """The design's, or a load in another unit."""
-    loaded = _columns(motion(5, load_Nm=5.0, design=DRIVE), 3)
+    loaded = signals_of(motion(5, load_Nm=5.0, design=DRIVE), 3)
     loaded["torque"] = np.full(len(loaded["time"]), 5.0)
     second = replace(_record(loaded, (*BARE, "torque")), name="loaded")
     wrong = with_values(DRIVE, {"friction.load_coefficient": factor * DRIVE.friction.load_coefficient})
@@ -388,7 +377,7 @@ def test_no_lag_is_found_where_the_drive_hardly_moves(amplitude, signals) -> Non
     lag of 2 to 3 ms was found in records that have none.
     """
     run = simulate(DRIVE, commands.multisine(amplitude, [0.7, 1.9, 4.3], 4.0, 1e-4, seed=2), 4.0)
-    result = identify_bench(BASE, [_record(_columns(run, 1), signals)])
+    result = identify_bench(BASE, [_record(signals_of(run, 1), signals)])
     assert "later" not in _said(result)
     assert "earlier" not in _said(result)
     model, truth = result.model, WANTED

@@ -9,6 +9,7 @@ from scipy.signal import lfilter
 
 from actuator_lti.design import load_design, with_values
 from analyses.estimation.least_squares import between_records, solve
+from reports.document import load
 from tests.identification.bench_records import columns_of, motion, staircase, write
 
 
@@ -40,6 +41,11 @@ def test_records_with_loads_of_their_own_are_one_fit_judged_on_another(files, tm
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
+    page = load(tmp_path / "identification.json")
+    tables = {
+        b["caption"]: b.get("note") for part in page["sections"] for b in part["blocks"] if "caption" in b
+    }
+    assert "Torque constant kM, fixed: these records do not tell it" in tables["Refined by simulation"]
     for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
         assert written.parameters[path].value == pytest.approx(refined["value"], rel=1e-6)

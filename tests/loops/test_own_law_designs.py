@@ -1,16 +1,16 @@
-"""Three controllers made outside and brought in as a law of one's own, each with a truth of its own."""
+"""Two controllers made outside and brought in as a law of one's own, each with a truth of its own."""
 
 from dataclasses import replace
 
 import numpy as np
 from loop_designs import controlled
 from own_laws import linear, period_s
-from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.linalg import solve_discrete_are
 from scipy.signal import place_poles
 
 from actuator_lti import Design, assemble_loops, load_design, plant, stability_margins
 from actuator_lti.design.model import Encoder, PositionLoop
-from nonlinear import Rows, tangent
+from nonlinear import Rows
 
 
 def poles(design: Design) -> np.ndarray:
@@ -55,47 +55,6 @@ def test_lqg_velocity_controller() -> None:
     assert run.limits["current"].fraction > 0.01
     assert abs(run.motor_speed_rad_s[-1] / 600.0 - 1.0) < 1e-6
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
-
-
-def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0):
-    """s = (z - 1)/(z + 1): sampled to continuous, or back with ``way`` -1; the unit circle is the axis."""
-    one = np.eye(len(A))
-    inverse = np.linalg.inv(one + way * A)
-    B, C, D = np.sqrt(2) * inverse @ B, np.sqrt(2) * C @ inverse, D - way * C @ inverse @ B
-    return inverse @ (A - way * one), B, C, D
-
-
-def test_h_infinity_position_controller_of_order_6() -> None:
-    """Normalised coprime factors: the four-block norm of the closed drive lies between its optimum and gamma.
-
-    The optimum sqrt(1 + rho(X Z)) is exact (Glover and McFarlane 1989); bilinear maps keep the norm.
-    """
-    base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
-    T, k = period_s(base, "position"), 100.0
-    gain = base.controller.position_loop.gain
-    open_loop = assemble_loops(base).position.open_loop
-    A, B, C, D = bilinear(open_loop.A, open_loop.B * k / gain, open_loop.C, np.zeros((1, 1)))
-    n, R = len(A), 1.0 + D.item() ** 2
-    assert n == 6
-    left = A - B @ (D / R) @ C
-    Z = solve_continuous_are(left.T, C.T, B @ B.T / R, np.array([[R]]))
-    X = solve_continuous_are(left, B, C.T @ C / R, np.array([[R]]))
-    optimum = float(np.sqrt(1.0 + np.max(np.abs(np.linalg.eigvals(X @ Z)))))
-    gamma, F = 1.1 * optimum, -(D.T @ C + B.T @ X) / R
-    W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
-    H = gamma**2 * W @ Z @ C.T
-    continuous = A + B @ F + H @ (C + D @ F)
-    Ak, Bk, Ck, Dk = bilinear(continuous, H, B.T @ X, -D.T, -1.0)
-    mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
-    assert len(mine.controller.position_loop.law.A) == 6
-    loop = assemble_loops(mine).position
-    assert stability_margins(loop.open_loop).stable
-    z = np.exp(1j * np.geomspace(1e-4, np.pi * 0.9999, 4000))
-    L, P = loop.open_loop(z), open_loop(z) * k / gain
-    K = L / P  # of what runs, in units of the shaped plant
-    norm = np.sqrt((1.0 + np.abs(K) ** 2) * (1.0 + np.abs(P) ** 2)) / np.abs(1.0 + L)
-    assert optimum * (1 - 1e-6) < norm.max() < gamma * (1 + 1e-6)
-    assert np.abs(tangent(mine, "position").open(z[::100]) / L[::100] - 1.0).max() < 1e-6
 
 
 def test_state_feedback_from_motor_and_load_of_a_joint() -> None:

@@ -29,7 +29,7 @@ INLINE = Fakes(workers=0)
 
 
 def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
-    """A small report: one requirement on ``margin`` (not proven where ``unknown``) and a table of margins."""
+    """A small report: one requirement on ``margin`` (not proven where ``unknown``), a table of margins."""
     name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
     unknown = bool(payload.get("unknown"))
     found = {"value": margin, "distance": margin - limit, "passed": margin >= limit}

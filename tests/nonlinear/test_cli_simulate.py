@@ -68,23 +68,22 @@ def _those(kind: str, **options: int) -> str:
     return " ".join(f"--{name} {value}" for name, value in options.items() if kind in OF[name])
 
 
-@pytest.mark.parametrize("kind", ["hold", "triangle", "chirp", "multisine", "stepped-sine"])
-def test_every_command_on_the_terminal(kind: str, cli) -> None:
+@pytest.mark.parametrize(
+    "kind", ["hold", "step", "ramp", "sine", "triangle", "chirp", "stepped-sine", "multisine"]
+)
+def test_every_command_is_told_and_begins_at_its_start(kind: str, run, cli) -> None:
     stepped = kind == "stepped-sine"  # to its end: 5 cycles of 5, 10 and 20 Hz, 1.75 s
     arguments = f"simulate --command {kind} --every 10 {_those(kind, frequency=5, to=20, count=3)}"
     more = "" if stepped else " --amplitude 0.2 --duration 0.4 --bias-rate 5 --load-slope -20"
     out = cli.text(*f"{arguments}{more}".split())
     assert ("1750 rows, status comes to rest" if stepped else "400 rows, status following") in out
     assert " deg " in out
-
-
-@pytest.mark.parametrize("kind", ["step", "ramp", "sine", "triangle", "chirp", "stepped-sine", "multisine"])
-def test_every_command_begins_at_its_start(kind: str, run) -> None:
-    words = f"--command {kind} --amplitude 0.1 --start 0.1 "
-    words += _those(kind, frequency=10, to=40, count=2, cycles=2)
-    reference = run(f"{words} --duration {1.0 if kind == 'stepped-sine' else 0.3}")[1]["reference_rad"]
-    assert not reference[:1000].any()
-    assert np.abs(reference[1000:1200]).max() > 0.0
+    if kind != "hold":  # which is there from the first tick on
+        words = f"--command {kind} --amplitude 0.1 --start 0.1 "
+        words += _those(kind, frequency=10, to=40, count=2, cycles=2)
+        reference = run(f"{words} --duration {1.0 if stepped else 0.3}")[1]["reference_rad"]
+        assert not reference[:1000].any()
+        assert np.abs(reference[1000:1200]).max() > 0.0
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Commands, loads and results: values, units and refusals."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -92,6 +93,8 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
         (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
         (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (lambda: read_columns(Path("r.csv"), ("t", "a")), 'line 3, column 2 = "x"'),
+        (lambda: read_columns(Path("r.csv"), ("b",)), 'no column "b"; there are "t", "a"'),
         (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm, m"),
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
@@ -109,16 +112,11 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: run({"current": None}, limits={"peak_time_s": 1.0}), "needs a current loop"),
     ],
 )
-def test_refusals(make: Callable[[], object], words: str) -> None:
+def test_refusals(make: Callable[[], object], words: str, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("r.csv").write_text("t,a\n0,1\n1,x\n")
     with pytest.raises(InputError, match=words):
         make()
-
-
-def test_cells_that_are_no_numbers(tmp_path) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text("t,a\n0,1\n1,x\n")
-    refused(read_columns, path, ("t", "a"), words='line 3, column 2 = "x"')
-    refused(read_columns, path, ("b",), words='no column "b"; there are "t", "a"')
 
 
 def test_trajectory_carries_units_and_leaves_as_a_frame() -> None:

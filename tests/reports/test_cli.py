@@ -183,17 +183,13 @@ def test_a_number_may_have_its_unit(given: tuple[str, str, str], cli) -> None:
     assert "50 % of every 20 s" in told
 
 
-def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
-    design = tmp_path / "bad.toml"
-    text = design_text("ilr33-amber").replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"')
-    design.write_text(text, encoding="utf-8")
+def test_a_bad_file_is_named_and_nothing_is_written(tmp_path, cli) -> None:
+    design, empty = tmp_path / "bad.toml", tmp_path / "empty.json"
+    design.write_text(design_text("ilr33-amber").replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
+    empty.touch()
     assert "rotor_inertia" in cli.refused("report", design, "--out", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_document_that_is_empty_is_named(tmp_path, cli) -> None:
-    (tmp_path / "empty.json").touch()
-    assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
+    assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", empty)
+    assert {*tmp_path.iterdir()} == {design, empty}
 
 
 def test_report_writes_both_files_and_gives_the_document(tmp_path, cli) -> None:

@@ -20,9 +20,11 @@ COMMANDS = commands()
 WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
 
 
-def test_every_command_is_listed() -> None:
+def test_every_command_is_listed_and_help_breaks_at_the_width_of_the_terminal() -> None:
+    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
     tops = {name.split()[0] for name in COMMANDS}
     assert tops == {name for names in PANELS.values() for name in names}
+    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
@@ -158,8 +160,3 @@ def test_the_program_runs_as_a_module() -> None:
     good, bad = ran("designs"), ran("margins", "no-such-design")
     assert (good.returncode, "ilr33-amber" in good.stdout) == (0, True)
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1)
-
-
-def test_help_breaks_lines_at_the_width_of_the_terminal() -> None:
-    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
-    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."

@@ -8,6 +8,7 @@ from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, with_overrides, with_values
 from analyses.linear.loop_survey import MOST_STATES, survey_loops
 from tests.refusals import refused
+from tests.validation.random_drives import drives
 
 NAMES = ("ilr33-amber", "ilr33-amber-multirate", "ctms-motor-position", "emps")
 
@@ -41,13 +42,22 @@ def each(population: Population, figures):
             yield k, loop, present[loop]
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_every_crossover_is_that_of_the_margin_engine(name):
-    population = scattered(name, 12, seed=5)
+LOUD = with_values(load_design("ilr33-amber"), {"control.position.gain": 4800.0})  # its S has no peak
+SURE = (*(scattered(name, 12, seed=5) for name in NAMES), Population(LOUD, {}, 1))
+RANDOM = tuple(Population(one, {}, 1) for one in drives(90_209, 8))  # some of which rounding decides
+
+
+@pytest.mark.parametrize("population", [*SURE, *RANDOM], ids=lambda each: each.design.name)
+def test_every_crossover_is_that_of_the_margin_engine(population):
     figures = linear_figures(population, time_figures=False)
+    assert set(figures.loops) == set(assemble_loops(population.design).present)
     for k, loop, own in each(population, figures):
         truth = stability_margins(own.open_loop)
+        if population.design.name.startswith("random") and (truth.withheld or figures.withheld(loop)[k]):
+            continue
         assert figures.stable(loop)[k] == truth.stable
+        peak = truth.sensitivity_peak_db if truth.stable else np.nan  # S of an unstable loop has none
+        assert figures.quantity("sensitivity_peak", loop)[k] == pytest.approx(peak, rel=1e-6, nan_ok=True)
         for seen, wanted, size in (
             (figures.gain_crossovers(loop), truth.phase_margins, "deg"),
             (figures.phase_crossovers(loop), truth.gain_margins, "ratio"),

@@ -69,23 +69,6 @@ def test_every_loop_and_break_point_is_that_of_the_linear_writing(drive: str | i
         assert np.max(off) <= max(1e-6, 10.0 * found.stated_error), place
 
 
-def test_an_integrator_in_closed_form() -> None:
-    """A P loop on an ideal source without friction: the torque is held, the angle a double integrator.
-
-    ``J w' = g u``, ``u = -K th``: over a tick th gains T w + g u T^2/(2 J), w gains g u T/J.
-    """
-    smooth = {"viscous_Nms_rad": 0.0, "viscous_reverse_Nms_rad": None}
-    bare = {"velocity": None, "computing_delay_s": 0.0}
-    design = changed(load_design("emps"), friction=smooth, controller=bare)
-    found, control = tangent(design, "u"), design.controller
-    T, push = control.period_s, design.effective_motor.source_gain_Nm_V / design.inertia_kgm2
-    push *= control.position_loop.gain
-    wanted = np.roots([1.0, 0.5 * push * T**2 - 2.0, 1.0 + 0.5 * push * T**2])
-    poles = np.linalg.eigvals(found.A)
-    for pole in wanted:
-        assert np.min(np.abs(poles - pole)) < 1e-9
-
-
 def test_a_gain_at_the_place_is_a_gain_of_the_controller() -> None:
     """`Tangent.at_gain` against the tangent of the drive with that gain."""
     design = load_design("ilr33-amber-multirate")
@@ -169,17 +152,6 @@ def test_a_rest_that_an_integral_holds_is_no_border_under_any_delay() -> None:
     assert certified.stable
     assert not certified.delay_margins
     assert exact_margins(loops, "u").delay_s == np.inf
-
-
-def test_a_load_that_hangs_is_a_spring() -> None:
-    """m g l sin(x + pi) has the slope -m g l at 0; what is less than pi is rounded to moved nothing."""
-    design = full_drive(910_883)
-    slope = -design.load.gravity.mass_kg * 9.80665 * design.load.gravity.arm_m
-    spring = changed(design, load={"gravity": None, "moment_slope_Nm_rad": slope})
-    for place in ("position", "w_ref"):
-        hangs, sprung = (Bench(one, one).place(place).tangent for one in (design, spring))
-        off = relative(hangs.closed(Z), sprung.closed(Z))
-        assert np.max(off) <= max(1e-9, hangs.stated_error), place
 
 
 def test_a_margin_at_rest_is_proven_as_far_as_it_is_resolved() -> None:
