@@ -10,8 +10,9 @@ damped tracking loop (1000 rad/s where the file names no bandwidth), its current
 p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC fix no period here.
 
 VESC: lo_current_max = l_current_max l_current_max_scale (mc_interface.c); the speed loop's output is taken
-times that and the scale once more (foc_math.c, firmware 5.3 and later). SimpleFOC by voltage: U = R I of a
-phase where the motor has its phase resistance, and with a KV the back-EMF besides (BLDCMotor.cpp).
+times that and the scale once more (foc_math.c, firmware 5.3 and later). SimpleFOC: U = R I of a phase where
+the motor has its resistance, and with a KV the back-EMF besides, up to 2.3 by voltage (BLDCMotor.cpp), from
+2.4 by estimated_current (FOCMotor.cpp).
 """
 
 import re
@@ -73,7 +74,7 @@ class Format:
     fixed: Mapping[str, Any] = field(default_factory=dict)
     unfit: Callable[[Tree, Design], str] = lambda given, design: ""
     also: Mapping[str, str] = field(default_factory=dict)
-    """Names that no key is for, each with what there is to say of it."""
+    """Names that are understood without a key, each with what there is to say of it."""
     assumed: Mapping[str, float] = field(default_factory=dict)
     """Numbers where the file has none."""
 
@@ -222,8 +223,11 @@ FORMATS = (
             Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
         ),
         {}, _torque_mode,
-        {"torque_controller": "", "pole_pairs": "", "KV_rating": "by voltage the library adds the back-EMF, "
-         "which a design without [control.current] has no key for: not carried over"},
+        {"torque_controller": "", "pole_pairs": "",
+         "phase_resistance": "by voltage the gain is taken times it, as by the library up to 2.3; from 2.4 "
+         "on that is right by estimated_current only",
+         "KV_rating": "by voltage the library adds the back-EMF, which a design without [control.current] "
+         "has no key for: not carried over"},
         {"phase_resistance": 1.0},
     ),
 )  # fmt: skip

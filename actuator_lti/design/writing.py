@@ -102,7 +102,7 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
         known = design.parameters.get(path)
         if known is not None and known.value == value:
             table[field.key] = _entry(known, unit_in_file(design, path, field))
-        elif value is not None and value != inf and value != field.default:
+        elif value is not None and value != inf and (value != field.default or path in design.written):
             unit = unit_in_file(design, path, field)
             if field.kind == "limit":
                 unit = ampere_unit("limits.", part.unit, design.motor.constants)

@@ -179,6 +179,16 @@ def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, why: 
     assert any(note.endswith(f": {why}, {key} is left out") for note in result.notes)
 
 
+def test_what_a_sketch_says_of_its_motor_is_told(tmp_path: Path) -> None:
+    (tmp_path / "settings").write_text(OF_RESISTANCE)
+    notes = import_controller_file(tmp_path / "settings", without("current")).notes
+    for words in (
+        "KV_rating = 90: by voltage the library adds the back-EMF",
+        "phase_resistance = 5.6: by voltage",
+    ):
+        assert any(note.startswith(words) for note in notes)
+
+
 def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:
     """A gain in torque without the constant that turns it into amperes; the newest firmware's encoder."""
     text = ODRIVE.replace('"torque_constant": 0.04,', "").replace('"cpr": 8192', '"use_index": true')
