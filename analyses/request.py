@@ -23,7 +23,7 @@ class Option:
     """A field as an option of a command."""
 
     words: str  # what it is, and its default where the design gives it
-    metavar: str = ""  # what stands for the value in the help
+    metavar: str = ""  # what stands for the value in the help; of a plain number its unit, "" for none
     _: KW_ONLY
     flag: str = ""  # the option, without dashes; the field's name without its unit where empty
     # ``"output"``: a position of the output with its unit; ``"load"``: a load, with or without;
@@ -48,6 +48,11 @@ def options(request: type | None) -> dict[str, tuple[Any, Option]]:
             kind, *more = get_args(hint)
             result[name] = (kind, next(one for one in more if isinstance(one, Option)))
     return result
+
+
+def is_number(kind: Any) -> bool:
+    """Whether the value of a field of this type is a number, with a unit or none."""
+    return float in (kind, *get_args(kind))
 
 
 def key_of(name: str) -> str:

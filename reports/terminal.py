@@ -133,7 +133,7 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
     cells = [(column, _cell(value, column["format"])) for column, value in said]
     there = [(column, cell) for column, cell in cells if cell.plain.strip() not in ("", "–")]
     for number, (column, cell) in enumerate(there):
-        label = column["label"].lower() if column["label"] != "Unit" else ""
+        label = column["label"] if column["label"] != "Unit" else ""
         between = " " if column["label"] == "Unit" else ", " if label in ("", "at") else "; "
         text.append(between if number else "")
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())

@@ -51,7 +51,6 @@ class Quantity:
     linear_unit: str = ""  # in reports of a linear axis, where that differs
     absolute: bool = False  # whether its magnitude counts: a gain margin down as one up, a lead as a lag
     signed: bool = False  # whether it may be negative, and with it a limit on it
-    closed: bool = True  # whether it is a figure of the closed loop, which an unstable one has not
     timed: bool = False  # whether it is one of the step response: stairs of samples, without a slope
     size: float = 1.0  # its usual size: what a distance to a limit of 0 is measured by
     # What has it: the figures of a loop, `actuator_lti.drive.facts.Capability`,
@@ -114,16 +113,16 @@ class Quantity:
 
 _LIST = (
     Quantity("gain_margin", "dB", "loop", "smallest gain margin, up or down", "gain margin",
-             "margins.gain_margin_db", 1, absolute=True, closed=False, size=6.0,
+             "margins.gain_margin_db", 1, absolute=True, size=6.0,
              heading="Gain margin", at_a_glance="gain:1", followed=True, tolerance=0.01),
     Quantity("phase_margin", "deg", "loop", "smallest phase margin", "phase margin",
-             "margins.phase_margin_deg", 1, absolute=True, closed=False, size=45.0,
+             "margins.phase_margin_deg", 1, absolute=True, size=45.0,
              heading="Phase margin", at_a_glance="fix:1", followed=True, tolerance=0.05),
     Quantity("delay_margin", "s", "loop", "smallest delay margin", "delay margin",
              "margins.delay_margin_s", 1, heading="Delay margin", at_a_glance="sig:3", followed=True,
              tolerance=1e-07),
     Quantity("modulus_margin", "1", "loop", "smallest distance of L from -1", "modulus margin",
-             "margins.modulus_margin", 1, closed=False, size=0.5, heading="Modulus margin"),
+             "margins.modulus_margin", 1, size=0.5, heading="Modulus margin"),
     Quantity("sensitivity_peak", "dB", "loop", "peak of |S|", "peak of S",
              "margins.sensitivity_peak_db", -1, signed=True, size=6.0, heading="Peak of S",
              at_a_glance="fix:2", followed=True, tolerance=0.01),

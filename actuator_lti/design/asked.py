@@ -1,7 +1,7 @@
 """What is asked and known of a drive as data: studies, requirements, tolerances, pedigree, objects."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from math import inf
 from typing import Annotated, Any, Literal
 
@@ -146,7 +146,10 @@ class Tolerance:
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One value of the design file with its pedigree: dotted key, text as written, SI value."""
+    """One value of the design file with its pedigree: dotted key, text as written, SI value.
+
+    ``stated``: what the file has instead, where the value was computed from that.
+    """
 
     path: str
     text: str
@@ -156,6 +159,7 @@ class Parameter:
     source: str = ""
     grade: str = ""
     tolerance: Tolerance | None = None
+    stated: str = field(default="", compare=False)
 
 
 class FrozenMap(Mapping[str, Any]):

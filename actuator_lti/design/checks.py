@@ -1,5 +1,6 @@
 """Physics across keys: what cannot be is refused; what is only suspicious is warned of (`suspicions`)."""
 
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -18,9 +19,10 @@ from actuator_lti.design.checks_plant import (
 from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
 from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
 from actuator_lti.design.model import Correlation, Design, Requirement
-from actuator_lti.design.sections import part_at, parts_of
+from actuator_lti.design.sections import part_at, parts_of, template_of
 from actuator_lti.files.reading import shown
 
+_NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?\Z")
 CHECKS = "validation"  # what the ids of checks by simulation begin with
 
 
@@ -61,7 +63,22 @@ def out_of_range(design: Design) -> Iterator[Refusal]:
 
 
 def contradictions(design: Design) -> Iterator[Refusal]:
-    """What the relations between keys refuse, of all those whose own keys are read."""
+    """What the relations between keys refuse, of all those whose own keys are read; numbers with units."""
+    for refusal in _contradictions(design):
+        yield _with_unit(design, *refusal)
+
+
+def _with_unit(design: Design, path: str, given: object, allowed: str) -> Refusal:
+    """A refusal whose value, where it is a number alone, has the unit of its key."""
+    field = FIELDS.get(template_of(path))
+    number = isinstance(given, float) or (isinstance(given, str) and _NUMBER.match(given))
+    with suppress(UnreadError):
+        if number and field is not None and (unit := field.unit(Structure.of(design))) != "1":
+            given = f"{float(f'{given}'):g} {unit}"
+    return path, given, allowed
+
+
+def _contradictions(design: Design) -> Iterator[Refusal]:
     for check in FIRST_RELATIONS:
         refused = tuple(readable(check(design)))
         yield from refused

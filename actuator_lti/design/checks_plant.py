@@ -6,6 +6,8 @@ from dataclasses import replace
 from math import inf, isclose, log, pi
 from typing import Any
 
+from actuator_lti.design.field import Structure
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants, no_load_speed
@@ -67,7 +69,7 @@ def check_motor(design: Design) -> Iterator[Refusal]:
         same = f'with motor.constants = "{design.motor.constants}" kE is kM over {over} in SI'
         same = "in SI the two are one constant" if over == "1" else same
         allowed = (
-            f"allowed: within 10 % of {wanted:g}{_as_written(design, key, kM / kE)}, as "
+            f"allowed: within 10 % of {wanted:g} {_unit(design, key)}{_as_written(design, key, kM / kE)}, as "
             f"motor.torque_constant = {_stated(design, 'torque_constant')} has it ({same})"
         )
         causes = f"{_ratio(design, kE / kM)}{_warm(design, kM / kE)}"
@@ -88,7 +90,9 @@ def _warm(design: Design, ratio: Any) -> str:
     """The other cause of a kM below kE, and what follows from either."""
     if not 0.8 <= ratio <= 0.95:
         return ""
-    kM = f"{design.motor.torque_constant_Nm_A / ratio:g}{_as_written(design, 'torque_constant', 1.0 / ratio)}"
+    key = "torque_constant"
+    kM = f"{design.motor.torque_constant_Nm_A / ratio:g} {_unit(design, key)}"
+    kM += _as_written(design, key, 1.0 / ratio)
     taken = f"take one and write the other as it follows, kE as said or kM = {kM}"
     return f"; sheets give kM warm or saturated and kE cold (0.8 to 0.95 of it, here {ratio:.3g}): {taken}"
 
@@ -136,7 +140,13 @@ def with_stand_ins(design: Design) -> Design:
 
 def _stated(design: Design, key: str) -> str:
     """A constant of the motor in SI, and as the file has it."""
-    return f"{getattr(design.motor, _ELECTRICAL[key]):g}{_as_written(design, key, 1.0)}"
+    value = getattr(design.motor, _ELECTRICAL[key])
+    return f"{value:g} {_unit(design, key)}{_as_written(design, key, 1.0)}"
+
+
+def _unit(design: Design, key: str) -> str:
+    """The SI unit of a constant of the motor."""
+    return FIELDS[f"motor.{key}"].unit(Structure(design.axis))
 
 
 def _as_written(design: Design, key: str, times: float) -> str:

@@ -8,6 +8,11 @@ Periods: EPOS4 25 kHz and 2.5 kHz (EPOS4 50/5 Hardware Reference, maxon, 2023-07
 ODrive 3: a clock of 168 MHz over 2 * 3500 counts and 3 repetitions, 8 kHz; its speed comes from a critically
 damped tracking loop (1000 rad/s where the file names no bandwidth), its current gains from a bandwidth:
 p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC fix no period here.
+
+VESC: lo_current_max = l_current_max l_current_max_scale (mc_interface.c); the speed loop's output is taken
+times that and the scale once more (foc_math.c, firmware 5.3 and later). SimpleFOC: U = R I of a phase where
+the motor has its resistance, and with a KV the back-EMF besides, up to 2.3 by voltage (BLDCMotor.cpp), from
+2.4 by estimated_current (FOCMotor.cpp).
 """
 
 import re
@@ -15,28 +20,34 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
-from math import isfinite, pi, sqrt
+from math import inf, isfinite, nan, pi, sqrt
 from operator import mul
 from pathlib import Path
 from typing import Any, Literal
 
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.sections import parts_of
-from actuator_lti.design.settings_file import objects_of_xml, parsed_xml
+from actuator_lti.design.settings_file import parsed_xml, placed
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.reading import parse_json, read_text, shown_path
+from actuator_lti.files.reading import parse_json, read_text, shown, shown_path
 from actuator_lti.files.tree import Tree
 
 Stage = Literal["velocity", "-velocity", "current", "-current"]
 Value = float | Callable[..., float]
 A_dc, V_dc, TURN, RPM = sqrt(3.0) / 2.0, sqrt(3.0), 2.0 * pi, 2.0 * pi / 60.0
-_DCF = re.compile(r"^\s*\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|^\s*ParameterValue\s*=\s*(\S+)", re.I | re.M)
-_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
-_ASSIGNED = re.compile(r"(?:^|(?<=;))\s*\w+\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
+_DCF = re.compile(
+    r"^[ \t]*(?:\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|(Parameter|Default)Value[ \t]*=[ \t]*(\S+))",
+    re.I | re.M,
+)
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.S)
+_ASSIGNED = re.compile(r"(?:^|(?<=;))[ \t]*(\w+)\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
+_BUILT = re.compile(r"\bBLDCMotor\s+(\w+)\s*(?:=\s*BLDCMotor\s*)?\(([^)]*)\)")
+_ARGUMENTS = ("pole_pairs", "phase_resistance", "KV_rating", "phase_inductance")
 
 
 class Setting:
@@ -61,13 +72,16 @@ class Format:
     read: Callable[[str, str], Tree]
     settings: tuple[Setting, ...]
     fixed: Mapping[str, Any] = field(default_factory=dict)
-    unfit: Callable[[str, Design], str] = lambda text, design: ""
-    also: tuple[str, ...] = ()
-    """Names that ``unfit`` looks at."""
+    unfit: Callable[[Tree, Design], str] = lambda given, design: ""
+    also: Mapping[str, str] = field(default_factory=dict)
+    """Names that are understood without a key, each with what there is to say of it."""
+    assumed: Mapping[str, float] = field(default_factory=dict)
+    """Numbers where the file has none."""
 
 
 def _ratio(above: float, below: float) -> float:
-    return above / below if below else 0.0
+    """A time, say: infinite where there is no integral part, no number where there is no gain either."""
+    return above / below if below else above * inf
 
 
 def _flat(tree: Any, prefix: str = "") -> Tree:
@@ -84,19 +98,37 @@ def _flat(tree: Any, prefix: str = "") -> Tree:
 
 
 def _canopen(text: str, where: str) -> Tree:
-    """Objects of a device configuration, CiA 306 (.dcf) or CiA 311 (.xdc), by ``0x30A0.01``."""
+    """Values, else defaults, of a device configuration by ``0x30A0.01``: CiA 306 (.dcf), CiA 311 (.xdc)."""
     if text.lstrip().startswith("<"):
-        return {item.label: item.value for item in objects_of_xml(text, where)}
+        objects = ((place.label, one.get("actualValue") or one.get("defaultValue") or "")
+                   for place, one in placed(parsed_xml(text)))  # fmt: skip
+        return {label: _whole(value) for label, value in objects if value}
     found, label = {}, ""
-    for index, sub, value in _DCF.findall(text):
+    for index, sub, kind, value in _DCF.findall(text):
         label = f"0x{index.upper()}.{int(sub or '0', 16):02X}" if index else label
-        if value and label:
-            found[label] = int(value, 16) if re.fullmatch("0x[0-9A-Fa-f]{1,16}", value) else value
+        if kind and label and (kind.lower() == "parameter" or label not in found):
+            found[label] = _whole(value)
     return found
 
 
-def _torque_mode(text: str, design: Design) -> str:
-    by_current = "TorqueControlType::foc_current" in text
+def _whole(value: str) -> Any:
+    return int(value, 16) if re.fullmatch("0x[0-9A-Fa-f]{1,16}", value) else value
+
+
+def _sketch(text: str, where: str) -> Tree:
+    """What the lines of a sketch set, and how they make their one motor."""
+    text = _COMMENT.sub("", text)
+    built, assigned = dict(_BUILT.findall(text)), _ASSIGNED.findall(text)
+    motors = sorted({*built, *(owner for owner, name, _ in assigned if "." in name)})
+    if len(motors) > 1:
+        raise InputError(f"sets several motors: {', '.join(motors)}; allowed: the lines of one of them")
+    made = zip(_ARGUMENTS, ",".join(built.values()).split(","), strict=False)
+    found = {name: value.strip().rstrip("fF") for name, value in [*made, *(one[1:] for one in assigned)]}
+    return {name: value for name, value in found.items() if value not in ("", "NOT_SET")}
+
+
+def _torque_mode(given: Tree, design: Design) -> str:
+    by_current = str(given.get("torque_controller")).endswith(("foc_current", "dc_current"))
     if by_current == (design.controller.current is not None):
         return ""
     return f"its torque control is by {'current' if by_current else 'voltage'}; allowed: a design " + (
@@ -104,11 +136,18 @@ def _torque_mode(text: str, design: Design) -> str:
     )
 
 
+def _motor_type(given: Tree, design: Design) -> str:
+    kind = given.get(_TYPE, 0)
+    said = f"{_TYPE} = {shown(kind)}: allowed: 0, a motor whose torque is controlled by current"
+    return said if kind else ""
+
+
 _AXIS, _MOTOR, _LOOP = "axis0.encoder.config.", "axis0.motor.config.", "axis0.controller.config."
+_TYPE = _MOTOR + "motor_type"
 FORMATS = (
     Format(
         "ODrive configuration", re.compile(r"\A\s*\{.*axis0", re.S),
-        lambda text, where: _flat(parse_json(text, where)),
+        lambda text, where: _flat(parse_json(text, where, float)),
         (
             Setting("control.position.gain", "1/s", 1.0, _LOOP + "pos_gain"),
             Setting("control.velocity.gain", "A*s/rad", lambda gain, kM: A_dc * _ratio(gain, TURN * kM),
@@ -127,6 +166,7 @@ FORMATS = (
         {"control.period": "125 us", "control.velocity.every": 1, "control.position.every": 1,
          "encoder.speed": "tracking", "encoder.bandwidth": "1000 rad/s",
          "encoder.filter_time": "0 s"},
+        _motor_type, {_TYPE: ""},
     ),
     Format(
         "VESC motor configuration", re.compile(r"<MCConfiguration"),
@@ -135,13 +175,15 @@ FORMATS = (
             Setting("control.current.gain", "V/A", 2.0, "foc_current_kp"),
             Setting("control.current.integral_time", "s", _ratio, "foc_current_kp", "foc_current_ki"),
             Setting("control.velocity.gain", "A*s/rad",
-                  lambda gain, peak, poles: A_dc * peak * gain / 20.0 * (poles / 2.0) / RPM,
-                  "s_pid_kp", "l_current_max", "si_motor_poles"),
+                  lambda gain, peak, scale, poles: A_dc * peak * scale**2 * gain / 20.0 * (poles / 2.0) / RPM,
+                  "s_pid_kp", "l_current_max", "l_current_max_scale", "si_motor_poles"),
             Setting("control.velocity.integral_time", "s", _ratio, "s_pid_kp", "s_pid_ki"),
-            Setting("limits.peak_current", "A", A_dc, "l_current_max"),
+            Setting("limits.peak_current", "A", lambda peak, scale: A_dc * peak * scale, "l_current_max",
+                  "l_current_max_scale"),
             Setting("limits.speed", "rad/s", lambda rpm, poles: _ratio(rpm * RPM, poles / 2.0),
                   "l_max_erpm", "si_motor_poles"),
         ),
+        assumed={"l_current_max_scale": 1.0},
     ),
     Format(
         "EPOS4 object export", re.compile(r'^\s*\[30A0sub1\]|index="(0x)?30A0"', re.I | re.M), _canopen,
@@ -161,17 +203,16 @@ FORMATS = (
             Setting("limits.speed", "rad/s", RPM, "0x6080.00"),
         ),
         {"control.period": "40 us", "control.velocity.every": 10, "control.position.every": 10},
-        lambda text, design: "" if {"velocity", "position"} - {*design.controller.stages} else
+        lambda given, design: "" if {"velocity", "position"} - {*design.controller.stages} else
         "an EPOS4 has no velocity loop inside its position loop; allowed: a design without one of the two",
     ),
     Format(
-        "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."),
-        lambda text, where: {name: value.strip().rstrip("fF")
-                             for name, value in _ASSIGNED.findall(_COMMENT.sub("", text))},
+        "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."), _sketch,
         (
             Setting("control.position.gain", "1/s", 1.0, "P_angle.P"),
             Setting("control.velocity.gain", "A*s/rad", A_dc, "PID_velocity.P", when="current"),
-            Setting("control.velocity.gain", "V*s/rad", V_dc, "PID_velocity.P", when="-current"),
+            Setting("control.velocity.gain", "V*s/rad", lambda gain, R: V_dc * gain * R, "PID_velocity.P",
+                  "phase_resistance", when="-current"),
             Setting("control.velocity.integral_time", "s", _ratio, "PID_velocity.P", "PID_velocity.I"),
             Setting("control.current.gain", "V/A", 2.0, "PID_current_q.P", when="current"),
             Setting("control.current.integral_time", "s", _ratio, "PID_current_q.P", "PID_current_q.I",
@@ -181,7 +222,13 @@ FORMATS = (
             Setting("limits.voltage", "V", 1.0, "voltage_power_supply"),
             Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
         ),
-        {}, _torque_mode, ("torque_controller",),
+        {}, _torque_mode,
+        {"torque_controller": "", "pole_pairs": "",
+         "phase_resistance": "by voltage the gain is taken times it, as by the library up to 2.3; from 2.4 "
+         "on that is right by estimated_current only",
+         "KV_rating": "by voltage the library adds the back-EMF, which a design without [control.current] "
+         "has no key for: not carried over"},
+        {"phase_resistance": 1.0},
     ),
 )  # fmt: skip
 
@@ -196,9 +243,9 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     if found is None:
         return None
     with in_file(where):
-        if unfit := found.unfit(text, base):
-            raise InputError(unfit)
         given = found.read(text, where)
+        if unfit := found.unfit(given, base):
+            raise InputError(unfit)
     overrides, used, notes = _overrides(found, given, base, path.name)
     tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
     fixed = {
@@ -219,9 +266,10 @@ def _overrides(
     """What the file sets, with its sources; the names that were understood; remarks."""
     overrides: dict[str, Any] = {}
     used: set[str] = set()
-    notes: list[str] = []
+    notes = [f"{name} = {given[name]}: {said}" for name, said in found.also.items() if said and name in given]
     for item in (one for one in found.settings if one.holds(base)):
-        numbers = {name: number for name in item.names if (number := _number(given.get(name))) is not None}
+        raw = {name: _number(given.get(name, found.assumed.get(name))) for name in item.names}
+        numbers = {name: number for name, number in raw.items() if number is not None}
         lacking = [name for name in item.names if name not in numbers]
         if lacking:
             said = f"{item.names[0]}: needs {', '.join(lacking)} for {item.key}"
@@ -229,15 +277,25 @@ def _overrides(
             continue
         used |= {*item.names}
         value = float(item.of(*numbers.values()))
-        stated = ", ".join(f"{name} = {given[name]}" for name in item.names)
-        if item.key == "limits.speed" and value > no_load_speed(base):
-            notes.append(f"{stated}: faster than the supply allows, left out")
+        stated = ", ".join(f"{name} = {given[name]}" for name in item.names if name in given)
+        too_fast = item.key == "limits.speed" and no_load_speed(base) < value < inf
+        if too_fast or value == _none(item.key):
+            overrides[item.key] = None
+            why = "faster than the supply allows" if too_fast else "none"
+            notes.append(f"{stated}: {why}, {item.key} is left out")
         elif value > 0.0 and isfinite(value):
             text = value if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
             overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}
         else:
             notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes
+
+
+def _none(key: str) -> float:
+    """The value of a limit or of a time that says that there is none; no number for what has to be there."""
+    known = FIELDS[key]
+    unsaid: float = inf if known.default is None else known.default
+    return nan if known.required else unsaid
 
 
 def _number(raw: object) -> float | None:

@@ -152,7 +152,7 @@ class DataSheet:
             field, unit = FIELDS[path], FIELDS[path].unit(Structure.of(design))
             made[path] = model.Parameter(
                 path=path, text=si_text(value, unit), value=value, unit=unit, symbol=field.symbol,
-                source=source, grade=stated[0].grade)  # fmt: skip
+                source=source, grade=stated[0].grade, stated=source)  # fmt: skip
             attributes[field.attribute] = value
         friction = replace(design.friction, **attributes)
         return replace(design, friction=friction, parameters=model.FrozenMap(made))

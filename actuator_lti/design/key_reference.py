@@ -1,17 +1,14 @@
 """Every key of a design file as a list to read, and how the numbers of one file are read."""
 
-from contextlib import suppress
 from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated
 
-from actuator_lti.design.data_sheet import FROM, SHEET
+from actuator_lti.design.data_sheet import SHEET
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import ALL_FIELDS, field_of, fields_in
-from actuator_lti.design.model import Axis, Design, Parameter
-from actuator_lti.design.reader import GAINS
+from actuator_lti.design.model import Axis, Design
 from actuator_lti.design.sections import RECORDS
-from actuator_lti.design.spellings import split_quantity
 from actuator_lti.files.tree import Tree
 
 
@@ -113,17 +110,6 @@ def explained(design: Design) -> tuple[Explained, ...]:
         unit = "" if item.unit == "1" else f" {item.unit}"
         symbol = f"{item.symbol} = " if item.symbol else ""
         result.append(
-            Explained(path, _written(item), f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}")
+            Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}")
         )
     return tuple(result)
-
-
-def _written(item: Parameter) -> str:
-    """As the file has it, also what a value was computed from: a sheet's own keys, a gain by what it does."""
-    if item.source.startswith(FROM):
-        return item.source
-    first = item.source.partition("; ")[0]
-    if item.path in GAINS and first.startswith("from "):
-        with suppress(ValueError):
-            return first if split_quantity(first.removeprefix("from ")) else ""
-    return item.text

@@ -93,6 +93,7 @@ class Design:
     revision: Annotated[str, text("revision of this file")] = ""
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""
     origin: str = ""
+    written: frozenset[str] = field(default=frozenset(), compare=False)  # keys that stand in its file
 
     def with_values(self, values: Mapping[str, Any]) -> "Design":
         """A copy with some keys changed, as a design file would write them.

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import replace
 from datetime import date
 from difflib import get_close_matches
+from math import inf
 from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
@@ -79,7 +80,8 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     design = reader.with_gains(
         model.Design(**{**head, "validation": fallback, **parts, **records}, objects=objects, origin=origin)
     )
-    design = replace(design, parameters=FrozenMap(reader.parameters))
+    written = frozenset(reader.written)
+    design = replace(design, parameters=FrozenMap(reader.parameters), written=written)
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
@@ -94,6 +96,7 @@ class Reader:
     def __init__(self, tree: Tree, findings: Findings) -> None:
         self.findings, self.tree = findings, tree
         self.guessed: set[str] = set()
+        self.written: set[str] = set()
         self.ticks: dict[str, int] = {}
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
@@ -178,6 +181,7 @@ class Reader:
         for field in fields:
             where = f"{path}.{field.key}"
             if field.key in table:
+                self.written.add(where)
                 values[field.attribute] = self.value(field, table, where)
             elif meant.get(field.key):
                 self.findings.alias(where, f"{path}.{meant[field.key]}")
@@ -268,7 +272,7 @@ class Reader:
             text = table["value"] if isinstance(table["value"], str) else si_text(table["value"], unit)
             into[path] = model.Parameter(
                 path=path, text=text, value=value, unit=unit, symbol=field.symbol, tolerance=tolerance,
-                source=table.get("source", ""), grade=table.get("grade", ""),
+                source=table.get("source", ""), grade=table.get("grade", ""), stated=table.get("stated", ""),
             )  # fmt: skip
         return value
 
@@ -283,7 +287,8 @@ class Reader:
                     continue
                 text = si_text(value, ampere_unit(path, unit, self.frame.constants))
                 source = "; ".join(filter(None, (f"from {table['value']}", table.get("source"))))
-                self.kept(field, {**table, "value": text, "source": source}, value, path, self.parameters)
+                made = {**table, "value": text, "source": source, "stated": f"from {table['value']}"}
+                self.kept(field, made, value, path, self.parameters)
                 part = replace(part_at(design, field.section), **{field.attribute: value})
                 design = with_part(design, field.section, part)
         return design
@@ -329,7 +334,9 @@ class Reader:
             unit = field.unit(self.structure)
             share = unit == "1" and field.high == 1.0 and 2.0 <= value <= 100.0 and BARE.match(f"{raw}")
             percent = f'; or is it "{value:g} %"' if share else ""
-            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}")
+            off = value == 0.0 and field.default in (None, inf) and not field.required
+            none = "; for none leave the key out" * off
+            return self.refuse(path, raw, f"allowed: {field.allowed(unit)}{percent}{none}")
         return int(value) if field.kind == "integer" else value
 
     def limit(self, quantity: Any, raw: Any, path: str) -> Any:

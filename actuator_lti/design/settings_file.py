@@ -8,7 +8,7 @@ from typing import Any, get_args
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, register_namespace, tostring
 
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
-from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily
+from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily, ObjectPlace
 from actuator_lti.design.object_dictionary import OBJECTS
 from actuator_lti.design.objects import checked_objects
 from actuator_lti.errors import InputError, in_file
@@ -111,19 +111,13 @@ def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None 
 
     No DTD, no entities and no external references are accepted.
     """
-    values = objects_of_xml(text, where)
     with in_file(where):
+        values = tuple(item for item, _ in _objects_in(parsed_xml(text)))
         if not values:
             raise InputError(
                 "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC"
             )
         return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor)
-
-
-def objects_of_xml(text: str, where: str) -> tuple[ControllerObject, ...]:
-    """The objects of a device configuration that have an actual value."""
-    with in_file(where):
-        return tuple(item for item, _ in _objects_in(parsed_xml(text)))
 
 
 def parsed_xml(text: str) -> Element:
@@ -142,20 +136,25 @@ def parsed_xml(text: str) -> Element:
     return root
 
 
-def _objects_in(element: Element, depth: int = 0) -> Iterator[tuple[ControllerObject, Element]]:
-    """Every object with an actual value, and the element that holds it."""
+def placed(element: Element, depth: int = 0) -> Iterator[tuple[ObjectPlace, Element]]:
+    """Every object and sub-object of a device configuration, and the element that it is."""
     if depth > 8 * TOML_DEPTH.most:
         raise InputError("nested too deeply")
     if not _is(element, "CANopenObject"):
         for child in element:
-            yield from _objects_in(child, depth + 1)
+            yield from placed(child, depth + 1)
         return
     index = _hex(element, "index", 4)
     subs = [child for child in element if _is(child, "CANopenSubObject")]
     for one in (element, *subs):
-        subindex = 0 if one is element else _hex(one, "subIndex", 2)
-        if one.get("actualValue") is not None:
-            yield _object_of(one, index, subindex), one
+        yield ObjectPlace(index=index, subindex=0 if one is element else _hex(one, "subIndex", 2)), one
+
+
+def _objects_in(root: Element) -> Iterator[tuple[ControllerObject, Element]]:
+    """Every object with an actual value, and the element that holds it."""
+    return (
+        (_object_of(one, place), one) for place, one in placed(root) if one.get("actualValue") is not None
+    )
 
 
 def _is(element: Element, name: str) -> bool:
@@ -169,9 +168,9 @@ def _hex(element: Element, attribute: str, digits: int) -> int:
     return int(text, 16)
 
 
-def _object_of(element: Element, index: int, subindex: int) -> ControllerObject:
+def _object_of(element: Element, place: ObjectPlace) -> ControllerObject:
     names = {"name": element.get("name", ""), "data_type": element.get("dataType", "")}
-    item = ControllerObject(index=index, subindex=subindex, value=0, **names)
+    item = ControllerObject(index=place.index, subindex=place.subindex, value=0, **names)
     text = element.attrib["actualValue"].strip()
     if not _INTEGER.match(text):
         raise InputError(f"{item.label} = {shown(element.attrib['actualValue'])}: allowed: a whole number")

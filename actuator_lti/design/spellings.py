@@ -34,6 +34,8 @@ _SPELLINGS = (
     (re.compile(r"'"), " arcmin"),
     (re.compile(r"(?<=[AV]) ?_?(?:DC|dc)\b"), ""),  # of the motor that the model has: direct
     (re.compile(r"(?<=[A-Za-z])\^?-([123])\b"), r"^-\1"),  # min-1
+    (re.compile(r"\bkmin\^-1\b"), "(1000*min^-1)"),
+    (re.compile(r"(?<=V)min\b"), "*min"),  # mVmin
     (re.compile(r"(?<=[A-Za-z])([23])(?![0-9])"), r"^\1"),  # cm2
     (re.compile(r"(?<=[A-Za-z23])[-.](?=[A-Za-z])"), "*"),  # oz-in, g.cm2
     (re.compile(r"\b(?:r|U|tr|rev)/min\b"), "rpm"),
@@ -51,17 +53,18 @@ _COLUMN = (
         r"\1e\3 \2",
     ),
 )
-_TEN = re.compile(r"\b10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
+_TEN = re.compile(r"(?<![0-9])10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)")
 _BOUND = re.compile(r"\s*(±|\+/-|[≤≥<>~≈]=?|max\.?|typ\.?|ca\.?|approx\.?)\s*(?=[0-9.])", re.IGNORECASE)
 _SPREAD = re.compile(r"\s*((?:±|\+/-).*|\(?(?:max|typ|nom)\b\.?\)?)\s*\Z", re.IGNORECASE)
 _EXPONENT = re.compile(r"(?<=[0-9.])\s+([eE][+-]?[0-9]+)\b")  # 5.0 E-6
 _TWO = re.compile(r"\s*([0-9.]+)\s*(?:±|\+/-)\s*([0-9]+\.?[0-9]*)\s*([^\s0-9%].*?)\s*\Z")
+_BRACKETED = re.compile(r"\A\s*\(([^()]*(?:±|\+/-)[^()]*)\)")  # (20 ± 1) mm
 _AT = re.compile(r"\s*(@\s*[-+]?[0-9.]+ ?(?:°|deg)?\s*[CK]?)\s*\Z")
 _SECOND = re.compile(r"(?<![\w^.-])(?!1(?:000)?(?![0-9.]))[0-9]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:]|to\b)\s*([0-9]+\.?[0-9]*)\s*\Z")
 _BITS = re.compile(r"\s*(?:([0-9]{1,2})[ -]?[Bb]its?|2\^([0-9]{1,2}))\s*\Z")  # of an encoder
-_SYMBOL = re.compile(r"\A\s*[A-Za-z]\w{0,3}\s*=\s*(?=[+-]?[0-9.])")  # i = 8, R = 0.36 ohm
+_SYMBOL = re.compile(r"\A\s*(?:[A-Za-z]\w{0,3}\s*=|K[Vv]\b)\s*(?=[+-]?[0-9.])")  # i = 8, KV 100 rpm/V
 LONGEST = 120  # characters of a quantity
 
 
@@ -75,6 +78,7 @@ def tidy(unit: str) -> str:
 
 def _alone(text: str) -> str:
     """A number in one power of ten and its unit; what a sheet says of its bounds is refused."""
+    text = _BRACKETED.sub(r"\1 ", text)
     for aside, find in ((_BOUND, _BOUND.match), (_AT, _AT.search), (_SPREAD, _SPREAD.search)):
         if found := find(text):
             plain = f"{text[: found.start()]}{text[found.end() :]}".strip()

@@ -14,14 +14,14 @@ from actuator_lti.design.units import AdvisedError, ampere_unit, parse_limit, pa
 from actuator_lti.errors import InputError
 
 CONVENTION = re.compile(r"(?<=[AV])[ _]?\(?(rms|eff|peak|pk|p|phase)\b\)?", re.IGNORECASE)
+_OF_SHEET = re.compile(rf"{CONVENTION.pattern}|(?<=A)[ _]?\(?(dc)\b\)?", re.IGNORECASE)
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _MAINS = re.compile(r"(?<=V)[ _]?\(?(?:ac|rms|eff)\b\)?|(?<=V) ?~", re.IGNORECASE)
 _RANGE = re.compile(r"(?<=[0-9]) *(?:[-–]|to) *(?=[0-9])")
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _PER_TRAVEL = re.compile(r"/ *\(?[kcmnuµ]?m\b")  # of a linear encoder
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
-_PEAK = {"rms-line": sqrt(2.0), "peak-phase": 1.0}  # of one ampere or volt of a sheet
-_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}  # section 1 of model.md
+_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0, "dc": 1.0}  # section 1 of model.md
 PHASE = "V/A phase"
 _UPSIDE_DOWN = {
     "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),  # "83.4 rpm/V"
@@ -50,8 +50,10 @@ class Frame:
             text = _PER_TURN.sub("", text) if field.key in ("lead", "counts_per_rev") else text
             if field.path == "limits.voltage" and _MAINS.search(text):
                 _refuse_mains(_MAINS.sub("", text))
-            if said := {text[of.start() - 1]: of[1].lower() for of in CONVENTION.finditer(text)}:
-                plain = self.quantity(CONVENTION.sub(" dc", text), field)
+            sheet = field.section == "motor" and self.constants != "dc"
+            words = _OF_SHEET if sheet else CONVENTION
+            if said := {text[of.start() - 1]: of[of.lastindex or 1].lower() for of in words.finditer(text)}:
+                plain = self.quantity(words.sub("" if sheet else " dc", text), field)
                 return plain * self._amperes(field, unit, said)
         rotary = field.unit(replace(self.structure, axis="rotary"))
         factors = {unit: 1.0}
@@ -105,7 +107,7 @@ class Frame:
             if not unit.startswith("V/A"):
                 raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
             return 2.0  # R and L line-line are twice those of a phase
-        given = "rms-line" if convention in ("rms", "eff") else "peak-phase"
+        given = {"rms": "rms-line", "eff": "rms-line", "dc": "dc"}.get(convention, "peak-phase")
         if self.constants == "dc":
             phase = ", where R and L are per phase" * (given == "peak-phase")
             plain = "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
@@ -119,7 +121,7 @@ class Frame:
         if not (own or power):
             raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
         volts = sqrt(2.0) if not own and said.get("V") in ("rms", "eff") else 1.0
-        return volts * float((_PEAK[given] / _PEAK[self.constants] if own else _DC_PER[given]) ** power)
+        return volts * float((_DC_PER[given] / (_DC_PER[self.constants] if own else 1.0)) ** power)
 
     def other_axis(self, raw: Any, field: Field) -> str:
         """That the unit of a refused value would be one of the other kind of axis."""

@@ -167,7 +167,7 @@ def elastic_warnings(design: Design) -> Iterator[str]:
         bare = 'which a drive without gears is not; load.path = "back-drivable"?'
         yield (
             f"friction.load_coefficient: {less}: the friction of a {held}"
-            if design.gears
+            if design.gears or "load.path" in design.written
             else f"load.path: self-locking is assumed, {bare}"
         )
 

@@ -93,7 +93,7 @@ _ASIDE = {
     "g": "is no unit; 1 g of a fall is 9.80665 m/s^2",
     "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
     **dict.fromkeys(
-        ("tick", "ticks", "sample", "samples", "cycle", "cycles"),
+        ("tick", "ticks", "sample", "samples", "cycle", "cycles", "period", "periods"),
         "is no unit; every takes ticks of control.period without one, a time is so many of that period",
     ),
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
@@ -102,7 +102,7 @@ _ASIDE = {
     "db": "is no unit here; a ratio is 10^(dB/20): -20 dB is 0.1",
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
-_PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm", "mil")
+_PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm", "mil", "lb")
 _COUNTS: Dimension = (("[count]", 1),)
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
@@ -224,7 +224,7 @@ def _unknown(name: str, units: Units) -> str:
         return f'"{name}" {_ASIDE[name.lower()]}'
     names = [known for known in units if known[0] != "1"]
     prefixed = (prefix + known for known in names for prefix in ("", *_PREFIXES))
-    cased = [one for one in prefixed if one.lower() == name.lower()]
+    cased = [one for one in prefixed if one.lower() == name.lower() and one != name]
     cased.sort(key=lambda one: sum(map(ne, one, name)))  # of "mS" ms before Ms
     near = cased or get_close_matches(name, names, 1, 0.5)
     return f'unknown unit "{name}"' + (f' (nearest known: "{near[0]}")' if near else "")

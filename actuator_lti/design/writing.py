@@ -102,7 +102,7 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
         known = design.parameters.get(path)
         if known is not None and known.value == value:
             table[field.key] = _entry(known, unit_in_file(design, path, field))
-        elif value is not None and value != inf and value != field.default:
+        elif value is not None and value != inf and (value != field.default or path in design.written):
             unit = unit_in_file(design, path, field)
             if field.kind == "limit":
                 unit = ampere_unit("limits.", part.unit, design.motor.constants)
@@ -150,8 +150,8 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     """A copy of a design with keys changed as a design file would write them.
 
     By dotted path a text, number, list or table: ``{"motor.resistance": "60 mohm", "friction.law": "tanh",
-    "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry. An
-    InputError as of :func:`load_design`, also for an unknown key.
+    "gear.worm.ratio": 40}``.  A number replaces the value and drops its source; a table the whole entry;
+    None takes the key away. An InputError as of :func:`load_design`, also for an unknown key.
     """
     tree = design_tree(design)
     as_stated(tree, overrides)
@@ -227,6 +227,9 @@ def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
         raise InputError(f"{path}: which one? allowed: {', '.join(names) or f'none, no [[{table}]]'}")
     if not isinstance(here, dict):
         raise InputError(f"{path}: unknown key; allowed: a key of the design file")
+    if value is None:
+        here.pop(parts[-1], None)
+        return
     old = here.get(parts[-1])
     if isinstance(old, dict) and "value" in old and not isinstance(value, Mapping):
         kept = {"tolerance": old["tolerance"]} if "tolerance" in old and not _width_gone(old, value) else {}

@@ -162,7 +162,7 @@ def biquad(item: Filter, period_s: Any) -> Block:
     w0 = centre_rad_s(item)
     if np.any(np.asarray(w0) * period_s >= np.pi):
         raise InputError(
-            f"{item.kind} at {np.max(w0):g} rad/s: must be below pi/T = {np.pi / np.min(period_s):g}"
+            f"{item.kind} at {np.max(w0):g} rad/s: must be below pi/T = {np.pi / np.min(period_s):g} rad/s"
         )
     c = w0 / np.tan(w0 * period_s / 2)
     padded = (0.0,) * (order + 1 - len(num)) + num

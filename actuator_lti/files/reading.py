@@ -12,6 +12,7 @@ import stat
 import tomllib
 import unicodedata
 from collections import Counter
+from collections.abc import Callable
 from difflib import get_close_matches
 from io import BufferedReader
 from os import PathLike
@@ -214,12 +215,18 @@ def _hint(text: str, error: Exception) -> str:
     return ""
 
 
-def parse_json(text: str, where: str) -> Any:
-    """The value of a JSON text: no NaN, no key twice, bounded depth, no control characters."""
+def _refuse_constant(name: str) -> float:
+    raise ValueError(f"{name} is not allowed")
+
+
+def parse_json(text: str, where: str, constant: Callable[[str], float] = _refuse_constant) -> Any:
+    """The value of a JSON text: no NaN and Infinity unless they are read by ``constant``, no key twice,
+    bounded depth, no control characters.
+    """
     with in_file(where):
         try:
             value = json.loads(
-                text, parse_constant=_refuse_constant, parse_float=_finite, object_pairs_hook=_no_key_twice
+                text, parse_constant=constant, parse_float=_finite, object_pairs_hook=_no_key_twice
             )
         except RecursionError:
             raise InputError(_too_deep("", JSON_DEPTH)) from None
@@ -227,10 +234,6 @@ def parse_json(text: str, where: str) -> Any:
             raise InputError(f"not JSON: {_plain(str(error), 200)}") from None
         _walk(value, JSON_DEPTH, None, None)
     return value
-
-
-def _refuse_constant(name: str) -> None:
-    raise ValueError(f"{name} is not allowed")
 
 
 def _finite(digits: str) -> float:

@@ -7,11 +7,11 @@ import numpy as np
 from flint import acb_mat
 from scipy.interpolate import BarycentricInterpolator
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delays.form import DelayForm, delay_form
 from actuator_lti.margins.loop import balanced
 from actuator_lti.margins.poles import sorted_poles
-from actuator_lti.step.motion import NO_FINAL, UNSTABLE, Motion
+from actuator_lti.step.motion import LOST, NO_FINAL, UNSTABLE, Motion
 from actuator_lti.step.search import Pieces
 from actuator_lti.systems.delay_response import DelayResponse
 from actuator_lti.systems.delay_stepper import MOST_PIECES, DelayStepper
@@ -22,6 +22,7 @@ _FIRST = 10.0  # longest delays to walk at first
 _MEET = 1e-7
 _POINTS = 32
 _ZERO = 1e-12  # of the largest response about the poles
+_OFTEN = "the step response is too long beside its delays: what it settles to is known, when is not"
 _FORGOTTEN = 25.0  # time constants
 _RADIUS = 0.25  # of the circle about a pole, of the way to what lies next
 _TURN = np.exp(2j * np.pi * (np.arange(32) + 0.5) / 32)
@@ -41,14 +42,19 @@ def delayed_response(system: Any) -> tuple[Motion, float, Pieces]:
         raise InputError(UNSTABLE)
     final = 0.0 if at_rest.order else at_rest.lead
     around = 1j * np.abs(poles.values[np.abs(poles.values) > 0.0])
-    if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
+    if final == 0.0:
         raise InputError(NO_FINAL)
+    if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
+        raise NumericalError(LOST)
     head, u = _FIRST * float(form.delays_s.max()), np.ones(1)
     if head > MOST_PIECES * float(form.delays_s.min()):
-        raise InputError("the step response lasts too many delays to be stepped")
+        raise NumericalError(_OFTEN)
     walk = DelayStepper(system, 0.0, np.zeros(form.states), u)
     while True:
-        walk.at(head, u)
+        try:
+            walk.at(head, u)
+        except InputError:  # more pieces than it takes
+            raise NumericalError(_OFTEN) from None
         begins, lengths, series = walk.pieces()
         series = series[..., 0] / final
         series[:, -1] -= 1.0

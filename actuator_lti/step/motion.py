@@ -32,6 +32,7 @@ from actuator_lti.types import Complex, Real
 
 UNSTABLE = "the system is not stable: it has no step figures"
 NO_FINAL = "the final value of the step response is zero: it has no rise, overshoot or settling"
+LOST = NO_FINAL.replace("is zero:", "is zero within the rounding of the entries:")
 _INTEGRATES = "the system integrates: its step response has no final value"
 _LONG = "the step response rings for too long: what it settles to is known, when is not"
 _FINE = 512.0  # parts of the shortest time constant: a span that its power series covers
@@ -140,7 +141,7 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
         if num[0] == 0:
             raise InputError(NO_FINAL)
         if abs(double(num[0] / den[0])) <= dc_noise(loop):
-            raise NumericalError(NO_FINAL.replace("is zero:", "is zero within the rounding of the entries:"))
+            raise NumericalError(LOST)
         rest = (num * den[0] / num[0] - den) / fmpq_poly([0, den[den.degree()]])
         return _free_motion(balls(rest), poles, loop.in_z)
 

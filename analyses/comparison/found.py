@@ -51,16 +51,18 @@ class FigureName:
 
 
 def small_signal(design: Design, result: Mapping[str, LoopFigures]) -> dict[str, float | None]:
-    """Linear figures of every loop and static figures at every load of the design."""
+    """Linear and static figures; an unstable loop has none, and its drive no stiffness."""
     figures: dict[str, float | None] = {}
     for loop, found in result.items():
         one = found.judged
         for name, quantity in LOOP_QUANTITIES.items():
-            value = quantity.read(one) if one.stable or not quantity.closed else None
+            value = quantity.read(one) if one.stable else None
             figures[f"{loop}.{name}"] = None if value is None else float(value)
+    stands = all(one.sound is not False for one in result.values())
     for name, load in drive_cases(design.validation.loads_Nm):
         value = float(drive_figure(design, name, load))
-        figures[f"drive.{name}@{load:g}"] = None if isnan(value) else value
+        there = stands or QUANTITIES[name].source != "stiffness"
+        figures[f"drive.{name}@{load:g}"] = value if there and not isnan(value) else None
     return figures
 
 
@@ -153,6 +155,7 @@ class Found:
     # By column, such as ``"position.phase_margin"``; ``None`` where there is none
     figures: dict[str, float | None]
     verdicts: tuple[RequirementVerdict, ...]
+    unstable: tuple[str, ...] = ()  # the loops that are not stable: they have no figures
     changed: tuple[Changed, ...] = ()
     differences: dict[str, float] = field(default_factory=dict)  # figure minus the base's, where they differ
     # For each difference the changed keys one at a time, the strongest first; what is left over is their

@@ -184,6 +184,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     return Found(
         figures={**small_signal(design, result), **plan.figures(design, loops)},
         verdicts=evaluate_requirements(design, result),
+        unstable=tuple(name for name, one in result.items() if one.sound is False),
         checks=checks,
         untested=untested,
     )

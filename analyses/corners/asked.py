@@ -25,10 +25,10 @@ class Asked:
     Try: actuator-lti corners fin --hot 85 --cold -54 --supply 22
     """
 
-    hot_degC: Annotated[float, Option("Winding and magnets when hot; the winding's limit, or 120.", "DEGC")]
-    cold_degC: Annotated[float, Option("Winding and magnets when cold; -40.", "DEGC")]
+    hot_degC: Annotated[float, Option("Winding and magnets when hot; the winding's limit, or 120.", "degC")]
+    cold_degC: Annotated[float, Option("Winding and magnets when cold; -40.", "degC")]
     supply_V: Annotated[float, Option("The low supply; 0.8 of limits.voltage.", "V")]
-    cold_viscous: Annotated[float, Option("Factor on viscous friction in the cold; 1.", "FACTOR")] = 1.0
+    cold_viscous: Annotated[float, Option("Factor on viscous friction in the cold; 1.")] = 1.0
 
     def __post_init__(self) -> None:
         """Refuse what is no corner."""

@@ -42,7 +42,7 @@ class Asked:
         ),
     ] = None
     error_limit: Annotated[
-        float, Option("Error, of the motion about its mean, above which a signal fails; 20.", "PERCENT")
+        float, Option("Error, of the motion about its mean, above which a signal fails; 20.", "%")
     ] = 20.0
 
     def __post_init__(self) -> None:

@@ -80,8 +80,8 @@ def command_of(design: Design, record: Record, signal: str | None = None) -> Dri
         constant = design.effective_motor.torque_constant_Nm_A
         if constant is None:
             raise InputError(f"{signal}: needs motor.torque_constant", where=design.name)
-        values = values / constant
-        notes.append(f"command: {signal.replace('_', ' ')} over kM = {constant:g}")
+        values, unit = values / constant, "N/A" if design.axis == "linear" else "N m/A"
+        notes.append(f"command: {signal.replace('_', ' ')} over kM = {constant:g} {unit}")
     if stage != outermost:
         notes.append(f"command: {signal.replace('_', ' ')}; the loops outside the {stage} do not act")
         outside = STAGES[: STAGES.index(stage)]

@@ -29,7 +29,7 @@ class Asked:
     amplitude_rad: Annotated[
         float, Option('Peak, such as "5 deg"; half the full deflection.', "ANGLE", kind="output")
     ]
-    frequency_hz: Annotated[float, Option("Of the sine; 1.", "HZ")] = USUAL_HZ
+    frequency_hz: Annotated[float, Option("Of the sine; 1.", "Hz")] = USUAL_HZ
     load_Nm: Annotated[
         float,
         Option(
@@ -41,7 +41,7 @@ class Asked:
     share: Annotated[float, Option("Share of the time in motion; the drive holds still for the rest; 1.")] = (
         1.0
     )
-    cycle_s: Annotated[float, Option("One motion and one rest together; 10.", "S")] = 10.0
+    cycle_s: Annotated[float, Option("One motion and one rest together; 10.", "s")] = 10.0
 
     def __post_init__(self) -> None:
         """Refuse what is no duty."""

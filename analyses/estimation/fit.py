@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from actuator_lti.types import Floats
 
 COVERAGE = 1.959963984540054
 """Standard errors of a normal value in half of its 95 % interval."""
+SAME = 1e-9
+"""Part of a correlation below which values are one."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +111,31 @@ class Fit:
         return Fit(
             names=tuple(slopes), values=np.array([found[name] for name in slopes]), covariance=covariance
         )
+
+    def refined(self, own: Fit) -> Fit:
+        """The fit where some values were found anew, at all the others: with the error of these as well.
+
+        Examples
+        --------
+        >>> wide = np.array([[0.04, 0.02], [0.02, 0.01]])
+        >>> both = Fit(names=("a", "b"), values=np.array([1.0, 2.0]), covariance=wide)
+        >>> again = Fit(names=("a",), values=np.array([1.1]), covariance=np.array([[0.01]]))
+        >>> both.refined(again).values.tolist(), both.refined(again).covariance.round(6).tolist()
+        ([1.1, 2.0], [[0.05, 0.02], [0.02, 0.01]])
+        """
+        here = [self.names.index(name) for name in own.names]
+        rest = [k for k, name in enumerate(self.names) if name not in own.names]
+        beside = self.correlation[np.ix_(here, rest)] * self.standard_errors[here][:, None]
+        inverse = np.linalg.pinv(self.correlation[np.ix_(rest, rest)], rcond=SAME, hermitian=True)
+        values, covariance = self.values.copy(), self.covariance.copy()
+        values[here] = own.values
+        covariance[np.ix_(here, here)] = own.covariance + beside @ inverse @ beside.T
+        return replace(self, values=values, covariance=covariance)
+
+    def only(self, names: Sequence[str]) -> Floats:
+        """The covariance of some of the values."""
+        at = [self.names.index(name) for name in names]
+        return np.asarray(self.covariance[np.ix_(at, at)])
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""

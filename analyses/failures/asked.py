@@ -33,8 +33,8 @@ class Asked:
         float,
         Option('Deflection to which times are given, such as "2 deg"; stop/10.', "ANGLE", kind="output"),
     ]
-    detection_s: Annotated[float, Option("Seconds from the failure to its detection; 0.1.", "S")] = 0.1
-    watched_s: Annotated[float, Option("How long each failure is followed; 1.", "S", flag="duration")] = 1.0
+    detection_s: Annotated[float, Option("Seconds from the failure to its detection; 0.1.", "s")] = 0.1
+    watched_s: Annotated[float, Option("How long each failure is followed; 1.", "s", flag="duration")] = 1.0
     load_Nm: Annotated[
         float,
         Option(
@@ -51,7 +51,8 @@ class Asked:
                 raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
         near, stop, seen, end = self.deflection_rad, self.stop_rad, self.detection_s, self.watched_s
         if near > stop:
-            raise InputError(f"deflection {near:g}: must not be beyond the stop, {stop:g}")
+            both = f"deflection {near:g} rad: must not be beyond the stop, {stop:g} rad"
+            raise InputError(f"{both} (on a linear axis m)")
         if seen > end:
             raise InputError(f"detection {seen:g} s: must not be after {end:g} s, the end")
         if not isfinite(self.load_Nm):

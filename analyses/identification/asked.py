@@ -29,7 +29,7 @@ class Settings:
         Option("Hold a value, such as friction.load_coefficient=0; repeatable.", "KEY=VALUE"),
     ] = None
     residual_limit: Annotated[
-        float, Option("Largest relative residual for which a design is written; 20.", "PERCENT")
+        float, Option("Largest relative residual for which a design is written; 20.", "%")
     ] = 20.0
     inertia_to: Annotated[
         str,
@@ -129,9 +129,7 @@ class Asked(Settings):
     plan: Annotated[
         bool, Option("FILE is a design: motions that tell its values as closely as asked (then records).")
     ] = False
-    within: Annotated[
-        float, Option("With --plan: half of each 95 % interval, of the value; 5.", "PERCENT")
-    ] = 5.0
+    within: Annotated[float, Option("With --plan: half of each 95 % interval, of the value; 5.", "%")] = 5.0
     noise: Annotated[
         float | None,
         Option(

@@ -126,14 +126,19 @@ def identify_bench(
                 raise InputError(f"settings.{key}: {told}", where=record.name)
         made = design_with_fit(with_structure(start, model), values, source)
         if both is not None:
-            made = with_correlations(made, joint_values(start, both, inertia_to=settings.inertia_to))
+            both = joint_values(start, both, inertia_to=settings.inertia_to)
+            made = with_correlations(made, both)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
     refined = None
     if settings.refine:
         refined = refine_records(made, used, values.names, progress=progress)
+        if both is not None:  # its values are those at the constants that the voltage tells
+            both = both.refined(refined)
+            refined = replace(refined, covariance=both.only(refined.names))
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
+        made = made if both is None else with_correlations(made, both)
     written = read_design_text(write_design(made))
     again = tuple(resimulate(written, record, model.form) for record in (*used, *unseen))
     allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)

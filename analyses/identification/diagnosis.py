@@ -12,10 +12,12 @@ from analyses.correlation.driving import jump_share
 from analyses.estimation.arrays import lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
+from analyses.estimation.parameters import Parameter, parameter
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
 from analyses.records.consistency import RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 
 LEAST_RUN = 3
@@ -104,7 +106,7 @@ def diagnosed(
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
         if not is_benchmark(record):
-            told, added = _drift(part, model)
+            told, added = _drift(part, model, parameter("offset", design.axis))
             found[record.name] += told
             model = replace(model, covariance=model.covariance + added)
     return Diagnosed(
@@ -144,7 +146,7 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
     return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
 
 
-def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], Floats]:
+def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[Finding], Floats]:
     """Whether scale or offset of all torques drifts (-1 to 1) along a record, and adds to the covariance."""
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
@@ -159,7 +161,7 @@ def _drift(part: RecordFit, model: JointModel) -> tuple[list[Finding], Floats]:
         told.append(f"all torques change by {200.0 * scale:+.2g} % from begin to end")
         moved = np.outer(model.values, model.values) * scale**2 / 3.0
     if sure[1]:
-        told.append(f"the offset by {2.0 * shift:+.2g}")
+        told.append(f"the offset by {2.0 * offset.scale * shift:+.2g} {offset.unit}")
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
     text = f"{' and '.join(told)}: the intervals hold it"
@@ -198,8 +200,9 @@ def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> 
     if not count or not float(np.mean(more[rows])) > SURE * error:
         return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
+    largest = f"{np.max(np.abs(record[name])):.4g} {KNOWN_UNITS.get(name, '')}".rstrip()
     text = (
-        f"{share:.2g} % of its samples stand at the largest value, {np.max(np.abs(record[name])):.4g}, where "
+        f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
         "the other rows say that it was larger: clipped; these rows are left out"
     )
     return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]

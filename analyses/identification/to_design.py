@@ -88,10 +88,10 @@ def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, f
     rest = design.inertia_kgm2 - own / scale
     left = (total_kgm2 - rest) * scale
     if not left > 0.0:
-        other = INERTIAS[1 - INERTIAS.index(key)]
+        other, unit = INERTIAS[1 - INERTIAS.index(key)], "kg" if design.axis == "linear" else "kg m^2"
         raise InputError(
-            f"identified inertia {total_kgm2:.4g} at the motor in all, but the design's inertias "
-            f"beside {key} alone make {rest:.4g}: correct them, or write it to {other}",
+            f"identified inertia {total_kgm2:.4g} {unit} at the motor in all, but the design's inertias "
+            f"beside {key} alone make {rest:.4g} {unit}: correct them, or write it to {other}",
             where=design.origin or design.name,
         )
     return left, scale

@@ -33,7 +33,7 @@ class Asked(OnMachines):
     step: Annotated[
         float | None, Option('Nonlinear step of every sample, such as "1 deg".', "ANGLE", kind="output")
     ] = None
-    duration_s: Annotated[float, Option("Duration of that step; 0.5.", "S")] = 0.5
+    duration_s: Annotated[float, Option("Duration of that step; 0.5.", "s")] = 0.5
     load_Nm: Annotated[float, LOAD] = 0.0
     operating_point: Annotated[str, POINT] = "sliding"
     at_least: Annotated[
@@ -41,7 +41,6 @@ class Asked(OnMachines):
         Option(
             "Probability that is enough, if its one-sided 95 % lower bound shows it; else every sample must "
             "pass, and the worst case (with --no-worst: at least 59 samples, which show 95 %).",
-            "P",
         ),
     ] = None
     worst: Annotated[bool, Option("Seek the worst case of each requirement.", flag="worst/--no-worst")] = True

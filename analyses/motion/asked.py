@@ -39,21 +39,21 @@ class Asked:
             kind="command",
         ),
     ] = 1.0
-    frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "HZ")] = 1.0
-    to: Annotated[float | None, Option("Last frequency of a chirp or set; ten times the first.", "HZ")] = None
+    frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "Hz")] = 1.0
+    to: Annotated[float | None, Option("Last frequency of a chirp or set; ten times the first.", "Hz")] = None
     count: Annotated[int, Option("Number of frequencies of a stepped or multisine; 10.")] = 10
     cycles: Annotated[
         int | None, Option("Periods played of a sine or triangle, or of each of a stepped sine (5).")
     ] = None
     seed: Annotated[int, Option("Seed of the phases of a multisine; 0.")] = 0
-    start: Annotated[float, Option("Time at which the command begins; 0.", "S")] = 0.0
-    duration: Annotated[float | None, Option("Duration; 1, or that of a stepped sine or a record.", "S")] = (
+    start: Annotated[float, Option("Time at which the command begins; 0.", "s")] = 0.0
+    duration: Annotated[float | None, Option("Duration; 1, or that of a stepped sine or a record.", "s")] = (
         None
     )
     bias_rate: Annotated[float, Option("Ramp added underneath: the amplitude's unit per second; 0.")] = 0.0
     load: Annotated[float, LOAD] = 0.0
     load_slope: Annotated[
-        float, Option("Load torque per rad of output angle, added to the design's; 0.", "N_m/rad")
+        float, Option("Load torque per rad of output angle, added to the design's; 0.", "N*m/rad")
     ] = 0.0
     load_file: Annotated[
         Path | None, Option("Load torque over time: s (of the run, or the record's), N m.", "CSV")

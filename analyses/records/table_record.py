@@ -77,7 +77,7 @@ class SiRows:
         else:
             if times.minimum is not None:
                 late = block.values[:, 0] >= times.minimum
-                block = self._kept(block, late, f"time below {times.minimum:g}")
+                block = self._kept(block, late, f"time below {times.minimum:g} {times.unit}")
             time = self._unwrapped(block.values[:, 0]) * self._factor
             keep = self._increases(time, block)
             time, raw = time[keep], self._kept(block, keep, "whose time does not increase").values[:, 1:]

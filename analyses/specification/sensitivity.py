@@ -111,7 +111,8 @@ def population_figures(
 ) -> dict[str, np.ndarray]:
     """Figures of many designs by column, as `Sensitivity` names them; static ones at the design's loads.
 
-    Behind the mean of a limited jerk the response to the command is not among them.
+    Margins of an unstable loop are negative: how far it is from stable. Behind the mean of a limited jerk the
+    response to the command is not among them.
     """
     linear = linear_figures(population, time_figures=time_figures, held=True)
     columns = {}
@@ -120,7 +121,8 @@ def population_figures(
             unlike = loop == "position" and quantity.of_response and command_mean(design)
             if (time_figures or not quantity.timed) and not unlike:  # stairs of samples have no slope
                 values = linear.quantity(name, loop)
-                columns[f"{loop}.{name}"] = np.abs(values) if quantity.absolute else values
+                sized = np.abs(values) if quantity.absolute else values
+                columns[f"{loop}.{name}"] = np.where(linear.stable(loop), sized, -sized)
     for name, load in drive_cases(design.validation.loads_Nm):
         if name != "motor_current" or design.motor.has_electrical_dynamics:
             columns[f"drive.{name}@{load:g}"] = drive_figures(population, name, load)

@@ -82,7 +82,7 @@ def _below_nyquist(w0: Any, period_s: Any, kind: str, where: str) -> Any:
     nyquist = pi / np.asarray(period_s)
     if np.any(w0 >= nyquist):
         message = f"control.velocity.filter: {kind} at {np.max(w0):g} rad/s"
-        raise InputError(f"{message}: must be below pi/T = {np.min(nyquist):g}", where=where)
+        raise InputError(f"{message}: must be below pi/T = {np.min(nyquist):g} rad/s", where=where)
     return w0
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.request import OnMachines, Option, flag, options
+from analyses.request import OnMachines, Option, flag, is_number, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli.options import (
@@ -132,9 +132,10 @@ def answer(
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values: dict[str, Any] = {}
-    for name, (_, option) in options(one.request).items():
+    for name, (kind, option) in options(one.request).items():
         of, value = f"--{option.flag or flag(name)}", chosen[name]
-        values[name] = value if option.kind == "plain" else read_quantity(of, value, option.kind, drive)
+        plain = option.kind == "plain" and not is_number(kind)
+        values[name] = value if plain else read_quantity(of, value, option.kind, drive, option.metavar)
     if one.written and (as_json or out is not None):
         values[one.written] = True
     asked = one.asked(subject, values)
@@ -197,9 +198,13 @@ def _print(
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:
     """A field as an option of typer; what is not given is None, and the request knows what then."""
-    text = kind if option.kind == "plain" else str
+    text = kind if option.kind == "plain" and not is_number(kind) else str
     if option.argument:
         needed = Parameter.empty if default is None else default
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
-    made = typer.Option(f"--{option.flag or flag(name)}", metavar=option.metavar or None, help=option.words)
+    made = typer.Option(
+        f"--{option.flag or flag(name)}",
+        metavar=option.metavar or "NUMBER" * is_number(kind) or None,
+        help=option.words,
+    )
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)

@@ -64,11 +64,13 @@ def export(
     result = export_objects(drive, complete=complete or None)
     if into is not None or (out is not None and out.suffix.lower() in (".xdc", ".xml")):
         text, homeless = settings_xml(result.objects, into)
+        unsaid = result.objects.velocity_gain_factor != 1.0
     else:
-        text, homeless = write_settings_toml(result.objects), ()
+        text, homeless, unsaid = write_settings_toml(result.objects), (), False
     write_new(out, text, force)
     notes = [*(f"rounded: {item}" for item in result.rounded), *result.notes]
     notes += [f"no place for it in {into}: {label}" for label in homeless]
+    notes += ["XML has no place for that factor: import it with --velocity-gain-per rpm"] * unsaid
     if as_json:
         objects = [_plain(item) for item in result.objects.values]
         made = {"schema": "actuator-lti/objects", "version": 1, "objects": objects, "notes": notes}

@@ -56,35 +56,45 @@ SetOption = Annotated[
 ]
 
 
-def read_quantity(option: str, words: str | None, kind: Kind, drive: Design) -> float | None:
-    """A number of the command line with its unit; of a load or of the command also without it.
+_AT_OUTPUT = {
+    ("output", "rotary"): ("rad", 'a value such as "2 deg"'),
+    ("output", "linear"): ("m", 'a value such as "5 mm"'),
+    ("load", "rotary"): ("N*m", 'a torque such as "4 N*m"'),
+    ("load", "linear"): ("N", 'a force such as "40 N"'),
+}
+
+
+def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, unit: str = "") -> float | None:
+    """A number of the command line with its unit; but for a position of the output also without it.
 
     In SI a position of the output or a load there, in its usual unit the outermost loop's command; the
-    drive's axis and outermost loop say the unit. ``option`` is for the message.
+    drive's axis and outermost loop say the unit. A plain number is in ``unit``. ``option``: for the message.
     """
-    from actuator_lti.design.units import parse_quantity
-    from nonlinear.runs.trajectory import COMMAND_UNITS
+    from actuator_lti.design.units import parse_limit
 
     if words is None:
         return None
     bare: float | None = None
-    linear, factor = drive.axis == "linear", 1.0
-    if kind == "output":
-        unit, allowed = ("m", 'a value such as "5 mm"') if linear else ("rad", 'a value such as "2 deg"')
-    elif kind == "load":
-        unit, allowed = ("N", 'a force such as "40 N"') if linear else ("N*m", 'a torque such as "4 N*m"')
+    if kind in ("output", "load"):
+        unit, allowed = _AT_OUTPUT[kind, drive.axis]
     else:
-        usual, factor = COMMAND_UNITS[drive.axis, drive.controller.outermost]
-        unit, allowed = usual.replace("deg", "rad").replace("mm", "m"), f'"5 {usual}", or 5 in {usual}'
+        unit = _command_unit(drive) if kind == "command" else unit
+        allowed = f'"5 {unit}", or 5 in {unit}' if unit else 'a number such as 0.5 or "50 %"'
     with suppress(ValueError):
         bare = None if kind == "output" else float(words)
     if bare is not None and not isfinite(bare):
         raise InputError(f"{option} {words}: must be a finite number")
     try:
-        return factor * parse_quantity(words, unit) if bare is None else bare
+        return parse_limit(words, unit or "1") if bare is None else bare
     except InputError as error:
         reason = error.message.partition("; allowed")[0]
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
+
+
+def _command_unit(drive: Design) -> str:
+    from nonlinear.runs.trajectory import COMMAND_UNITS
+
+    return COMMAND_UNITS[drive.axis, drive.controller.outermost][0]
 
 
 def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Design:

@@ -71,7 +71,7 @@ def keys(asked: Asked) -> Keys:
     if asked.explain is not None:
         design = load_design(asked.explain)
         figures = tuple(one for one in sheet_figures(design) if text in one.name.lower())
-        rows = (*explained(design), *_assumed(design, asked.explain))
+        rows = (*explained(design), *_assumed(design))
         warnings = tuple(Warned(line) for line in warnings_of(design) if text in line.lower())
         return Keys(tuple(item for item in rows if text in item.path), design, figures, warnings)
     axis: Axis = "linear" if asked.linear else "rotary"
@@ -85,13 +85,11 @@ def keys(asked: Asked) -> Keys:
     return Keys(found)
 
 
-def _assumed(design: Design, file: str) -> tuple[Explained, ...]:
+def _assumed(design: Design) -> tuple[Explained, ...]:
     """The path of the load where its file does not say it: an engineer has to."""
     from actuator_lti.design.key_reference import Explained
-    from actuator_lti.design.loader import design_text
-    from actuator_lti.files.reading import parse_toml
 
-    if "path" in parse_toml(design_text(file), file).get("load", {}):
+    if "load.path" in design.written:
         return ()
     path = design.load.path
     return (Explained("load.path", "not written", f"{path}, assumed", "a load only adds friction"),)

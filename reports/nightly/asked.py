@@ -39,9 +39,9 @@ class Settings(OnMachines):
 
     build: ClassVar[str] = "reports.nightly.compute:build"
     workers: Annotated[int | None, Option("Worker processes; 2.", "N")] = 2
-    time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "SECONDS")] = 900.0
+    time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "s")] = 900.0
     memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = JOB_MEMORY_MB
-    wait_s: Annotated[float, Option("Wait for another nightly on the same site; 0.", "SECONDS")] = 0.0
+    wait_s: Annotated[float, Option("Wait for another nightly on the same site; 0.", "s")] = 0.0
     keep: Annotated[int, Option("Nights whose reports stay on the site; 60.", "NIGHTS")] = 60
     state: Annotated[Path | None, STATE] = None
     accept_lost_history: Annotated[bool, ANEW] = False

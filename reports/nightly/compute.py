@@ -9,6 +9,7 @@ from actuator_lti.design.loader import read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
+from reports import document as doc
 from reports.document_schema import Document
 from reports.nightly.figures import digest
 
@@ -21,7 +22,6 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     designs alone), or ``refused``, why there is none.
     """
     from analyses.isolation import drain
-    from reports import document as doc
     from reports.html import page
 
     drain()

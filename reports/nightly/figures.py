@@ -53,7 +53,7 @@ def digest(document: Mapping[str, Any]) -> Tree:
 def verdicts_of(document: Mapping[str, Any]) -> list[Tree]:
     """Return the requirements of a document, each once, in its order.
 
-    ``distance`` is positive where it is met, ``relative`` that of the limit; ``limit`` is in words, ``bound``
+    ``distance`` is positive where it is met, ``relative`` its `reserve`; ``limit`` is in words, ``bound``
     the number; ``what`` is `REQUIREMENTS` or the kind of check; ``role`` its colour, ``why`` beside its word.
     """
     made: dict[str, Tree] = {}
@@ -83,6 +83,13 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
         "why": why(item),
         **{key: item[key] for key in _AS_THEY_ARE},
     }
+
+
+def left(verdict: Mapping[str, Any]) -> float:
+    """What a verdict is ranked by: minus infinity where not met without a figure, infinity if by none."""
+    lost = verdict["value"] is None and verdict["verdict"] == "not met" and verdict["what"] == REQUIREMENTS
+    known = -math.inf if lost else verdict["relative"]
+    return math.inf if known is None else float(known)
 
 
 def figures_of(document: Mapping[str, Any]) -> Iterator[Figure]:

@@ -129,7 +129,7 @@ def markdown(night: Overview) -> str:
     lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {night.counts}", "", run, ""]
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]
     if notable:
-        lines += ["| design | state | worst requirement | distance | moved since last night |"]
+        lines += ["| design | state | worst requirement | left to its limit | moved since last night |"]
         lines += ["|---|---|---|---:|---:|", *map(_row, notable[:_LISTED])]
         lines += [f"| and {len(notable) - _LISTED} more | | | | |"] if len(notable) > _LISTED else []
     else:
@@ -140,7 +140,8 @@ def markdown(night: Overview) -> str:
 
 
 def _row(design: DesignView) -> str:
-    worst = "" if design.result.worst is None else f"{100 * design.result.worst:+.1f} %"
+    lost = "not met" if design.result.worst_id else ""
+    worst = lost if design.result.worst is None else f"{100 * design.result.worst:+.1f} %"
     state = " ".join(STATES[design.state])
     cells = (markdown_cell(design.name), state, markdown_cell(design.result.worst_id), worst)
     return f"| {' | '.join(cells)} | {len(design.last_night.changes)} |"

@@ -4,6 +4,7 @@ import platform
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from actuator_lti.start.extras import need
 from reports.nightly import site as site_files
 from reports.nightly.asked import Asked, Settings
 from reports.nightly.cache import Cache, CorruptEntry
-from reports.nightly.figures import Figure
+from reports.nightly.figures import Figure, left
 from reports.nightly.history import History, Reported, open_history
 from reports.nightly.processes import Answer, Limits, Task, build_each
 from reports.nightly.records import Result, Run
@@ -192,8 +193,8 @@ def _built(run: Run, job: Job, key: str, answer: Answer, cache: Cache) -> Outcom
 def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any) -> Outcome:
     """What came of a job that has a report: its result, its figures and what is behind them."""
     failing, sections = meta["failed"] or meta["failed_sections"], ", ".join(meta["failed_sections"])
-    ranked = [v for v in meta["verdicts"] if v["relative"] is not None]
-    worst: Mapping[str, Any] = min(ranked, key=lambda v: v["relative"], default={"relative": None, "id": ""})
+    ranked = [v for v in meta["verdicts"] if left(v) < inf]
+    worst: Mapping[str, Any] = min(ranked, key=left, default={"relative": None, "id": ""})
     result = Result(
         run=run.id,
         name=job.name,

@@ -151,7 +151,9 @@ def course_of(night: Overview, design: DesignView, history: History, past: Seque
     for k in sorted(range(len(figures)), key=lambda k: figures[k].kind != "requirement"):
         figure = figures[k]
         shown = figure.kind in ("requirement", "check") or (figure.better and figure.kind == "figure")
-        if shown and np.isfinite(values[:, k]).any():
+        if figure.kind == "requirement" and not np.isfinite(values[:, k]).any():
+            course.steady.append(figure)  # of a loop that was never stable, say
+        elif shown and np.isfinite(values[:, k]).any():
             _add(course, figure, verdicts.get(figure.name, {}), nights, values[:, k], allowed[k])
     return course
 

@@ -90,7 +90,8 @@ class DesignView:
     @property
     def rank(self) -> tuple[float, ...]:
         """Order of the index: no result first, then what fails, then the worst distance to a requirement."""
-        worst = np.inf if self.result.worst is None else self.result.worst
+        lost = -np.inf if self.result.worst_id else np.inf  # not met without a figure; no requirement
+        worst = lost if self.result.worst is None else self.result.worst
         return (0.0 if self.broken else 1.0 if self.state == "fail" else 2.0, worst)
 
 
@@ -123,7 +124,9 @@ class Overview:
     @property
     def counts(self) -> str:
         counted = ((self.count(state), words) for state, (_, words) in STATES.items())
-        return ", ".join(f"{count} {words}" for count, words in counted if count)
+        apart = (d for d in self.designs if d not in self.alone and d.state != "pass")
+        said = ", ".join(f"{count} {words}" for count, words in counted if count)
+        return "; ".join([said, *(f"{one.name}: {STATES[one.state][1]}" for one in apart)])
 
     @property
     def passed(self) -> bool:

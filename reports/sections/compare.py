@@ -19,7 +19,7 @@ from reports.as_json import as_json
 from reports.html import show_signed
 from reports.numbers import capital, row_time_unit, significant
 from reports.sections import compare_best, compare_figures
-from reports.sections.compare_best import SEEN, number
+from reports.sections.compare_best import SEEN, number, unstable_words
 from reports.sections.names import LOOPS, unit_words
 from reports.sections.requirements import item, label, limit_words
 from reports.sections.validation import loop_name, quantity_name
@@ -31,8 +31,8 @@ _MOST_MOVERS = 3
 _TERMINAL = ("gain_margin", "phase_margin", "modulus_margin", "bandwidth", "overshoot", "settling_time")
 _OF_GROUP = doc.of(lambda name: f"{GROUPS[name.group]}: {name.label}", "figure", "Figure")
 _MARKS = (
-    "In brackets the difference from the base. ▲ best and ▽ worst of all designs. Margins by their size: one "
-    "downwards counts as one upwards."
+    "In brackets the difference from the base. ▲ best and ▽ worst of the stable designs; a loop that is not "
+    "stable has no figures. Margins by their size: one downwards counts as one upwards."
 )
 
 
@@ -53,9 +53,9 @@ def brief(comparison: Comparison) -> Brief:
         name
         for name in shown.names
         if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
-        if any(name.key in one.differences for one in shown.variants)
+        if any(name.key in one.differences or name.group in one.unstable for one in shown.variants)
     ]
-    loops = _of_figures("Loops", names, _OF_GROUP, shown, batches(shown)[:1], _MARKS) if names else []
+    loops = _of_figures("Loops", names, _OF_GROUP, shown, batches(shown), _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
     return Brief(result(comparison), [block, *loops], notes)
@@ -74,9 +74,11 @@ def write(comparison: Comparison, folder: Path | None) -> list[str]:
 
 
 def result(comparison: Comparison) -> str:
-    """Count the requirements of all designs, and name the first that is not met, or not proven."""
+    """Count the requirements of all designs; name the first that is not stable, not met, or not proven."""
     everything = comparison.everything
     said = f"{comparison.tally.words('requirements')}, over {len(everything.all)} designs."
+    unstable = [f"{one.variant.name}, {unstable_words(one)}" for one in everything.all if one.unstable]
+    said += _first_of("Not stable", unstable)
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         of = [(one, v) for one in everything.all for v in one.verdicts if v.verdict == word and not v.waiver]
         said += _first_of(word.capitalize(), [f"{one.variant.name}, {label(v)}" for one, v in of])
@@ -135,7 +137,9 @@ def _side_by_side(
 def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
     verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
     if verdict is None or verdict.value is None:
-        return {"text": "none", "status": verdict.role if verdict else "info"}
+        unstable = verdict is not None and verdict.loop in one.unstable
+        words = "not stable" if unstable else "none"
+        return {"text": words, "status": verdict.role if verdict else "info"}
     change = 0.0 if wanted.value is None else verdict.value - wanted.value
     factor = shown_unit(wanted.requirement.unit)[1]
     return {"text": _with_change(factor * verdict.value, factor * change), "status": verdict.role}
@@ -157,7 +161,7 @@ def figures(comparison: Comparison) -> doc.Section:
         if names := [name for name in comparison.names if name.group == group]:
             blocks += _of_figures(title, names, head, comparison, parts)
     variants = comparison.everything.variants
-    moved = sum(bool(one.differences) for one in variants)
+    moved = sum(bool(one.differences) or one.unstable != comparison.base.unstable for one in variants)
     result = f"{moved} of {len(variants)} variants change a figure of the base."
     return doc.section("figures", "Figures side by side", blocks, result=result, intro=_MARKS)
 
@@ -196,7 +200,8 @@ def differences(comparison: Comparison) -> doc.Section:
         heading = f"{one.variant.name}: {keys}"[:400]
         same = not (one.changed or one.differences)
         equal = doc.text(f"{one.variant.name}: equal to the base.")
-        blocks.append(equal if same else doc.details(heading, [_moved_table(one, comparison)]))
+        lost = [doc.text(f"Not stable: {unstable_words(one)}. It has no figures.")] if one.unstable else []
+        blocks.append(equal if same else doc.details(heading, [*lost, _moved_table(one, comparison)]))
     intro = (
         "Each changed key is applied alone to the base, over the exact sampled loops. What the keys do not "
         "explain is their interaction. Large-signal figures are not taken apart."

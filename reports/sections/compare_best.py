@@ -7,6 +7,7 @@ and figure, those with the most and the least room.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 from actuator_lti.asked.quantities import reserve
@@ -16,6 +17,7 @@ from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.nightly.text import csv_text
 from reports.numbers import significant
+from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label, limit_words
 
 SEEN = 5e-5  # relative; a smaller difference changes no digit that is shown
@@ -50,8 +52,13 @@ def failed(one: Compared) -> int:
 
 
 def nearness(verdict: RequirementVerdict) -> float | None:
-    """What is left to the nearer limit as a share of it; ``None`` where either is missing."""
+    """What is left to the nearer limit as a share of it; ``None`` where either is missing.
+
+    Minus infinity for a figure of a loop that is not stable: it is not met, and there is none.
+    """
     of = verdict.requirement
+    if verdict.value is None and verdict.verdict == Verdict.NOT_MET:
+        return -math.inf
     limits = [limit for limit in (of.minimum, of.maximum) if limit]
     if verdict.value is None or verdict.distance is None or not math.isfinite(verdict.distance) or not limits:
         return None
@@ -71,6 +78,8 @@ def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
 
     def nearest(one: Compared) -> str:
         near, verdict = weakest(one)
+        if one.unstable:
+            return f"not stable: {unstable_words(one)}"
         return "" if verdict is None else f"{label(verdict)}, {_percent(near)}"
 
     columns = [
@@ -83,6 +92,11 @@ def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
         doc.of(lambda o: "" if o is base else _changes(o, comparison, -1), "gives", "Gives up most"),
     ]
     return doc.listing("Each design", comparison.all, columns, note, lambda one: tally(one.verdicts).role)
+
+
+def unstable_words(one: Compared) -> str:
+    """Name the loops that are not stable."""
+    return ", ".join(LOOPS[name] for name in one.unstable)
 
 
 def _those(one: Compared, word: Verdict) -> str:
@@ -101,6 +115,8 @@ def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
 
 
 def _percent(part: float, *, signed: bool = False) -> str:
+    if math.isinf(part):
+        return "lost" if part < 0.0 else "regained"
     sign = "+" if signed and part > 0 else ""
     return f"{sign}{significant(100.0 * part, 2)} %"
 
@@ -119,12 +135,12 @@ def _best(comparison: Comparison) -> doc.Block:
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
-            seen = SEEN * max(abs(high[0]), 1e-9)
-            first, *alike = [name for near, name, _ in ranked if high[0] - near <= seen]  # the base is first
-            same = high[0] - low[0] <= seen
+            alike_one = partial(math.isclose, high[0], rel_tol=SEEN, abs_tol=1e-9 * SEEN)
+            first, *alike = [name for near, name, _ in ranked if alike_one(near)]  # the base is first
+            same = alike_one(low[0])
             best = first + f"; {len(alike)} alike" * bool(alike)
             row |= {"best": "all alike" if same else best, "value": high[2]}
-            row["worst"] = "" if same else f"{low[1]}: {low[2]}"
+            row["worst"] = "" if same else f"{low[1]}: {low[2] or 'not stable'}"
         rows.append(row)
     return doc.table("Best design of each requirement", columns, rows)
 
@@ -168,7 +184,7 @@ def _ends(comparison: Comparison) -> Iterator[int]:
 
 def _least_and_most(values: Mapping[int, float | None]) -> tuple[int, ...]:
     """Where the least and the largest of the values that are there stand."""
-    known = {k: value for k, value in values.items() if value is not None and math.isfinite(value)}
+    known = {k: value for k, value in values.items() if value is not None and not math.isnan(value)}
     return (min(known, key=known.__getitem__), max(known, key=known.__getitem__)) if known else ()
 
 
@@ -204,16 +220,16 @@ def shown_words(comparison: Comparison) -> str:
 
 
 def table_text(comparison: Comparison) -> str:
-    header = ["design", "met", "not_met", "not_proven", "weakest", "room_percent"]
+    header = ["design", "met", "not_met", "not_proven", "unstable", "weakest", "room_percent"]
     header += [f"{name.key} [{name.unit}]" for name in comparison.names]
     header += [f"requirement {one.id} [{one.requirement.unit}]" for one in comparison.base.verdicts]
     rows: list[list[object]] = []
     for one in comparison.all:
         (near, verdict), count = weakest(one), tally(one.verdicts)
         values = {v.id: v.value for v in one.verdicts}
-        least = (None, None) if verdict is None else (verdict.id, 100.0 * near)
+        least = (None, None) if verdict is None or math.isinf(near) else (verdict.id, 100.0 * near)
         figures = [one.figures.get(name.key) for name in comparison.names]
         asked = [values.get(wanted.id) for wanted in comparison.base.verdicts]
-        counts = (count.met, count.not_met, count.not_proven)
+        counts = (count.met, count.not_met, count.not_proven, " ".join(one.unstable))
         rows.append([one.variant.name, *counts, *least, *figures, *asked])
     return csv_text(header, rows)

@@ -109,7 +109,7 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
         place = verdict.loop or "drive"
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
-        if key in comparison.sensitivities.base:
+        if comparison.base.figures.get(key) is not None:
             result[key] = r.minimum if r.minimum is not None else r.maximum
     if not result:
         margins = ("gain_margin", "phase_margin", "bandwidth")
@@ -156,5 +156,6 @@ def _slopes(comparison: Comparison) -> doc.Block:
         doc.of(lambda pair: known.base[pair[0]], "base", "Nominal", format="sig:5"),
         doc.of(lambda pair: pair[1].high, "high", "At its high end", format="sig:5"),
     ]
-    slopes = [(key, one) for key in known.base for one in known.tornado(key)[:MOST_BARS]]
+    there = (key for key in known.base if comparison.base.figures.get(key) is not None)
+    slopes = [(key, one) for key in there for one in known.tornado(key)[:MOST_BARS]]
     return doc.listing("Slopes and ranges, the ten strongest parameters of each figure", slopes, columns)

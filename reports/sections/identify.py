@@ -16,15 +16,7 @@ from analyses.identification.two_mass import NAMES, angle_responses, response
 from analyses.identification.verdict import Identified
 from reports import document as doc
 from reports.charts import style
-from reports.sections import identify_campaign, identify_records
-from reports.sections.identified import (
-    constant_words,
-    finding_table,
-    input_table,
-    judged,
-    parameter_table,
-    value_words,
-)
+from reports.sections import identified, identify_campaign, identify_records
 from reports.sections.measured import decibels_and_degrees
 
 
@@ -79,7 +71,7 @@ def _plan(plan: Plan) -> doc.Section:
     groups = [(next(same), 1 + sum(1 for _ in same)) for _, same in groupby(plan.segments, key=id)]
     expected = "Intervals to be expected, at the design's values"
     blocks = [
-        parameter_table(expected, plan.expected, note, axis=axis, more=[share]),
+        identified.parameter_table(expected, plan.expected, note, axis=axis, more=[share]),
         doc.listing("Motions, in this order", groups, columns),
     ]
     if plan.segments:
@@ -100,7 +92,7 @@ def _plan(plan: Plan) -> doc.Section:
 def _two_mass(result: FrequencyResult) -> doc.Section:
     """Parameters, and motor angle (and load angle) over motor torque: measured lines and the model."""
     fit, lines = result.fit, result.lines
-    blocks = [parameter_table("Identified two-mass drive", result.found)]
+    blocks = [identified.parameter_table("Identified two-mass drive", result.found)]
     model = angle_responses(
         lines.omega_rad_s, {name: fit[name] for name in NAMES}, fit.reduction, fit.reaction
     )
@@ -112,18 +104,21 @@ def _two_mass(result: FrequencyResult) -> doc.Section:
         panel.curve(hertz, np.abs(model[k - 1]), "two-mass model", **style.series(1))
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
         blocks.append(doc.figure("response", chart, caption))
-    blocks.append(input_table(f"Inputs: {result.record.name}", result.inputs))
-    blocks += [finding_table(name, rows) for name, rows in result.findings.items()]
+    blocks.append(identified.input_table(f"Inputs: {result.record.name}", result.inputs))
+    blocks += [identified.finding_table(name, rows) for name, rows in result.findings.items()]
     intro = (
         f"{fit.lines} lines of a period of {result.period_s:g} s, means over {lines.periods} periods; "
         "two-mass drive by maximum likelihood with the noise of every line from the spectrum beside it. "
         f"Misfit {fit.misfit:.2f} (1: the noise explains the residuals)."
     )
     low, high = fit.antiresonance_rad_s[0] / (2.0 * np.pi), fit.resonance_rad_s[0] / (2.0 * np.pi)
-    words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {value_words(fit, 'stiffness')}"
+    stiffness = identified.value_words(fit, "stiffness")
+    words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {stiffness}"
     words += "" if result.play is None else f", play {2e3 * result.play.half_rad:.3g} mrad"
-    words += f"{constant_words(fit)}."
-    return judged("frequency-identification", "Two-mass drive", result, blocks, result=words, intro=intro)
+    words += f"{identified.constant_words(fit)}."
+    return identified.judged(
+        "frequency-identification", "Two-mass drive", result, blocks, result=words, intro=intro
+    )
 
 
 SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
@@ -141,7 +136,7 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
         f"sampled loop, {noise}."
     )
-    blocks: list[doc.Block] = [parameter_table("Identified values", fit)]
+    blocks: list[doc.Block] = [identified.parameter_table("Identified values", fit)]
     both = decibels_and_degrees(measured.response, result.modelled)
     for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
         chart = style.Chart(width=style.WIDE, height=280.0)
@@ -151,8 +146,8 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
-    values = "; ".join(f"{parameter(name).key} {value_words(fit, name)}" for name in fit.names)
-    values += constant_words(fit)
-    return judged(
+    values = "; ".join(f"{parameter(name).key} {identified.value_words(fit, name)}" for name in fit.names)
+    values += identified.constant_words(fit)
+    return identified.judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )

@@ -11,8 +11,8 @@ from analyses.identification.richer import LawScore, RicherLaws
 from analyses.identification.run import CampaignAnswer
 from analyses.identification.surface import NAMES, SurfaceFit
 from reports import document as doc
+from reports.sections import identified
 from reports.sections.campaign_figures import region_figure, residual_figure, surface_figure, window_figures
-from reports.sections.identified import constant_words, input_table, judged, parameter_table, value_words
 
 
 def section(answer: CampaignAnswer) -> doc.Section:
@@ -22,16 +22,18 @@ def section(answer: CampaignAnswer) -> doc.Section:
     blocks += [residual_figure(fit), *window_figures(result), shared_table(fit)]
     blocks += [law_table(result.laws)] if result.laws is not None else []
     blocks += suggestion_blocks(answer.suggestion) if answer.suggestion is not None else []
-    blocks += [*account_blocks(result), input_table("Inputs of all runs", result.inputs)]
+    blocks += [*account_blocks(result), identified.input_table("Inputs of all runs", result.inputs)]
     blocks.append(doc.details("Every run", [run_table(result)]))
     intro = (
         f"{len(fit.points)} of {result.runs_listed} runs, {result.rows_in} rows in, {result.rows_out} out. "
         f"M = kM i with kM = {result.torque_constant_Nm_A:g} N m/A, averaged over the steady part of each "
         f"run ({result.criterion}), then M = C0 + Cv w + CM |M_ext| with errors in all variables."
     )
-    found = ", ".join(f"{name} = {value_words(fit, name)}" for name in NAMES)
-    words = f"{found}{constant_words(fit)}, from {len(fit.points)} runs."
-    return judged("identification", "Identified friction", answer, blocks, result=words, intro=intro)
+    found = ", ".join(f"{name} = {identified.value_words(fit, name)}" for name in NAMES)
+    words = f"{found}{identified.constant_words(fit)}, from {len(fit.points)} runs."
+    return identified.judged(
+        "identification", "Identified friction", answer, blocks, result=words, intro=intro
+    )
 
 
 def coefficient_table(fit: SurfaceFit) -> doc.Block:
@@ -45,7 +47,7 @@ def coefficient_table(fit: SurfaceFit) -> doc.Block:
         "Intervals by propagated distributions (GUM Supplement 1): Student for the scatter of the runs, "
         "uniform for the instruments' shared errors."
     )
-    return parameter_table("Friction coefficients", fit, note, more=more)
+    return identified.parameter_table("Friction coefficients", fit, note, more=more)
 
 
 def contribution_table(answer: CampaignAnswer) -> doc.Block:

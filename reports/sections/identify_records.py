@@ -6,21 +6,14 @@ import numpy as np
 
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import DesignValue
+from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital
-from reports.sections.identified import (
-    constant_words,
-    finding_table,
-    input_table,
-    judged,
-    parameter_table,
-    value_words,
-)
+from reports.sections import identified
 from reports.sections.names import speed_unit
 
 
@@ -37,22 +30,26 @@ def section(result: BenchResult) -> doc.Section:
         )
         ended = "ended at a bound of its key: these records do not tell it."
         note += "".join(f" {key} {ended}" for key in refined.at_bound)
-        blocks.append(parameter_table("Refined by simulation", refined, note, axis=axis))
+        if (kept := given_constant(model)) is not None:
+            note += f" {parameter(kept, axis).label}, fixed: {model.fixed[kept].reason}."
+        blocks.append(identified.parameter_table("Refined by simulation", refined, note, axis=axis))
     if result.electrical is not None:
         residual = 100.0 * result.electrical.relative_residual
         note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
-        blocks.append(parameter_table("Voltage equation", result.electrical, note))
+        blocks.append(identified.parameter_table("Voltage equation", result.electrical, note))
     blocks += [law_table(result, axis)] if result.laws else []
     blocks += [scatter_table(model, axis)] if len(result.records) > 1 else []
     for part, record in zip(model.records, result.records, strict=True):
         blocks += [
-            input_table(f"Inputs: {record.name}", result.inputs[record.name]),
-            finding_table(record.name, result.findings[record.name]),
+            identified.input_table(f"Inputs: {record.name}", result.inputs[record.name]),
+            identified.finding_table(record.name, result.findings[record.name]),
             *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
         ]
-    blocks += [finding_table(record.name, result.findings[record.name]) for record in result.validation]
+    blocks += [
+        identified.finding_table(record.name, result.findings[record.name]) for record in result.validation
+    ]
     blocks += residual_blocks(model, result.residual_tests, axis)
-    return judged(
+    return identified.judged(
         "dynamic-identification", "Dynamic identification", result, blocks,
         result=_result(result, axis), intro=_intro(result),
     )  # fmt: skip
@@ -63,15 +60,17 @@ def _result(result: BenchResult, axis: str) -> str:
     model = result.model
     main = [n for n in model.names if n.partition("_")[0] in ("inertia", "dry", "viscous") or n == "map_0"]
     labels = {name: parameter(name, axis).label.partition(",")[0].lower() for name in main[:3]}
-    parts = [f"{label} {value_words(model, name, axis)}" for name, label in labels.items()]
+    parts = [f"{label} {identified.value_words(model, name, axis)}" for name, label in labels.items()]
     if result.refined is not None:  # these are the design's
-        parts = [f"{key} {value_words(result.refined, key, axis)}" for key in result.refined.names[:3]]
+        parts = [
+            f"{key} {identified.value_words(result.refined, key, axis)}" for key in result.refined.names[:3]
+        ]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
     worst = max(result.resimulated, key=lambda one: one.relative_error)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
-    words = f"{told}{constant_words(model, axis)}. {written} meets {met} within"
+    words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
     return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
 
 
@@ -102,7 +101,7 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
         "autocorrelation of the residuals, and the scatter between records where there are several; this one "
         "goes into the design." + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
     )
-    return parameter_table("Identified parameters", model, note, axis=axis, more=more)
+    return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 
 
 def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:

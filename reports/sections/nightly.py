@@ -12,7 +12,7 @@ from reports.nightly.view import STATES, Overview
 def section(night: Overview) -> doc.Section:
     rows = []
     for design in (one for one in night.designs if one.state != "pass"):
-        why = design.why or design.result.worst_id
+        why = design.why or design.result.worst_id or "; ".join(design.meta.get("words", ()))
         if design.state == "regression":
             worst = design.regressions
             why = f"{len(worst)} figures worse than the baseline, {worst[0].figure}"

@@ -3,6 +3,9 @@
 from pathlib import Path
 
 from actuator_lti.asked.quantities import shown_unit, with_unit
+from actuator_lti.design.access import located
+from actuator_lti.design.fields import Structure
+from actuator_lti.design.model import Design
 from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
@@ -13,7 +16,7 @@ from reports.sections.names import in_shown, output_unit
 
 
 def section(result: TuningResult) -> doc.Section:
-    verdicts = doc.verdicts(_verdict(r) for r in result.requirements)
+    verdicts = doc.verdicts(_verdict(r, result.before) for r in result.requirements)
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
         *([confirmed(result)] if result.confirmed else []),
@@ -75,8 +78,11 @@ def _at_limit(r: BindingRequirement) -> bool:
     return 0.0 <= r.relative < 1e-4
 
 
-def _verdict(r: BindingRequirement) -> doc.VerdictItem:
-    corner = "; ".join(f"{path} {value:.4g}" for path, value in r.corner.items()) or "nominal"
+def _verdict(r: BindingRequirement, design: Design) -> doc.VerdictItem:
+    structure = Structure.of(design)
+    units = {path: located(design, path)[0].unit(structure) for path in r.corner}
+    said = (f"{path} {with_unit(value, units[path], '.4g')}" for path, value in r.corner.items())
+    corner = "; ".join(said) or "nominal"
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]
     return doc.verdict(
         f"tuning/{r.id}", f"{r.label}, worst corner", value=r.value, limit=r.limit, unit=r.unit,

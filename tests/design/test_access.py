@@ -1,6 +1,7 @@
 """Changing a design by dotted path, its tolerances, its hash and its warnings."""
 
 import pickle
+from contextlib import nullcontext
 
 import pytest
 
@@ -31,13 +32,10 @@ def test_every_numeric_key_can_be_read_and_changed(path: str) -> None:
     assert others == {p: parameter_value(AMBER, p) for p in paths_of(AMBER) if p != path}
 
 
-def test_a_changed_value_says_what_it_was() -> None:
+def test_a_changed_value_says_what_it_was_with_its_relative_tolerance_or_the_absolute_one() -> None:
     parameter = with_values(AMBER, {"motor.resistance": 0.06}).parameters["motor.resistance"]
     assert (parameter.value, parameter.text) == (0.06, "0.06 ohm")
     assert parameter.source == "changed from 55 mohm"
-
-
-def test_the_relative_tolerance_follows_and_the_absolute_one_stays() -> None:
     relative = with_values(AMBER, {"load.inertia": 4e-4}).parameters["load.inertia"].tolerance
     assert relative.half_width == pytest.approx(2e-4)
     emps = load_design("emps")
@@ -61,14 +59,12 @@ def test_the_relative_tolerance_follows_and_the_absolute_one_stays() -> None:
     ],
 )
 def test_an_impossible_change_is_refused(values: dict[str, float], says: str) -> None:
+    """Relations may be left unchecked for sampling, but not ranges."""
     with pytest.raises(InputError, match=says):
         with_values(AMBER, values)
-
-
-def test_relations_may_be_left_unchecked_for_sampling_but_not_ranges() -> None:
-    assert with_values(AMBER, {"motor.back_emf_constant": 0.01}, check=False)
-    with pytest.raises(InputError):
-        with_values(AMBER, {"motor.resistance": -1.0}, check=False)
+    relation = says in ("within 10 %", "supply cannot reach")
+    with nullcontext() if relation else pytest.raises(InputError, match=says):
+        with_values(AMBER, values, check=False)
 
 
 def test_text_overrides_change_any_key_as_a_file_would() -> None:
@@ -108,9 +104,7 @@ def test_an_override_of_an_unknown_key_is_refused(path: str) -> None:
 def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
     respelled = with_overrides(AMBER, {"motor.inductance": "0.006 mH", "motor.resistance": "0.055 ohm"})
     assert design_hash(respelled) == design_hash(AMBER)
-    text = "# a comment\n" + design_text("ilr33-amber").replace(
-        'source = "tuned here"', 'source = "elsewhere"'
-    )
+    text = "# mine\n" + design_text("ilr33-amber").replace('source = "tuned here"', 'source = "elsewhere"')
     assert design_hash(read_design_text(text, "elsewhere")) == design_hash(AMBER)
     for change in (
         {"motor.inductance": "6.1 uH"},

@@ -36,6 +36,7 @@ def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> 
     file.write_text(write_design(DESIGN), encoding="utf-8")
     wanted = assemble_loops(DESIGN).position.open_loop
     run = simulate(DESIGN, commands.step(0.01), 0.02)
+    assert load_design(DESIGN) is DESIGN
     for given in ("ilr33-amber", str(file), file):
         result = assemble_loops(given).position.open_loop
         assert all(np.array_equal(getattr(result, part), getattr(wanted, part)) for part in "ABCD")
@@ -130,10 +131,6 @@ def test_loops_are_indexed_and_iterated_by_name() -> None:
         stability_margins(loops.velocity)
 
 
-def test_a_design_is_loaded_as_it_is() -> None:
-    assert load_design(DESIGN) is DESIGN
-
-
 def test_a_sweep_changes_one_key_and_says_so() -> None:
     points = sweep("ilr33-amber", "control.position.gain", ["60 1/s", 120.0])
     assert [point.value for point in points] == ["60 1/s", 120.0]
@@ -151,7 +148,9 @@ def cells(html: str) -> list[str]:
     return ["".join(part.itertext()) for part in parts if part.tag in ("td", "th", "caption")]
 
 
-def test_a_notebook_shows_designs_loops_and_margins() -> None:
+def test_a_notebook_shows_designs_loops_and_margins_and_texts_of_a_file_become_no_html() -> None:
+    hostile = write_design(DESIGN).replace("ILR-33", "<script>alert(1)</script>ILR-33")
+    assert cells(read_design_text(hostile)._repr_html_())
     shown = cells(DESIGN._repr_html_())
     assert all(path in shown and known.text in shown for path, known in DESIGN.parameters.items())
     loops = assemble_loops(DESIGN)
@@ -160,14 +159,6 @@ def test_a_notebook_shows_designs_loops_and_margins() -> None:
     shown = cells(margins._repr_html_())
     assert shown[0] == "closed loop: stable"
     assert f"{margins.phase_margin_deg:.4g} deg" in shown
-
-
-def test_texts_of_a_design_file_cannot_become_html() -> None:
-    text = write_design(DESIGN).replace("ILR-33", "<script>alert(1)</script>ILR-33")
-    assert "<script>" in text
-    from actuator_lti import read_design_text
-
-    cells(read_design_text(text)._repr_html_())
 
 
 def test_every_package_says_that_it_has_types() -> None:

@@ -67,17 +67,3 @@ def test_a_gear_alone_keeps_the_motor(tmp_path) -> None:
     assert (design.motor, design.friction.dry_torque_Nm) == (plain.motor, plain.friction.dry_torque_Nm)
     assert (design.coupling.torque_1_Nm, design.coupling.torque_2_Nm) == (29.0, 108.0)
     assert margins(design).passed
-
-
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        (["--motor", "maxon-re-40"], 'nearest known: "maxon-re-40-150w-'),
-        (["--gear", "worm"], "allowed: maxon-gp-26-b-84, "),
-        (["--gear", GEARS[0], "--kind", "fin"], "--gear: not allowed beside --kind and --from"),
-        (["--motor", "", "--from", "fin"], "--motor: not allowed beside --kind and --from"),
-    ],
-)
-def test_what_is_not_in_it_is_refused(asked: list[str], said: str, tmp_path, cli) -> None:
-    assert said in cli.refused("init", tmp_path / "mine.toml", *asked)
-    assert list(tmp_path.iterdir()) == []

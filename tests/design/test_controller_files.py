@@ -42,12 +42,22 @@ SIMPLEFOC = """
   motor.PID_current_q.I= 300;
   driver.voltage_power_supply = 24;
 """
-BY_VOLTAGE = SIMPLEFOC.replace("foc_current", "voltage")
+BY_VOLTAGE = "// motor.torque_controller = TorqueControlType::foc_current;" + SIMPLEFOC.replace(
+    "foc_current", "voltage"
+)
+OF_RESISTANCE = "BLDCMotor motor = BLDCMotor(11, 5.6, 90);" + BY_VOLTAGE
+TWO_MOTORS = SIMPLEFOC + SIMPLEFOC.replace("motor.", "other.")
 EPOS_VALUES = {"30A0sub1": 369404, "30A0sub2": 466187, "30A2sub1": "0xBD52B", "30A2sub2": 23963356,
                "30A1sub1": 1500000, "30A1sub2": 780000, "30A1sub3": 16000, "3001sub2": 6000}  # fmt: skip
 EPOS = "\n".join(f"[{at}]\nParameterName=x\nParameterValue={value}" for at, value in EPOS_VALUES.items())
 SUB = '<CANopenSubObject subIndex="01" actualValue="369404"/>'
 XDC = f'<a><CANopenObject index="30A0">{SUB}</CANopenObject></a>'
+DEFAULTS = EPOS.replace("Value=369404", "Value=\nDefaultValue=250000").replace(
+    "ParameterValue=466187", "ParameterValue=500000\nDefaultValue=1"
+)
+XDC_DEFAULT = XDC.replace("actual", "default").replace(
+    "<CANopenSub", '<CANopenSubObject subIndex="02"/><CANopenSub'
+)
 PEAK, ERPM = sqrt(3) / 2, 7 * 60 / (2 * pi)
 GAINS = [f"control.{stage}.{key}" for stage in ("current", "velocity") for key in ("gain", "integral_time")]
 
@@ -76,8 +86,16 @@ def without(stage: str) -> Design:
         # iq = error in electrical rpm times s_pid_kp/20 times l_current_max
         (VESC, "", (0.0138 * sqrt(3) / PEAK, 0.0138 / 18.1, PEAK * ERPM * 0.004 / 20 * 60, 0.5),
          {"limits.peak_current": PEAK * 60}, ": foc_f_zv"),
+        # lo_current_max = 0.5 * 60, and m_iq_set = output * lo_current_max * 0.5
+        (VESC.replace("<foc_f_", "<l_current_max_scale>0.5</l_current_max_scale><foc_f_"), "",
+         (0.0138 * 2, 0.0138 / 18.1, PEAK * ERPM * 0.004 / 20 * 15, 0.5), {"limits.peak_current": PEAK * 30},
+         ": foc_f_zv"),
         (SIMPLEFOC, "", (6, 0.01, PEAK * 0.5, 0.05), {"encoder.filter_time": 0.005, "limits.voltage": 24},
          ": none"),
+        (SIMPLEFOC.replace("foc_current", "dc_current"), "", (6, 0.01), {}, ": none"),
+        # u_q = R i_q + U_emf of a phase
+        (OF_RESISTANCE, "current", (None, None, sqrt(3) * 0.5 * 5.6, 0.05), {}, "PID_current_q.I"),
+        (OF_RESISTANCE.replace("5.6", "NOT_SET"), "current", (None, None, sqrt(3) * 0.5, 0.05), {}, ".I"),
         (BY_VOLTAGE, "current", (None, None, sqrt(3) * 0.5, 0.05), {}, "PID_current_q.P, PID_current_q.I"),
         # uV/A and uV/(A ms); uA s/rad and uA/rad; uA/rad, uA/(rad s) and uA s/rad
         (EPOS, "position", (0.369404, 369.404 / 466187, 0.775467, 775467 / 23963356),
@@ -86,6 +104,8 @@ def without(stage: str) -> Design:
          {"control.position.gain": 1.5, "control.position.integral_time": 1.5 / 0.78,
           "control.position.derivative_time": 0.016 / 1.5}, ": 0x30A2.01, 0x30A2.02"),
         (XDC, "position", (0.369404,), {}, ": none"),
+        (DEFAULTS, "position", (0.25, 250.0 / 500000), {}, "0x30A1.03"),  # default where there is no value
+        (XDC_DEFAULT, "position", (0.369404,), {}, ": none"),
     ],
 )  # fmt: skip
 def test_each_makers_gains_in_the_units_of_the_model(
@@ -105,6 +125,8 @@ def test_each_makers_gains_in_the_units_of_the_model(
     ("text", "words"),
     [
         (BY_VOLTAGE, r"by voltage; allowed: a design without \[control.current\]"),
+        (TWO_MOTORS, "several motors: motor, other; allowed: the lines of one of them"),
+        (ODRIVE.replace('{"phase_i', '{"motor_type": 2, "phase_i'), "motor_type = 2: allowed: 0"),
         (EPOS, "no velocity loop inside its position loop"),
         (ODRIVE.replace("20.0, ", "20.0, x", 1), "line 3"),
     ],
@@ -116,19 +138,55 @@ def test_what_the_design_cannot_hold_is_refused(text: str, words: str, tmp_path:
 
 
 @pytest.mark.parametrize(
-    ("text", "other"),
+    ("text", "key"),
     [
-        (ODRIVE.replace('constant": 0.04', 'constant": 0').replace("20.0", '"inf"', 2), "position.gain"),
-        (VESC.replace(">14<", ">0<").replace("0.008", "0"), "velocity.integral_time"),
+        (ODRIVE.replace('constant": 0.04', 'constant": 0'), "velocity.gain"),
+        (ODRIVE.replace("20.0", '"inf"', 2), "position.gain"),
+        (ODRIVE.replace("20.0", "NaN", 2), "position.gain"),
+        (VESC.replace(">14<", ">0<"), "velocity.gain"),
+        (VESC.replace("0.004", "0").replace("0.008", "0"), "velocity.integral_time"),
     ],
 )
-def test_numbers_that_say_nothing_are_left_and_said(text: str, other: str, tmp_path: Path) -> None:
-    """A constant of 0, an infinite gain, no poles, no integral: the design keeps what it has."""
+def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_path: Path) -> None:
+    """A constant of 0, an infinite gain, no poles, no gain at all: the design keeps what it has."""
     (tmp_path / "settings").write_text(text)
     result = import_controller_file(tmp_path / "settings", BASE)
-    for key in ("control.velocity.gain", f"control.{other}"):
-        assert parameter_value(result.design, key) == parameter_value(BASE, key)
-        assert any(note.endswith(f"not taken, {key} stays as it is") for note in result.notes)
+    assert parameter_value(result.design, f"control.{key}") == parameter_value(BASE, f"control.{key}")
+    assert any(note.endswith(f"not taken, control.{key} stays as it is") for note in result.notes)
+
+
+PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
+
+
+@pytest.mark.parametrize(
+    ("text", "stage", "key", "why"),
+    [
+        (ODRIVE.replace("0.32", "0"), "", "control.velocity.integral_time", "none"),
+        (EPOS.replace("780000", "0"), "velocity", "control.position.integral_time", "none"),
+        (EPOS.replace("16000", "0"), "velocity", "control.position.derivative_time", "none"),
+        (SIMPLEFOC.replace("0.005f", "0"), "", "encoder.filter_time", "none"),
+        (ODRIVE.replace("10.0,", "Infinity,"), "", "limits.speed", "none"),
+        (VESC, "", "limits.speed", "faster than the supply allows"),
+    ],
+)
+def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, why: str, tmp_path: Path) -> None:
+    """An integral gain of 0, no limit, no filter: nothing of the base stays in its place."""
+    base = with_overrides(without(stage), (PID if stage else {"encoder.filter_time": "1 ms"}))
+    (tmp_path / "settings").write_text(text)
+    result = import_controller_file(tmp_path / "settings", base)
+    assert key in base.parameters
+    assert key not in result.design.parameters
+    assert any(note.endswith(f": {why}, {key} is left out") for note in result.notes)
+
+
+def test_what_a_sketch_says_of_its_motor_is_told(tmp_path: Path) -> None:
+    (tmp_path / "settings").write_text(OF_RESISTANCE)
+    notes = import_controller_file(tmp_path / "settings", without("current")).notes
+    for words in (
+        "KV_rating = 90: by voltage the library adds the back-EMF",
+        "phase_resistance = 5.6: by voltage",
+    ):
+        assert any(note.startswith(words) for note in notes)
 
 
 def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:

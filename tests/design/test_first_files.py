@@ -144,11 +144,14 @@ def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     assert same.torque_constant_Nm_A == pytest.approx(same.back_emf_constant_Vs_rad, rel=1e-5)
 
 
-def test_kv_of_a_motor_stated_per_phase_is_line_line() -> None:
+def test_kv_of_a_motor_per_phase_is_line_line_and_a_constant_missing_behind_a_screw_is_told_at_the_shaft():
     """kM = 8.27/KV in N m per ampere of a phase (ODrive's documentation): kE and kM are one constant."""
     text = motor("peak-phase", torque_constant=f"{8.27 / 82} N*m/A", back_emf_constant="82 KV")
     same = read_design_text(text).effective_motor
     assert same.back_emf_constant_Vs_rad == pytest.approx(same.torque_constant_Nm_A, rel=1e-4)
+    text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
+    answer = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
+    assert answer.endswith("in SI, 0.0127 V*s/rad")
 
 
 # 44 oz-in/A rms is 0.31071 N m/A rms; over sqrt(3) it is kE in V rms line-line
@@ -267,10 +270,6 @@ def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, k
     assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
 
 
-def test_a_controllers_name_is_answered_with_the_command_that_reads_its_settings(cli) -> None:
-    assert "objects import" in cli.refused("keys", "odrive")
-
-
 @pytest.mark.parametrize(
     ("written", "counts"), [("4096 counts/rev", 4096), ("1024 lines/turn", 4096), ("4000 inc/rev", 4000)]
 )
@@ -279,17 +278,9 @@ def test_counts_may_be_said_to_be_per_turn(written: str, counts: int) -> None:
     assert design.encoder.counts_per_rev == counts
 
 
-def test_a_missing_constant_behind_a_screw_is_told_at_the_shaft_of_its_motor() -> None:
-    text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
-    told_of = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
-    assert told_of.endswith("in SI, 0.0127 V*s/rad")
-
-
 def test_what_a_file_does_not_say_is_explained_and_warned_of(cli, tmp_path) -> None:
     file = tmp_path / "direct.toml"
-    file.write_text(
-        DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n', encoding="utf-8"
-    )
+    file.write_text(DRIVE.replace("19.2", '"1/19.2"') + '[control.current]\ngain = "9 Hz"\n')
     data = cli.data("keys", "--explain", f"{file}")
     rows = {one["path"]: (one["written"], one["read"]) for one in data["keys"]}
     assert rows["load.path"] == ("not written", "self-locking, assumed")

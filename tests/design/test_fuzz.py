@@ -1,11 +1,11 @@
-"""Whatever stands in a design is taken or refused in one line; what is taken survives being written."""
+"""What is taken of a design survives being written, in any order, changed and changed back."""
 
 from typing import Any
 
 import pytest
 import tomli_w
 from design_strategies import design_trees
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, reject, settings
 from hypothesis import strategies as st
 
 from actuator_lti.design import (
@@ -20,60 +20,19 @@ from actuator_lti.design import (
 )
 from actuator_lti.errors import InputError
 
-MANY = settings(max_examples=100, suppress_health_check=list(HealthCheck))
-SCALARS = st.one_of(
-    st.none().map(lambda _: ""),
-    st.booleans(),
-    st.integers(),
-    st.floats(),
-    st.text(max_size=20),
-    st.sampled_from(["1 V", "-1 kg", "nan A", "1e400 s", "5 %", "x" * 11_000, "every", "ilr33-amber"]),
-    st.dates(),
-)
-VALUES = st.recursive(
-    SCALARS,
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=8), inner, max_size=3),
-    max_leaves=6,
-)  # fmt: skip
+RELAXED = settings(max_examples=60, suppress_health_check=list(HealthCheck))
 
 
-def one_line(call: Any) -> None:
-    try:
-        call()
-    except InputError as error:
-        for line in str(error).split("\n"):
-            assert line.isprintable()
-            assert len(line) < 2000
-
-
-@MANY
-@given(design_trees(), st.data())
-def test_any_value_at_any_place(tree: dict[str, Any], data: st.DataObject) -> None:
-    here: Any = tree
-    while True:
-        keys = list(here) if isinstance(here, dict) else list(range(len(here)))
-        if not keys:
-            break
-        key = data.draw(st.sampled_from(keys))
-        deeper = isinstance(here[key], dict | list) and data.draw(st.booleans())
-        if not deeper:
-            here[key] = data.draw(VALUES)
-            break
-        here = here[key]
-    try:
-        text = tomli_w.dumps(tree)
-    except (TypeError, ValueError):
-        return
-    one_line(lambda: write_design(read_design_text(text, "f")))
-
-
-@MANY
+@RELAXED
 @given(st.text(max_size=40))
 def test_any_name_of_a_design(name: str) -> None:
-    one_line(lambda: load_design(name))
-
-
-RELAXED = settings(max_examples=60, suppress_health_check=list(HealthCheck))
+    """What a file may hold is damaged in tests/hardness."""
+    said = ""
+    try:
+        load_design(name)
+    except InputError as error:
+        said = str(error)
+    assert all(line.isprintable() and len(line) < 2000 for line in said.split("\n"))
 
 
 def survives(design: Design) -> None:
@@ -108,13 +67,10 @@ OF_AN_INTEGRAL: dict[str, object] = {
 }  # fmt: skip
 
 
-def test_keys_that_need_others_survive() -> None:
+def test_keys_that_need_others_and_tables_without_keys_survive() -> None:
     """None of them is drawn alone: each is refused, or means nothing, without its neighbour."""
     for name, values in (("joint", NEEDING_OTHERS), ("ilr33-amber", OF_AN_INTEGRAL)):
         survives(load_design(name).with_values(values))
-
-
-def test_a_table_without_keys_survives() -> None:
     empty: dict[str, object] = {name: {} for name in ("supply", "temperature", "failure", "duty")}
     drive = load_design("ilr33-amber").with_values(empty)
     assert None not in [getattr(drive, name) for name in empty]
@@ -147,7 +103,10 @@ def test_the_order_of_keys_does_not_matter(tree: dict[str, Any], random: Any) ->
 def test_a_changed_design_survives_too_and_can_be_changed_back(tree: dict[str, Any], factor: float) -> None:
     design = read_design_text(tomli_w.dumps(tree), "any")
     nominal = {path: value for path, value, _ in tolerances(design)}
-    changed = with_values(design, {path: value * factor for path, value in nominal.items()}, check=False)
+    try:
+        changed = with_values(design, {path: value * factor for path, value in nominal.items()})
+    except InputError:  # a supply that no longer reaches the speed, say
+        reject()
     assert read_design_text(write_design(changed), "any") == changed
     back = with_values(changed, nominal, check=False)
     assert design_hash(back) == design_hash(design)

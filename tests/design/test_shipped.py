@@ -37,13 +37,6 @@ def test_the_baseline_holds_the_facts_with_their_grade(path: str) -> None:
     assert design.parameters[path].source
 
 
-def test_the_equivalent_inertia_is_equation_12() -> None:
-    design = load_design("ilr33-amber")
-    expected = 9.2e-7 + 1e-7 + (5e-7 + 5e-7) / 66**2 + 2e-4 / 2376**2
-    assert design.total_ratio == 2376
-    assert design.inertia_kgm2 == pytest.approx(expected, rel=1e-14)
-
-
 PUBLISHED = {
     "ilr33-amber-multirate": {"control.velocity.every": 2, "control.position.every": 10},
     "ctms-motor-position": {
@@ -78,10 +71,6 @@ def test_the_stages_of_the_textbook_motor_and_of_the_force_source() -> None:
 def test_the_shipped_designs_are_these_each_named_like_its_file() -> None:
     assert shipped_designs()[0] == "ilr33-amber"
     assert [load_design(name).name for name in shipped_designs()] == list(shipped_designs())
-    assert set(shipped_designs()) == {
-        "ilr33-amber", "ilr33-amber-compliant", "ilr33-amber-multirate", "ilr33-amber-tanh",
-        "ballscrew", "ctms-motor-position", "emps", "fin", "joint",
-    }  # fmt: skip
 
 
 def test_the_variants_of_the_baseline_differ_from_it_only_in_what_they_are_for() -> None:
@@ -110,7 +99,12 @@ def test_an_elastic_design_has_its_derived_values_from_its_own_others(name: str)
         assert parameter.grade
 
 
-def test_the_sources_of_the_real_drives_state_their_own_sums() -> None:
+def test_the_sources_of_the_drives_state_their_own_sums() -> None:
+    """The equivalent inertia of the baseline is equation 12."""
+    amber = load_design("ilr33-amber")
+    assert amber.total_ratio == 2376
+    sum_12 = 9.2e-7 + 1e-7 + (5e-7 + 5e-7) / 66**2 + 2e-4 / 2376**2
+    assert amber.inertia_kgm2 == pytest.approx(sum_12, rel=1e-14)
     joint, screw = load_design("joint"), load_design("ballscrew")
     gravity = joint.load.gravity
     assert joint.load.inertia_kgm2 == pytest.approx(gravity.mass_kg * gravity.arm_m**2 + 0.06)

@@ -119,18 +119,6 @@ def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() 
     assert told == sorted(told, key=lambda line: int(line.split(":")[1].split()[1]))
 
 
-def test_a_gear_without_a_name_hides_whether_it_locks_behind_the_coupling() -> None:
-    told = _told_lines(design_text("ilr33-amber-compliant") + "[[gear]]\nratio = 2\n")
-    assert ["gear[3].name: missing" in line for line in told] == [True]
-
-
-def test_a_bandwidth_of_a_current_loop_that_no_motor_has_is_a_mistake_among_others() -> None:
-    text = design_text("emps") + '[control.current]\ngain = "500 Hz"\n'
-    assert any(
-        "control.current = a table: not allowed with motor.source_gain" in line for line in _told_lines(text)
-    )
-
-
 KE, KM = 'back_emf_constant = { value = "5.9 mV*s/rad"', 'torque_constant = { value = "5.9 mN*m/A"'
 
 
@@ -239,3 +227,8 @@ def test_no_mistake_hides_another_or_ends_in_a_traceback() -> None:
     with pytest.raises(Mistakes) as told:
         design_from_tree(tree, "f")
     assert [key in str(told.value) for key in ("load = ", "coupling.after = ")] == [True, True]
+    # whether a gear without a name locks behind the coupling; a bandwidth where there is no motor's loop
+    (line,) = _told_lines(design_text("ilr33-amber-compliant") + "[[gear]]\nratio = 2\n")
+    assert "gear[3].name: missing" in line
+    lines = _told_lines(design_text("emps") + '[control.current]\ngain = "500 Hz"\n')
+    assert any("control.current = a table: not allowed with motor.source_gain" in line for line in lines)

@@ -7,7 +7,7 @@ from math import pi
 import pytest
 
 from actuator_lti.design import read_design_text
-from actuator_lti.design.units import parse_quantity, parse_unit, scaled
+from actuator_lti.design.units import parse_quantity, parse_unit
 from actuator_lti.errors import InputError
 
 OZ, LB, INCH, G = 0.45359237 / 16, 0.45359237, 0.0254, 9.80665
@@ -33,6 +33,7 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     # a minute without an angle is that of revolutions
     ("rad/s", 100 * pi, ("3000 min-1", "3000 min^-1", "3000 1/min", "3000 r/min", "3000 RPM", "3000 U/min")),
     ("rad/s", 100 * pi, ("3000 min⁻¹", "3000 min-¹")),
+    ("rad/s", 1000 * pi / 30, ("1 kmin-1", "1 kmin^-1", "1 kmin⁻¹")),
     ("rad/s", 10600 * pi / 30, ("10 600 rpm",)),
     ("rad/s", 200 * pi, ("6000 r.p.m.",)),
     ("rad/s^2", 60000 * pi, ("30000 rev/s^2", "30000 rev/s2")),
@@ -52,12 +53,13 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("V*s/rad", 0.09 / pi, ("3 V/KRPM",)),
     ("V*s/rad", 0.3 / pi, ("10 V/1000rpm", "10 V/1000 min-1", "10 V/(1000 rpm)", "10 mV/(1/min)")),
     ("V*s/rad", 0.3 / pi, ("10 mV/min-1", "10 mV/rpm")),
+    ("V*s/rad", 0.3 / pi, ("10 V/kmin-1", "10 V/(kmin-1)", "10 mVmin")),
     ("V*s/rad", 2.6 * 0.03 / pi, ("2.6 V per krpm",)),
     # a speed without its brackets, where nothing else can be meant
     ("V*s/rad", 0.125 / pi, ("0.25 V/rps", "0.25 V/rev/s")),
     ("V*s/rad", 0.1, ("0.1 V/rad/s", "0.1 V/rad/sec")),
     ("V*s/m", 0.99 / 0.0254, ("0.99 V/in/s",)),
-    ("rad/(V*s)", 140 * pi / 30, ("140 KV", "140 Kv")),
+    ("rad/(V*s)", 140 * pi / 30, ("140 KV", "140 Kv", "KV 140 rpm/V", "Kv = 140 rpm/V")),
     ("N/V", 35.15, ("35.15 N/V",)),
     ("N", -3.1648, ("-3.1648 N",)),
     ("V", 12.0, ("12 V",)),
@@ -81,7 +83,7 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("1/s", 25.0, ("25/s",)),
     # forces as data sheets write them; one pound is 0.45359237 kg, g_n is 9.80665 m/s2, an inch 0.0254 m
     ("N*m", OZ * G * INCH, ("1 ozf*in", "1 oz-in", "1 ozin")),
-    ("N*m", LB * G * INCH, ("1 in-lb",)),
+    ("N*m", LB * G * INCH, ("1 in-lb", "1 in-lbs")),
     ("N*m", LB * G * 0.3048, ("1 lb-ft",)),
     ("N*m", 0.0980665, ("1 kgf cm", "1 kg-cm", "1 kgcm")),
     ("N*m", 0.05, ("5 Ncm",)),
@@ -96,6 +98,8 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("N*m*s/rad", 2.0, ("2 N*m/rad/s",)),
     ("N*m/rad", 3 * 60 * 180 / pi, ("3 N*m/arcmin",)),
     ("N*m/rad", 1.2 * 9.80665 * 10800 / pi, ("1.2 kgf·m/arc-min", "1.2 kgfm/arcmin")),
+    ("N*m/rad", 16e3, ("16 x10³ Nm/rad", "16x10³ Nm/rad", "16 ×10^3 Nm/rad")),
+    ("N*m*s/rad", 5e-3 / (1000 * pi / 30), ("5 mNm/kmin-1", "5 mNm/krpm")),
     ("N*m/(N*m)", 1.34e-3, ("1.34 mN*m/(N*m)",)),
     ("1", 1.34e-3, ("1.34e-3 N*m/(N*m)",)),
     ("1", 0.5, ("50 %",)),
@@ -164,6 +168,8 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("2,621,440 counts", "1", 'write "2621440 counts"'),
         ("100-120 V", "V", "a range; write one number"),
         ("2 ticks", "s", "of control.period"),
+        ("1 period", "s", "of control.period"),
+        ("(20 ± 1) kgcm²", "kg*m^2", 'write "20 kgcm²"; "± 1 kgcm²" is one for tolerance = "5 %"'),
         ("5 Arms", "A", "unknown unit"),
         ("3 rpn", "rad/s", 'nearest known: "rpm"'),
         ("3 mfoo", "m", "unknown unit"),
@@ -212,11 +218,6 @@ def test_a_unit_is_the_product_of_its_parts_rounded_once(seed: int) -> None:
     assert found.factor == float(exact)
     there = dict(found.dimension)
     assert [there.get(key, 0) for key in ("[mass]", "[length]", "[time]")] == powers
-
-
-def test_scaling_by_a_large_factor_is_a_product() -> None:
-    assert scaled(2.5, 1000.0) == 2500.0
-    assert scaled(2.0, 0.3) == 0.6
 
 
 TEXT = """

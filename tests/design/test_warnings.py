@@ -13,6 +13,7 @@ GEAR = '[[gear]]\nname = "R22"\nratio = 19.2\n'
 BASES = {
     "first": DRIVE,
     "direct": DRIVE.replace(GEAR, ""),
+    "locked": DRIVE.replace(GEAR, '[load]\npath = "self-locking"\n'),
     "sheet": SHEET,
     "bare": design_text("ctms-motor-position").partition("[validation]")[0],
 }
@@ -41,7 +42,7 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     (
         "ilr33-amber",
         {"motor.resistance": {"value": "50 mohm", "grade": "Z"}},
-        "\nmotor.resistance: grade 'Z'",
+        "\nmotor.resistance: grade",
         True,
     ),
     ("ilr33-amber", {"gear.worm.input_inertia": {"value": "5 g*cm^2", "grade": "X"}}, "\ngear.worm", True),
@@ -87,6 +88,9 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("direct", BACK, FEELS, False),
     ("direct", {"friction.load_coefficient": 1}, ASSUMED, False),
     ("direct", {"friction.load_coefficient": 1}, FEELS, False),
+    # what its file writes itself is not assumed, whatever else is changed
+    ("locked", {"limits.voltage": "13 V"}, ASSUMED, False),
+    ("locked", {}, FEELS, True),
 ]
 
 

@@ -40,13 +40,18 @@ def test_filters_keep_their_order_and_have_keys_of_their_own() -> None:
     assert read_design_text(write_design(changed), changed.origin) == changed
 
 
-def test_the_two_meanings_of_a_peak_time() -> None:
-    # r = 3 for one second: 8.490187 s (model.md section 6); the excess form gives r^2 - 1
-    base = {"limits.peak_time": "1 s"}
-    assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(1 / log(9 / 8), rel=1e-14)
-    assert with_overrides(AMBER, base).limits.overload_time_s == pytest.approx(8.490187, abs=5e-7)
-    excess = with_overrides(AMBER, base | {"limits.overload": "excess"})
-    assert excess.limits.overload_time_s == pytest.approx(8.0)
+def test_the_two_meanings_of_a_peak_time_of_one_design_and_of_many() -> None:
+    """r = 3 for one second: tau = t/ln(r^2/(r^2 - 1)), 8.490187 s (model.md section 6); in excess r^2 - 1."""
+    base = with_overrides(AMBER, {"limits.peak_time": "1 s"})
+    assert base.limits.overload_time_s == pytest.approx(1 / log(9 / 8), rel=1e-14)
+    assert base.limits.overload_time_s == pytest.approx(8.490187, abs=5e-7)
+    assert with_overrides(base, {"limits.overload": "excess"}).limits.overload_time_s == pytest.approx(8.0)
+    peaks, times = np.array([8.0, 12.0, 20.0]), np.array([0.5, 1.0, 3.0])
+    many = stacked(base, {"limits.peak_current": peaks, "limits.peak_time": times}).limits.overload_time_s
+    squares = (peaks / 4) ** 2
+    assert many == pytest.approx(times / np.log(squares / (squares - 1)))
+    many = stacked(base, {"limits.peak_time": times}).limits.overload_time_s
+    assert many == pytest.approx(times * 8.490187, rel=1e-6)
 
 
 @pytest.mark.parametrize("constants", ["rms-line", "peak-phase"])
@@ -77,13 +82,6 @@ def test_an_ac_motor_keeps_torque_losses_and_voltage_limit(constants: str) -> No
     # the peak of the line-line voltage is what the bus limits
     assert motor.back_emf_constant_Vs_rad * speed == pytest.approx(sqrt(3) * k * speed, rel=1e-14)
     assert motor.torque_constant_Nm_A == pytest.approx(motor.back_emf_constant_Vs_rad, rel=1e-14)
-
-
-def test_a_mixed_up_convention_is_named() -> None:
-    with pytest.raises(InputError, match=r'motor\.constants = "rms-line"'):
-        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"})
-    with pytest.raises(InputError, match=r"60/\(2 pi\)"):
-        with_overrides(AMBER, {"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"})
 
 
 def test_a_warm_motor() -> None:
@@ -132,6 +130,12 @@ def test_a_speed_drive_has_no_position_loop() -> None:
         ({"coupling": STIFF, "friction.load_coefficient": 0.9 / 2376}, "gives energy"),
         ({"load.friction": {"dry_torque": "1 N*m"}}, "allowed behind a coupling"),
         ({"coupling": {"stiffness": "1 N*m/rad"}, "load.friction": {"breakaway_ratio": 0.9}}, "at least 1"),
+        ({"motor.resistance": "0,6 ohm"}, 'motor.resistance.*use a decimal point: "0.6 ohm"'),
+        ({"motor.inductance": "6 ohm"}, 'motor.inductance.*"ohm" is the unit of a resistance'),
+        ({"motor.rotor_inertia": "3 kg"}, r"motor.rotor_inertia.*m \(p/2 pi\)\^2"),
+        ({"limits.voltage": "3 vots"}, 'limits.voltage.*nearest known: "volt'),
+        ({"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"}, r'motor\.constants = "rms-line"'),
+        ({"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"}, r"60/\(2 pi\)"),
     ],
 )  # fmt: skip
 def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
@@ -166,18 +170,6 @@ def test_the_tracking_limit_is_where_its_poles_leave_the_unit_circle() -> None:
         return float(np.max(np.abs(np.linalg.eigvals(A))))
 
     assert radius(TRACKING_LIMIT * 0.999) < 1.0 < radius(2 * (sqrt(2) - 1) * 1.001)
-
-
-def test_the_overload_time_of_stacked_designs_is_that_of_each() -> None:
-    """tau = t_peak/ln(r^2/(r^2 - 1)) by the exact numbers of each design."""
-    base = with_overrides(AMBER, {"limits.peak_current": "12 A", "limits.continuous_current": "4 A",
-                                  "limits.peak_time": "1 s"})  # fmt: skip
-    peaks, times = np.array([8.0, 12.0, 20.0]), np.array([0.5, 1.0, 3.0])
-    many = stacked(base, {"limits.peak_current": peaks, "limits.peak_time": times}).limits.overload_time_s
-    squares = (peaks / 4) ** 2
-    assert many == pytest.approx(times / np.log(squares / (squares - 1)))
-    many = stacked(base, {"limits.peak_time": times}).limits.overload_time_s
-    assert many == pytest.approx(times * 8.490187, rel=1e-6)
 
 
 def _taken(call: Callable[[], object]) -> bool:
@@ -231,6 +223,8 @@ def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(
         assert str(made.value).rpartition("allowed: ")[2] == str(read.value).rpartition("allowed: ")[2]
 
 
-def test_an_axis_that_is_none_is_refused_before_its_units_are_asked() -> None:
+def test_an_axis_that_is_none_is_refused_before_its_units_are_asked_and_a_linear_one_has_masses() -> None:
     with pytest.raises(InputError, match='axis = "round": allowed: "rotary" or "linear"'):
         check_design(replace(AMBER, axis="round"), "drive")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match=r"motor.rotor_inertia.*J \(2 pi/p\)\^2"):
+        load_design("emps").with_values({"motor.rotor_inertia": "3 kg*cm^2"})

@@ -43,11 +43,9 @@ def graph(with_functions: bool) -> dict[str, set[str]]:
     return result
 
 
-@pytest.mark.parametrize("with_functions", [False, True], ids=["at start-up", "in functions, too"])
-def test_no_import_cycle(with_functions: bool) -> None:
-    result = graph(with_functions)
+def test_no_import_cycle() -> None:
+    result = graph(True)
     assert len(result) > 300
-    assert "actuator_lti.margins.engine" in result["actuator_lti.margins"] or with_functions
     try:
         TopologicalSorter(result).prepare()
     except CycleError as error:
@@ -56,6 +54,7 @@ def test_no_import_cycle(with_functions: bool) -> None:
 
 def test_a_cycle_would_be_seen() -> None:
     result = graph(False)
+    assert "actuator_lti.margins.engine" in result["actuator_lti.margins"]
     result["actuator_lti.errors"].add("actuator_lti.margins.engine")
     with pytest.raises(CycleError):
         TopologicalSorter(result).prepare()

@@ -72,20 +72,13 @@ def test_each_change_touches_no_more_files_than_promised(change: str) -> None:
     assert all(len(re.findall(r"`[\w/]+\.(?:py|md)`", row.split("|")[1])) <= 1 for row in rows)
 
 
-def test_the_list_of_keys_holds_every_key(made: ModuleType) -> None:
-    page = made.keys_page()
+def test_the_lists_hold_every_key_quantity_command_and_option(made: ModuleType) -> None:
+    keys, quantities, page = made.keys_page(), made.quantities_page(), made.commands_page()
     for field in FIELDS.values():
-        section = page.split(f"## `[{field.section}]`")[1].split("\n## ")[0]
+        section = keys.split(f"## `[{field.section}]`")[1].split("\n## ")[0]
         assert f"| `{field.key}` |" in section, field.path
-
-
-def test_the_list_of_quantities_holds_every_quantity(made: ModuleType) -> None:
-    page = made.quantities_page()
-    assert all(f"| `{name}` | `{each.unit}` |" in page for name, each in QUANTITIES.items())
-
-
-def test_the_list_of_commands_holds_every_command_and_option(made: ModuleType) -> None:
-    page, root = made.commands_page(), typer.main.get_command(build())
+    assert all(f"| `{name}` | `{each.unit}` |" in quantities for name, each in QUANTITIES.items())
+    root = typer.main.get_command(build())
     for panel, names in PANELS.items():
         assert f"## {panel}" in page
         for name in names:

@@ -37,15 +37,10 @@ def random_drive(rng: Rng) -> model.Design:
     controller = _controller(draw, design)
     friction: Parts = {"law": draw.maybe("coulomb", "tanh", 0.75), "dry_torque_Nm": draw.near(dry_Nm)}
     friction |= {"dry_torque_reverse_Nm": draw.maybe(draw.near(dry_Nm), None)}
-    friction |= {
-        "breakaway_ratio": draw.maybe(1.0 + rng.random(), 1.0),
-        "smoothing_speed_rad_s": draw.near(5.0),
-    }
+    friction |= {"breakaway_ratio": draw.maybe(1.0 + rng.random(), 1.0)}
+    friction |= {"smoothing_speed_rad_s": draw.near(5.0)}
     friction |= {"offset_torque_Nm": draw.maybe(2e-4)}
-    load: Parts = {
-        "path": draw.maybe("back-drivable", "self-locking"),
-        "moment_slope_Nm_rad": draw.maybe(-4.0),
-    }
+    load = {"path": draw.maybe("back-drivable", "self-locking"), "moment_slope_Nm_rad": draw.maybe(-4.0)}
     load |= {"gravity": draw.maybe(model.Gravity(mass_kg=2.0, arm_m=0.1, offset_rad=0.3), None)}
     load |= {"moment_damping_Nms_rad": own.maybe(own.near(0.05)), "gear_error_Nm": own.maybe(own.near(0.3))}
     load |= {"gear_error_periods": own.near(10.0), "gear_error_phase_rad": own.rng.uniform(0.0, 3.0)}
@@ -142,10 +137,7 @@ def _filters(draw: Draw) -> tuple[model.Filter, ...]:
 
 def _encoder(draw: Draw) -> model.Encoder:
     speed = ("ideal", "difference", "tracking")[draw.rng.integers(3)]
-    own: Parts = {
-        "counts_per_rev": draw.maybe(4096, None),
-        "difference_samples": int(draw.rng.integers(1, 5)),
-    }
+    own = {"counts_per_rev": draw.maybe(4096, None), "difference_samples": int(draw.rng.integers(1, 5))}
     own |= {"filter_time_s": draw.maybe(5e-4), "bandwidth_rad_s": draw.near(2000.0)}
     return model.Encoder(speed=speed, **own)
 

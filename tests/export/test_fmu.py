@@ -91,9 +91,7 @@ def test_traced_keys_give_the_row_of_the_changed_design(name: str) -> None:
     free = [key for key in trace.keys if not key.fixed and key.path != "friction.breakaway_ratio"]
     tried = 0
     for _ in range(40):
-        values = {
-            key.path: min(max(key.value * float(rng.uniform(0.8, 1.25)), key.low), key.high) for key in free
-        }
+        values = {key.path: min(max(key.value * rng.uniform(0.8, 1.25), key.low), key.high) for key in free}
         k = [values.get(key.path, key.value) for key in trace.keys]
         p = executed(trace.lines, k)
         row = design_row(with_values(design, values, check=False))

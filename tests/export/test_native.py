@@ -175,7 +175,7 @@ def of_another_machine(_: pytest.MonkeyPatch, library: Library) -> None:
         (no_compiler, r"gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins"),
         (
             lambda patch, _: patch.setattr(os, "access", lambda *_: False),
-            "no compiled kernels of these sources",
+            "no compiled kernels of these",
         ),
         (of_another_machine, "does not load"),
     ],

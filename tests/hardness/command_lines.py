@@ -3,11 +3,8 @@
 import json
 import random
 from functools import cache
-from typing import Any
 
-import typer.main
-
-from reports.cli.app import build
+from tests.command_line import commands
 
 DESIGN = "ctms-motor-position"
 # What each command needs besides, so that it is quick. OUT is a folder of the run, FILE a file that is none.
@@ -29,12 +26,9 @@ VALUES = (
 @cache
 def options() -> dict[str, tuple[str, ...]]:
     """The options of each command of `QUICK`, those that take a value first."""
-    found = {}
+    found, known = {}, commands()
     for name in QUICK:
-        command: Any = typer.main.get_command(build())
-        for word in name.split():
-            command = command.commands[word]
-        named = [next((o for o in p.opts if o.startswith("--")), "") for p in command.params]
+        named = [next((o for o in p.opts if o.startswith("--")), "") for p in known[name].params]
         found[name] = tuple(option for option in named if option and option not in LEFT_OUT)
     return found
 

@@ -1,7 +1,8 @@
 """Kills nightlies at their file-system calls, one after the other; looks at what is left.
 
 ``python kill_at_calls.py SITE``: each round starts a nightly of a study that has changed and kills it with
-SIGKILL at one of its calls, then checks site and history. Prints one line of JSON.
+SIGKILL at one of its calls, then checks site and history. A kill between two calls that change the disk
+leaves what one at the second of them leaves. Prints one line of JSON.
 """
 
 import json
@@ -9,17 +10,39 @@ import os
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.append(str(Path(__file__).parents[1] / "nightly"))
 
 import ruptures  # noqa: F401 - here, not in every child
-from kill_target import check_history, child, night
+from nightly_fakes import CODE, INLINE, job, study
 from site_checks import check_whole
 
+from reports.nightly.history import open_history
+from reports.nightly.night import run_night
+
 CALLS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.chmod", "shutil.rmtree")
+DESIGNS = 6
+
+
+def night(site: Path, round_: int) -> None:
+    """One nightly, here, of a study of which half changes with every round."""
+    jobs = [job(f"design {k}", 10.0 + (round_ % 50 if k % 2 else 0), pause=0.003) for k in range(DESIGNS)]
+    run_night(study(*jobs), site, INLINE, code=CODE)
+
+
+def check_history(state: Path) -> None:
+    """Every finished night has all of its results, and the files are sound."""
+    history = open_history(state)
+    for run in history.runs:
+        results = history.night(run.id).results
+        assert len(results) == DESIGNS, run
+        for result in results:
+            assert history.figures(result), result
+    assert len({run.id for run in history.runs}) == len(history.runs)
+    assert history.index.begun >= len(history.runs) + len(history.index.interrupted)
 
 
 def count_calls(tick: Callable[[str], None]) -> None:
@@ -42,21 +65,25 @@ def count_calls(tick: Callable[[str], None]) -> None:
 def counted(site: Path, round_: int, last: int) -> tuple[int, int]:
     """A nightly in a process of its own that is killed at call ``last`` (0: not at all); status and calls."""
     read, write = os.pipe()
-
-    @contextmanager
-    def counting() -> Iterator[None]:
-        done = [0]
+    number = os.fork()
+    if number == 0:
+        done, status = 0, 1
 
         def tick(_event: str) -> None:
-            done[0] += 1
-            if done[0] == last:
+            nonlocal done
+            done += 1
+            if done == last:
                 os.kill(os.getpid(), signal.SIGKILL)
 
-        count_calls(tick)
-        yield
-        os.write(write, str(done[0]).encode())
-
-    number = child(site, round_, counting)
+        try:
+            count_calls(tick)
+            night(site, round_)
+            os.write(write, str(done).encode())
+            status = 0
+        finally:
+            if status:
+                traceback.print_exc()
+            os._exit(status)
     os.close(write)
     _, status = os.waitpid(number, 0)
     said = os.read(read, 32)
@@ -84,8 +111,12 @@ def main(site: Path) -> dict[str, int]:
         check_whole(site)
         check_history(state)
         if place % 10 == 0:
+            for again in (place, 2 * place):  # killed on what a kill has left
+                counted(site, 2, again)
             assert counted(site, 2, 0)[0] == 0, place
             check_whole(site)
+            check_history(state)
+            assert not [part for folder in folders for part in folder.rglob(".*.part")], place
     return {"calls": calls, "killed": killed}
 
 

@@ -318,6 +318,7 @@ def targets() -> tuple[Target, ...]:
         Target("override", (b"motor.resistance=55 mohm", b"gear.worm.ratio=50"), override),
         Target("design", designs, design_round),
         Target("extreme design", designs, design_round, fault=extreme),
+        Target("design tree", designs, design_round, fault=toml_fault),
         Target("settings", (SETTINGS,), settings),
         Target("settings xml", (xml.encode(),), settings, ".xml"),
         Target("controller file", CONTROLLERS, controller_file, ".xml"),

@@ -9,6 +9,7 @@ from actuator_lti.design import load_design, model
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 from tests.changed import changed
+from tests.loops.two_mass import drive_d
 
 Columns = dict[str, np.ndarray]
 NOISE_A = 0.02
@@ -26,20 +27,28 @@ def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = Non
     return simulate(drive, command, 4.0, load_Nm)
 
 
+def signals_of(run: Trajectory, seed: int) -> Columns:
+    """What is seen at 1 kHz, in SI, the current with white noise of 20 mA."""
+    signals = {
+        "time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad,
+        "speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V,
+    }  # fmt: skip
+    table = {name: values[::10] for name, values in signals.items()}
+    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(table["time"]))
+    return {**table, "current": table["current"] + noise}
+
+
 def columns_of(run: Trajectory, seed: int = 0, load_Nm: float | None = None) -> Columns:
-    """Columns at 1 kHz in a recorder's units, the current with white noise of 20 mA."""
-    every = slice(None, None, 10)
-    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(run.time_s[every]))
+    """The same in a recorder's units, without the voltage."""
+    seen = signals_of(run, seed)
     columns = {
-        "time_s": run.time_s[every],
-        "reference_deg": np.degrees(run.reference_rad[every]),
-        "motor_angle_rad": run.motor_angle_rad[every],
-        "motor_speed_rpm": run.motor_speed_rad_s[every] * 30.0 / np.pi,
-        "current_A": run.current_A[every] + noise,
+        "time_s": seen["time"],
+        "reference_deg": np.degrees(seen["reference"]),
+        "motor_angle_rad": seen["angle"],
+        "motor_speed_rpm": seen["speed"] * 30.0 / np.pi,
+        "current_A": seen["current"],
     }
-    if load_Nm is not None:
-        columns["load_Nm"] = np.full(len(noise), load_Nm)
-    return columns
+    return columns if load_Nm is None else {**columns, "load_Nm": np.full(len(seen["time"]), load_Nm)}
 
 
 def record_of(time: np.ndarray, name: str = "r", **signals: np.ndarray) -> Record:
@@ -72,27 +81,13 @@ HALF_PLAY = 1e-3
 
 
 def two_mass_design() -> model.Design:
-    """10:1, 2 mrad of play, dry friction, 16-bit and 20-bit encoders, 30 mA rms and 5 mA steps of current."""
-    constants = dict.fromkeys(("torque_constant_Nm_A", "back_emf_constant_Vs_rad"), 0.05)
+    """Drive D with 2 mrad of play, dry friction, encoders of 16 and 20 bits, 30 mA rms and 5 mA steps."""
     tools = model.Instruments(current_noise_A=0.03, current_resolution_A=0.005, output_angle_noise_rad=5e-6)
+    current = model.CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3)
     return changed(
-        bare("ilr33-amber"),
-        name="two-mass",
-        gears=(model.Gear(name="gear", ratio=10.0),),
-        motor={"rotor_inertia_kgm2": 2e-5, "resistance_ohm": 1.0, "inductance_H": 2e-3, **constants},
-        load=model.Load(
-            path="back-drivable", inertia_kgm2=2e-3, friction=model.LoadFriction(viscous_Nms_rad=0.02)
-        ),
-        limits={"voltage_V": 48.0, "speed_rad_s": 900.0}
-        | dict.fromkeys(("peak_current_A", "continuous_current_A"), 30.0),
-        instruments=tools,
-        friction=model.Friction(dry_torque_Nm=0.004, viscous_Nms_rad=1e-5),
-        controller=model.Controller(
-            period_s=1e-4,
-            computing_delay_s=1e-4,
-            current=model.CurrentLoop(gain_V_A=5.0, integral_time_s=2e-3),
-        ),
-        coupling=model.Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=0.02, play_rad=2.0 * HALF_PLAY),
-        encoder=model.Encoder(counts_per_rev=65536),
-        output_encoder=model.OutputEncoder(counts_per_rev=1 << 20),
-    )
+        drive_d(), name="two-mass", motor={"resistance_ohm": 1.0, "inductance_H": 2e-3},
+        controller={"velocity": None, "current": current}, load={"friction": {"viscous_Nms_rad": 0.02}},
+        limits={"speed_rad_s": 900.0, "peak_current_A": 30.0, "continuous_current_A": 30.0},
+        friction={"dry_torque_Nm": 0.004}, coupling={"play_rad": 2.0 * HALF_PLAY}, instruments=tools,
+        encoder={"counts_per_rev": 65536}, output_encoder={"counts_per_rev": 1 << 20},
+    )  # fmt: skip

@@ -51,26 +51,23 @@ def _swing(peak: float, hz: float = 3.0) -> Command:
     return commands.sine(peak, hz)
 
 
-@pytest.mark.parametrize(
-    ("design", "column", "command", "factor"),
-    [
-        (BASE, "reference [rad]", _swing(0.03), 1.0),
-        (SPEED, "speed_reference [rad/s]", _swing(0.8), SPEED.total_ratio),
-        (TORQUE, "current_reference [A]", _swing(6.0), 1.0),
-        (TORQUE, "torque_reference [Nm]", _swing(6.0), BASE.effective_motor.torque_constant_Nm_A or 0.0),
-        (VOLTAGE, "voltage_reference [V]", _swing(6.0), 1.0),
-        (WIDE, "reference [rad]", _swing(0.03), 1.0),
-        (MAPPED, "reference [rad]", _swing(0.03), 1.0),
-        (DIRECT, "reference [rad]", _swing(0.03), 1.0),
-        (SLOPED, "reference [rad]", _swing(0.03), 1.0),
-    ],
-    ids=[
-        "position", "speed", "current", "torque", "voltage", "two masses", "friction map", "voltage servo",
-        "sloped load",
-    ],
-)  # fmt: skip
-def test_a_record_meets_the_drive_that_made_it(design, column, command, factor, tmp_path) -> None:
+KINDS = {
+    "position": (BASE, "reference [rad]", _swing(0.03), 1.0),
+    "speed": (SPEED, "speed_reference [rad/s]", _swing(0.8), SPEED.total_ratio),
+    "current": (TORQUE, "current_reference [A]", _swing(6.0), 1.0),
+    "torque": (TORQUE, "torque_reference [Nm]", _swing(6.0), BASE.effective_motor.torque_constant_Nm_A),
+    "voltage": (VOLTAGE, "voltage_reference [V]", _swing(6.0), 1.0),
+    "two masses": (WIDE, "reference [rad]", _swing(0.03), 1.0),
+    "friction map": (MAPPED, "reference [rad]", _swing(0.03), 1.0),
+    "voltage servo": (DIRECT, "reference [rad]", _swing(0.03), 1.0),
+    "sloped load": (SLOPED, "reference [rad]", _swing(0.03), 1.0),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_record_meets_the_drive_that_made_it(kind: str, tmp_path) -> None:
     """Every signal to rounding, as the command is recorded at each tick; another friction is seen."""
+    design, column, command, factor = KINDS[kind]
     run = simulate(design, command, 0.5)
     _record(tmp_path / "r.csv", run, ROTARY, **{column: factor * run.reference_rad})
     record = open_record(tmp_path / "r.csv")

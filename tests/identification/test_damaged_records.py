@@ -19,8 +19,9 @@ from analyses.identification.joint_model import NAMES
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
 from benchmarks.random_records import KINDS, VALUES, random_records
-from nonlinear import Trajectory, commands, simulate
-from tests.identification.bench_records import NOISE_A, Columns, motion, record_of
+from nonlinear import commands, simulate
+from tests.changed import changed
+from tests.identification.bench_records import NOISE_A, Columns, motion, record_of, signals_of
 
 BASE = load_design("ilr33-amber")
 TRUTH = {"friction.dry_torque": 3e-3, "friction.viscous": 4e-6, "motor.rotor_inertia": 1.3e-6}
@@ -32,20 +33,9 @@ BARE = ("angle", "current")
 Damage = Callable[[Columns], Columns]
 
 
-def _columns(run: Trajectory, seed: int) -> Columns:
-    """In SI at 1 kHz, the current with white noise of 20 mA."""
-    signals = {
-        "time": run.time_s, "reference": run.reference_rad, "angle": run.motor_angle_rad,
-        "speed": run.motor_speed_rad_s, "current": run.current_A, "voltage": run.voltage_V,
-    }  # fmt: skip
-    table = {name: values[::10] for name, values in signals.items()}
-    noise = NOISE_A * np.random.default_rng(seed).standard_normal(len(table["time"]))
-    return {**table, "current": table["current"] + noise}
-
-
 @pytest.fixture(scope="module")
 def columns() -> Columns:
-    return _columns(motion(2, design=DRIVE), 1)
+    return signals_of(motion(2, design=DRIVE), 1)
 
 
 def _record(columns: Columns, names: tuple[str, ...] = ALL) -> Record:
@@ -96,7 +86,7 @@ def _range_from(share: float, factor: float) -> Damage:
 
 def _of_another_run(name: str) -> Damage:
     """A signal of the same drive's other motion."""
-    return lambda columns: {**columns, name: _columns(motion(7, design=DRIVE), 5)[name]}
+    return lambda columns: {**columns, name: signals_of(motion(7, design=DRIVE), 5)[name]}
 
 
 def _said(result: BenchResult) -> str:
@@ -205,7 +195,7 @@ def test_a_voltage_tells_the_constant_a_drift_widens_and_a_load_not_recorded_is_
     assert "drift along the record: all torques change by +1" in _said(result)
     low, high = result.model.interval("dry")
     assert low < WANTED["dry"] < high
-    loaded = _columns(motion(2, load_Nm=6.0, design=DRIVE), 1)
+    loaded = signals_of(motion(2, load_Nm=6.0, design=DRIVE), 1)
     result = identify_bench(DRIVE, [_record(loaded, BARE)])
     assert not result.passed
     assert "as under a load of 6.0" in "; ".join(item.reason for item in result.items)
@@ -229,22 +219,19 @@ SLOW = {
 
 
 def test_steps_of_the_voltage_between_the_samples_are_no_lag() -> None:
-    """A motor of L/R = 0.3 ms by Euler's rule at 20 kHz, sampled at 1 kHz: the intervals hold the truth."""
-    drive, step = with_values(BASE, SLOW, check=False), 5e-5
-    time = step * np.arange(60_000)
+    """A motor of L/R = 0.3 ms on steps at 20 kHz, sampled at 1 kHz: the intervals hold the truth."""
+    drive, time = with_values(BASE, SLOW, check=False), 5e-5 * np.arange(60_000)
     slow, fast = (np.sign(np.sin(2.0 * np.pi * f * time + 0.1)) for f in (0.837, 1.913))
-    u = 6.0 * slow + 3.0 * fast
-    inertia, dry, seen = drive.inertia_kgm2, drive.friction.dry_torque_Nm, np.zeros((len(time), 2))
-    i = w = angle = 0.0
-    for k, volt in enumerate(u.tolist()):
-        seen[k] = angle, i
-        i += step / 2.1e-4 * (volt - 0.66 * i - 0.0257 * w)
-        w += step / inertia * (0.0257 * i - drive.friction.viscous_Nms_rad * w)
-        w = max(abs(w) - step / inertia * dry, 0.0) * np.sign(w)
-        angle += step * w
-    angle, current = seen[::20].T
-    current = current + NOISE_A * np.random.default_rng(1).standard_normal(len(current))
-    record = record_of(time[::20], voltage_reference=u[::20], angle=angle, current=current)
+    control = {
+        **dict.fromkeys(("position", "velocity", "current")),
+        "period_s": 5e-5,
+        "computing_delay_s": 0.0,
+    }
+    on_a_voltage = commands.sampled(time, 6.0 * slow + 3.0 * fast)
+    run = simulate(changed(drive, controller=control), on_a_voltage, 3.0, record_every=20)
+    current = run.current_A + NOISE_A * np.random.default_rng(1).standard_normal(len(run.time_s))
+    inertia, angle = drive.inertia_kgm2, run.motor_angle_rad
+    record = record_of(run.time_s, voltage_reference=run.reference_rad, angle=angle, current=current)
     result = identify_bench(drive, [record])
     assert "taken back" not in _said(result)
     model = result.model
@@ -344,7 +331,7 @@ def test_what_cannot_be_put_right_gives_no_design(name: str, columns: Columns) -
 @pytest.mark.parametrize("factor", [100.0, 1e-3])
 def test_a_load_friction_of_another_size_fails(factor: float, columns: Columns) -> None:
     """The design's, or a load in another unit."""
-    loaded = _columns(motion(5, load_Nm=5.0, design=DRIVE), 3)
+    loaded = signals_of(motion(5, load_Nm=5.0, design=DRIVE), 3)
     loaded["torque"] = np.full(len(loaded["time"]), 5.0)
     second = replace(_record(loaded, (*BARE, "torque")), name="loaded")
     wrong = with_values(DRIVE, {"friction.load_coefficient": factor * DRIVE.friction.load_coefficient})
@@ -390,7 +377,7 @@ def test_no_lag_is_found_where_the_drive_hardly_moves(amplitude, signals) -> Non
     lag of 2 to 3 ms was found in records that have none.
     """
     run = simulate(DRIVE, commands.multisine(amplitude, [0.7, 1.9, 4.3], 4.0, 1e-4, seed=2), 4.0)
-    result = identify_bench(BASE, [_record(_columns(run, 1), signals)])
+    result = identify_bench(BASE, [_record(signals_of(run, 1), signals)])
     assert "later" not in _said(result)
     assert "earlier" not in _said(result)
     model, truth = result.model, WANTED

@@ -122,14 +122,6 @@ def test_one_record_in_many_formats(form: str, tmp_path) -> None:
     assert record["current"] == pytest.approx(CURRENT, abs=1e-9)
 
 
-def test_revolutions_per_minute_as_recorders_spell_them(tmp_path) -> None:
-    (tmp_path / "r.csv").write_text("t,n\n0,0\n1,60\n2,120\n")
-    for unit in ("rpm", "1/min", "U/min", "min^-1"):
-        text = f'file = "r.csv"\ntime = {{ column = 1 }}\nsignals.speed = {{ column = 2, unit = "{unit}" }}\n'
-        (tmp_path / "r.toml").write_text(text)
-        assert open_record(tmp_path / "r.toml")["speed"] == pytest.approx([0.0, 2.0 * np.pi, 4.0 * np.pi])
-
-
 def test_a_compressed_and_a_plain_file_read_alike() -> None:
     values = {"t": np.arange(5.0), "n": np.array([[1, 2], [3, 4]], dtype=np.int16), "k": 3.5, "text": "abc"}
     for packed in (False, True):

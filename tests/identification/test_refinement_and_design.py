@@ -21,6 +21,7 @@ from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments
 from analyses.records.open_record import open_record
+from tests.identification.bench_records import columns_of, motion, write
 from tests.refusals import refused
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
@@ -147,6 +148,26 @@ def test_output_error_finds_the_values_of_a_record_and_names_one_at_its_bound() 
     fit = Fit(names=("friction.viscous",), values=np.array([-1e-6]), covariance=np.eye(1) * 1e-14)
     with pytest.raises(InputError, match=r"identified friction\.viscous = -1e-06.* longer motion"):
         design_with_fit(load_design("ilr33-amber"), fit, "test")
+
+
+def test_refined_values_have_the_error_of_the_constant_that_the_voltage_tells(tmp_path, cli) -> None:
+    """Torques are kM i: an error of kM is that of the whole inertia, of which the rotor is a part."""
+    run = motion(2)
+    columns = columns_of(run)
+    noise = 5e-3 * np.random.default_rng(1).standard_normal(len(columns["time_s"]))
+    columns["voltage_V"] = run.voltage_V[::10] + noise
+    path = write(tmp_path / "v.csv", columns)
+    words = ("identify", path, "--design", "ilr33-amber", "--electrical", "--refine", "--out", tmp_path)
+    found = cli.data(*words)["refined"]["parameters"]["motor.rotor_inertia"]
+    written = load_design(tmp_path / "ilr33-amber-identified.toml")
+    constant, rotor = (written.parameters[f"motor.{key}"] for key in ("torque_constant", "rotor_inertia"))
+    share = constant.tolerance.std / constant.value
+    assert found["standard_error"] >= share * written.inertia_kgm2
+    assert found["standard_error"] == pytest.approx(share * written.inertia_kgm2, rel=0.1)
+    assert rotor.tolerance.std == pytest.approx(found["standard_error"], rel=1e-5)
+    pair = {"motor.rotor_inertia", "motor.torque_constant"}
+    (one,) = [c for c in written.correlations if {c.first, c.second} == pair]
+    assert one.coefficient == pytest.approx(share * written.inertia_kgm2 / found["standard_error"], rel=0.01)
 
 
 def test_refinement_on_emps_lowers_the_force_error_and_every_result_is_what_is_written(emps_file) -> None:

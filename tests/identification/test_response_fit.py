@@ -13,6 +13,7 @@ from reports.charts.chart import Curve
 from reports.charts.data import chart_of
 from reports.sections.identify import section
 from tests.changed import changed
+from tests.loops.loop_designs import source_drive
 
 TICK, GAIN, N = 1e-3, 0.8, 50.0
 TRUTH = {
@@ -23,18 +24,11 @@ TRUTH = {
     "friction.viscous": 4e-4,
     "control.computing_delay": 0.6e-3,
 }
-COUPLED = model.Design(
-    name="two-mass",
-    title="",
-    motor=model.Motor(source_gain_Nm_V=1.0, rotor_inertia_kgm2=1.0),
-    gears=(model.Gear(name="gear", ratio=N),),
+COUPLED = source_drive(
+    1.0, 1.0, TICK, 10.0, gears=(model.Gear(name="gear", ratio=N),), load={"path": "back-drivable"},
     coupling=model.Coupling(stiffness_Nm_rad=1.0, damping_Nms_rad=1.0),
-    load=model.Load(path="back-drivable"),
-    encoder=model.Encoder(speed="ideal"),
-    limits=model.Limits(voltage_V=10.0),
-    controller=model.Controller(period_s=TICK, computing_delay_s=0.0, position=model.PositionLoop(gain=GAIN)),
-    validation=model.Validation(full_deflection_rad=0.1),
-)
+    controller={"position": model.PositionLoop(gain=GAIN)}, validation={"full_deflection_rad": 0.1},
+)  # fmt: skip
 
 
 def _design(off: dict[str, float]) -> model.Design:

@@ -13,15 +13,14 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from flint import arb, arb_poly, ctx, fmpq_poly
+from flint import arb, arb_poly, ctx, fmpz_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import stability_margins
-from actuator_lti.systems.exact_fraction import exact_fraction
+from tests.margins.margin_truth import bilinear, even_odd, polynomials, positive
 
 _AGREE = 1e-6
 _LARGEST = 40
-_V = fmpq_poly([0, 1])
 
 
 def benchmark_loops(ctrlsys: Any) -> Iterator[tuple[str, control.StateSpace]]:
@@ -44,29 +43,21 @@ def benchmark_loops(ctrlsys: Any) -> Iterator[tuple[str, control.StateSpace]]:
                 )
 
 
-def exact_modulus_margin(loop: control.StateSpace) -> float:
+def exact_modulus_margin(loop: control.LTI) -> float:
     """Smallest |1 + L| from every stationary point of |N + D|^2/|D|^2, certified."""
-    fraction = exact_fraction(loop)
-    num, den = fraction.warped() if loop.isdtime(strict=True) else (fraction.num, fraction.den)
-
-    def square(p: fmpq_poly) -> fmpq_poly:
-        c = p.coeffs()
-        even = fmpq_poly([(-1) ** k * x for k, x in enumerate(c[0::2])])
-        odd = fmpq_poly([(-1) ** k * x for k, x in enumerate(c[1::2])])
-        return even * even + _V * odd * odd
-
-    above, below = square(num + den), square(den)
-    slope = above.derivative() * below - above * below.derivative()
-    n = fraction.den.degree()
+    num, den = polynomials(loop)
+    n, v = den.degree(), fmpz_poly([0, 1])
+    if loop.isdtime(strict=True):
+        num, den = bilinear(num, n), bilinear(den, n)
+    (ae, ao), (be, bo) = even_odd(num + den), even_odd(den)
+    above, below = ae * ae + v * ao * ao, be * be + v * bo * bo
     ends = [(above[0], below[0]), (above[n], below[n])]
     values = [float(arb(a) / arb(b)) for a, b in ends if b != 0]
     with ctx.workprec(256):
-        roots: Any = slope.numer().complex_roots() if slope.degree() > 0 else []
-        for root, _ in roots:
-            if root.imag == 0 and root.real > 0:
-                ratio = arb_poly(above)(root.real) / arb_poly(below)(root.real)
-                if ratio.is_finite():
-                    values.append(float(ratio.mid()))
+        for w in positive(above.derivative() * below - above * below.derivative()):
+            ratio = arb_poly(above)(w * w) / arb_poly(below)(w * w)
+            if ratio.is_finite():
+                values.append(float(ratio.mid()))
     return math.sqrt(max(min(values), 0.0))
 
 

@@ -11,7 +11,7 @@ from test_stacked import everything
 
 from actuator_lti import InputError, assemble_loops, delay_budget
 from actuator_lti.design.model import Design, Filter
-from actuator_lti.drive.blocks import biquad, pi
+from actuator_lti.drive.blocks import biquad
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from nonlinear.row.filters import section
 from tests.validation.random_drives import full_drive
@@ -48,17 +48,6 @@ def test_delay_close_to_whole_ticks_is_whole() -> None:
     assert split_delay(2.9999999999e-4, 1e-4) == (3, 0.0)
     with pytest.raises(InputError):
         split_delay(-1e-9, 1.0)
-
-
-def test_pi_in_z_is_the_recursion() -> None:
-    law, z = pi(2.0, 0.05, 0.01), np.exp(1j * 0.3)
-    k = np.arange(4000)
-    e = z**k
-    integral = np.cumsum(2.0 * 0.01 / 0.05 * e)
-    v = 2.0 * e + integral
-    offset = 2.0 * 0.01 / 0.05 / (1 - z)  # the start's constant, which the response does not contain
-    np.testing.assert_allclose(v - offset, law.at_z(np.array([30.0]))[0] * e, rtol=1e-9)
-    assert pi(2.0, None, 0.01).at_z(np.array([1.0]))[0] == 2
 
 
 def skewed(zero: float, pole: float, width: float, depth: float) -> Filter:

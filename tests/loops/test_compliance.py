@@ -70,15 +70,6 @@ def test_lost_motion_is_a_requirement() -> None:
     assert result.verdict == "met"
 
 
-def test_torque_margin_by_hand() -> None:
-    """kM i_peak (or kM U/R) over C0 + CM |M|, which breakaway multiplies: the path locks itself."""
-    friction, motor, limits = AMBER.friction, AMBER.motor, AMBER.limits
-    torque = motor.torque_constant_Nm_A * min(limits.peak_current_A, limits.voltage_V / motor.resistance_ohm)
-    held = 1.3 * (friction.dry_torque_Nm + friction.load_coefficient * 4.0) + abs(friction.offset_torque_Nm)
-    assert AMBER.load.path == "self-locking"
-    assert drive_figure(AMBER, "torque_margin", 4.0) == pytest.approx(torque / held, rel=1e-12)
-
-
 @pytest.mark.parametrize("load_Nm", [0.0, 1.0, 6.0])
 @pytest.mark.parametrize(("margin", "moves"), [(0.98, False), (1.02, True)])
 def test_the_simulator_starts_above_one(load_Nm: float, margin: float, moves: bool) -> None:

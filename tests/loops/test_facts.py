@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, emps, source_drive, without
+from loop_designs import amber, controlled, source_drive, without
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
@@ -61,10 +61,10 @@ def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     assert torque_gain_Nm_rad(design) == pytest.approx(20.0 * 10 * 0.05 * 0.05 * share)
 
 
-@pytest.mark.parametrize("name", [*DRIVES, "emps with offset"])
+@pytest.mark.parametrize("name", DRIVES)
 @pytest.mark.parametrize("load", [0.0, 3.0])
 def test_many_drives_are_each_of_them_alone(name: str, load: float) -> None:
-    design = DRIVES.get(name, emps())
+    design = DRIVES[name]
     values = scattered(design, 6)
     many = capability(stacked(design, values), load)
     for k in range(6):

@@ -1,7 +1,7 @@
 """Where the limits begin: A_k(w) = limit_k/|T_k| against the recursion, closed forms, the running drive."""
 
 from dataclasses import replace
-from math import inf, pi, sin
+from math import inf
 
 import numpy as np
 import pytest
@@ -9,8 +9,9 @@ from loop_designs import amber, controlled, ctms_position, emps
 from recursion import run
 
 from actuator_lti import InputError, assemble_loops, load_design, onset
-from actuator_lti.design.model import Design, Friction, Limits
+from actuator_lti.design.model import Design, Limits
 from nonlinear import Drive, commands, simulate
+from tests.changed import changed
 
 
 def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[str, float]:
@@ -20,6 +21,7 @@ def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[st
         name: record[name][-window // every :] for name, every in (("u", 1), ("i_ref", 2), ("w_ref", 10))
     }
     steady["change"] = np.diff(record["w_ref"])[-window // 10 :] / 1e-3
+    steady["rate"] = np.diff(record["i_ref"])[-window // 2 :] / 2e-4
     return {name: float(np.max(np.abs(values))) for name, values in steady.items()}
 
 
@@ -28,9 +30,11 @@ def peaks(design: Design, cycles: int, window: int, amplitude: float) -> dict[st
 def test_onset_of_each_limiter_in_the_multirate_drive(cycles: int, feedforward: float) -> None:
     """At the onset amplitude the largest steady sample is the limit, whichever sub-tick it falls in."""
     design, window = amber(2, 10, feedforward=feedforward), 14_000
+    design = changed(design, limits={"current_rate_A_s": 1e3})
     loops, omega = assemble_loops(design), 2 * np.pi * cycles / (window * 1e-4)
     seen = peaks(design, cycles, window, 1e-3)
     signals = {"speed": "w_ref", "acceleration": "change", "current": "i_ref", "voltage": "u"}
+    signals["current-rate"] = "rate"
     for name, path in loops.limiters.items():
         amplitude = float(path.onset_amplitude_rad(omega)[0])
         # the recursion sees samples of the sinusoid, whose phases here lie densely enough for 0.1 %
@@ -96,37 +100,6 @@ def test_three_forms_agree_at_low_frequency() -> None:
     for form in ("sampled", "continuous"):
         for name, path in assemble_loops(design, form).limiters.items():
             np.testing.assert_allclose(path.response(omega), reference[name].response(omega), rtol=2e-2)
-
-
-def heavy(n_v: int, rate_A_s: float) -> Design:
-    """A speed drive with P control whose load hardly moves: i_ref is Kp times the speed command."""
-    motor = replace(amber().motor, rotor_inertia_kgm2=1e9)
-    limits = Limits(voltage_V=1e9, current_rate_A_s=rate_A_s)
-    heavy = amber(n_v, motor=motor, friction=Friction(), limits=limits)
-    return controlled(heavy, position=None, velocity={"integral_time_s": None})
-
-
-@pytest.mark.parametrize("n_v", [1, 3])
-def test_onset_is_that_of_the_difference_of_a_sine(n_v: int) -> None:
-    """Of A sin(w t) sampled every T the change is at most 2 A sin(w T/2): A = r T/(2 Kp N sin(w T/2))."""
-    design = heavy(n_v, 150.0)
-    velocity, T = design.controller.velocity, n_v * design.controller.period_s
-    path = assemble_loops(design).limiters["current-rate"]
-    assert (path.limit, path.unit) == (150.0, "A/s")
-    for w in (20.0, 700.0, 0.9 * pi / T):
-        expected = 150.0 * T / (2.0 * velocity.gain * design.total_ratio * sin(w * T / 2.0))
-        assert path.onset_amplitude_rad(w)[0] == pytest.approx(expected, rel=1e-9)
-
-
-@pytest.mark.parametrize("hertz", [7.3, 61.7])
-def test_multirate_onset_divides_the_runs(hertz: float) -> None:
-    """Three velocity updates in a position update: 1 % below the border nothing acts, 1 % above it does."""
-    limits, friction = Limits(voltage_V=1e9, current_rate_A_s=1e3), Friction(viscous_Nms_rad=5e-6)
-    design = amber(2, 6, friction=friction, limits=limits)
-    border = float(assemble_loops(design).limiters["current-rate"].onset_amplitude_rad(2 * pi * hertz)[0])
-    for factor, acts in ((0.99, False), (1.01, True)):
-        run = simulate(design, commands.sine(factor * border, hertz), 1.2)
-        assert run.limit_active("current-rate")[run.time_s > 0.8].any() == acts
 
 
 def test_a_torque_drive_ramps() -> None:

@@ -1,10 +1,10 @@
 """The three forms against each other, operating points, break points, traps."""
 
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 import control
-import flint
 import numpy as np
 import pytest
 from loop_designs import amber, controlled, ctms_position, emps, faster, response, without
@@ -13,6 +13,7 @@ from actuator_lti import DelaySystem, InputError, assemble_loops
 from actuator_lti.design.model import Design, Encoder, Friction, Load
 from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.loops import exact_margins
+from tests.margins.margin_truth import truth_of
 from tests.validation.random_drives import full_drive
 
 R, L, K, J, Cv = 0.055, 6e-6, 5.9e-3, 1.05e-6, 5.25e-6  # of `amber`
@@ -142,16 +143,8 @@ def test_closed_loops_of_all_break_points_have_the_poles_of_the_one_drive(rates:
 
 def exactly_stable(loop: control.StateSpace, gain: float, samples: int) -> bool:
     """Whether gain z^-samples L closes stably, by certified roots; its doubles are taken as rationals."""
-
-    def matrix(values: np.ndarray) -> flint.fmpq_mat:
-        entries = [flint.fmpq(*float(v).as_integer_ratio()) for v in np.ravel(values)]
-        return flint.fmpq_mat(*np.shape(values), entries)
-
-    A, b, c = matrix(loop.A), matrix(loop.B), matrix(loop.C)
-    den = A.charpoly()
-    num = (A - b * c).charpoly() - den + matrix(loop.D)[0, 0] * den
-    closed = den * flint.fmpq_poly([0, 1]) ** samples + flint.fmpq(*gain.as_integer_ratio()) * num
-    return all(abs(root) < 1 for root, _ in closed.numer().complex_roots())
+    scaled = control.StateSpace(loop.A, gain * loop.B, loop.C, gain * loop.D, loop.dt)
+    return truth_of(scaled, Fraction(samples)).unstable == 0
 
 
 def test_exact_margins_are_those_of_the_exact_polynomial_where_the_loop_is_time_invariant() -> None:

@@ -1,16 +1,16 @@
-"""Four controllers made outside and brought in as a law of one's own, each with a truth of its own."""
+"""Two controllers made outside and brought in as a law of one's own, each with a truth of its own."""
 
 from dataclasses import replace
 
 import numpy as np
 from loop_designs import controlled
 from own_laws import linear, period_s
-from scipy.linalg import solve_continuous_are, solve_discrete_are
+from scipy.linalg import solve_discrete_are
 from scipy.signal import place_poles
 
 from actuator_lti import Design, assemble_loops, load_design, plant, stability_margins
 from actuator_lti.design.model import Encoder, PositionLoop
-from nonlinear import Rows, tangent
+from nonlinear import Rows
 
 
 def poles(design: Design) -> np.ndarray:
@@ -57,47 +57,6 @@ def test_lqg_velocity_controller() -> None:
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
 
 
-def bilinear(A: np.ndarray, B: np.ndarray, C: np.ndarray, D: np.ndarray, way: float = 1.0):
-    """s = (z - 1)/(z + 1): sampled to continuous, or back with ``way`` -1; the unit circle is the axis."""
-    one = np.eye(len(A))
-    inverse = np.linalg.inv(one + way * A)
-    B, C, D = np.sqrt(2) * inverse @ B, np.sqrt(2) * C @ inverse, D - way * C @ inverse @ B
-    return inverse @ (A - way * one), B, C, D
-
-
-def test_h_infinity_position_controller_of_order_6() -> None:
-    """Normalised coprime factors: the four-block norm of the closed drive lies between its optimum and gamma.
-
-    The optimum sqrt(1 + rho(X Z)) is exact (Glover and McFarlane 1989); bilinear maps keep the norm.
-    """
-    base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
-    T, k = period_s(base, "position"), 100.0
-    gain = base.controller.position_loop.gain
-    open_loop = assemble_loops(base).position.open_loop
-    A, B, C, D = bilinear(open_loop.A, open_loop.B * k / gain, open_loop.C, np.zeros((1, 1)))
-    n, R = len(A), 1.0 + D.item() ** 2
-    assert n == 6
-    left = A - B @ (D / R) @ C
-    Z = solve_continuous_are(left.T, C.T, B @ B.T / R, np.array([[R]]))
-    X = solve_continuous_are(left, B, C.T @ C / R, np.array([[R]]))
-    optimum = float(np.sqrt(1.0 + np.max(np.abs(np.linalg.eigvals(X @ Z)))))
-    gamma, F = 1.1 * optimum, -(D.T @ C + B.T @ X) / R
-    W = np.linalg.inv(((1.0 - gamma**2) * np.eye(n) + X @ Z).T)
-    H = gamma**2 * W @ Z @ C.T
-    continuous = A + B @ F + H @ (C + D @ F)
-    Ak, Bk, Ck, Dk = bilinear(continuous, H, B.T @ X, -D.T, -1.0)
-    mine = base.with_law("position", (Ak, Bk, -k * Ck, -k * Dk, T), ["error"])
-    assert len(mine.controller.position_loop.law.A) == 6
-    loop = assemble_loops(mine).position
-    assert stability_margins(loop.open_loop).stable
-    z = np.exp(1j * np.geomspace(1e-4, np.pi * 0.9999, 4000))
-    L, P = loop.open_loop(z), open_loop(z) * k / gain
-    K = L / P  # of what runs, in units of the shaped plant
-    norm = np.sqrt((1.0 + np.abs(K) ** 2) * (1.0 + np.abs(P) ** 2)) / np.abs(1.0 + L)
-    assert optimum * (1 - 1e-6) < norm.max() < gamma * (1 + 1e-6)
-    assert np.abs(tangent(mine, "position").open(z[::100]) / L[::100] - 1.0).max() < 1e-6
-
-
 def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     """All poles where they were placed: current, motor, coupling and load measured, the delay remembered."""
     base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
@@ -128,29 +87,3 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)
-
-
-def test_torque_loop_on_the_twist() -> None:
-    """PI on the spring's torque: the loop is k times the plant's response; at rest the torque is exact."""
-    base = replace(linear(load_design("joint")), requirements=(), encoder=Encoder())
-    coupling = base.coupling
-    base = replace(controlled(base, position=None), load=replace(base.load, inertia_kgm2=1e9))
-    T, k = period_s(base, "velocity"), coupling.stiffness_Nm_rad
-    kp, ki, per_command = 2e-3, 0.4, 5.0  # A/(N m), A/(N m s), N m per rad/s of the command
-    row = np.array([per_command, -k / base.ratio_to_coupling, k * base.ratio_behind_coupling])
-    law = ([[1.0]], [ki * T * row], [[1.0]], [(kp + ki * T) * row], T)
-    mine = base.with_law("velocity", law, ["command", "angle", "output_angle"])
-    loop = assemble_loops(mine).velocity
-    assert stability_margins(loop.open_loop).stable
-    system, ticks = plant(base, command="i_ref"), round(T / base.controller.period_s)
-    A, B, C = system.A, system.B[:, :1], system.C[[system.output_labels.index("twist")]]
-    z = np.exp(1j * np.geomspace(1e-2, 3.0, 40))
-    held = sum(np.linalg.matrix_power(A, j) @ B for j in range(ticks))
-    over = np.linalg.matrix_power(A, ticks)
-    P = np.array([(C @ np.linalg.solve(one * np.eye(len(A)) - over, held)).item() for one in z])
-    np.testing.assert_allclose(loop.open_loop(z), k * P * (kp + ki * T * z / (z - 1.0)), rtol=1e-6)
-    rows = Rows.of(mine, limits_on=False)
-    rows["ticks"] = int(4.0 / base.controller.period_s)
-    rows.step("command", 3.0 / base.total_ratio)
-    run = rows.trajectory()
-    assert abs(run.coupling_torque_Nm[-1] / (3.0 * per_command) - 1.0) < 1e-6

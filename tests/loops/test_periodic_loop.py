@@ -5,15 +5,12 @@ from math import inf, pi, sqrt
 
 import numpy as np
 import pytest
-from loop_designs import amber
 
 from actuator_lti.design import load_design, with_values
-from actuator_lti.design.model import Command
-from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
+from actuator_lti.drive.profile import CommandMean, profile_note
 from actuator_lti.loops import PeriodicLoop, assemble_loops, exact_margins, periodic_loop
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
-from nonlinear import commands, simulate
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
 from tests.validation.random_drives import full_drive
 
@@ -65,25 +62,6 @@ def test_a_rest_that_an_integral_holds_is_no_border(seed: int, gain: float) -> N
     found = exact_margins(assemble_loops(on_its_stand(on_the_bench(full_drive(seed)))), "u")
     assert found.gain_upper == pytest.approx(gain, rel=1e-4)  # what runs in time show
     assert found.spectral_radius < 0.999
-
-
-def test_the_mean_is_what_the_running_drive_does_to_a_command() -> None:
-    """Both runs are linear, so their ratio at the command's frequency is the mean's response."""
-    base = amber()
-    base = replace(base, friction=replace(base.friction, dry_torque_Nm=0.0, load_coefficient=0.0))
-    period = base.controller.position_loop.every * base.controller.period_s
-    jerk = 2.0 * 50.0 / (40 * period)
-    shaped = replace(base, command=Command(acceleration_rad_s2=50.0, jerk_rad_s3=jerk))
-    mean = command_mean(shaped)
-    assert mean == CommandMean(40, period)
-    hertz = 25.0
-    omega, count = 2 * pi * hertz, round(10.0 / hertz / period)
-    angles = []
-    for design in (base, shaped):
-        run = simulate(design, commands.sine(1e-4, hertz), duration_s=0.8, limits_on=True)
-        kept = run.output_angle_rad[-count:]
-        angles.append(np.sum(kept * np.exp(-1j * omega * run.time_s[-count:])))
-    assert angles[1] / angles[0] == pytest.approx(complex(mean.response(np.array(omega))), rel=1e-6)
 
 
 def test_its_delay_and_bandwidth() -> None:

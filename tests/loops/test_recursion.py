@@ -6,10 +6,10 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from loop_designs import amber, controlled
+from loop_designs import amber, controlled, emps
 from own_laws import linear
 from recursion import run
-from test_stacked import DRIVES, FILTERS, everything
+from test_stacked import FILTERS, everything
 from two_mass import drive_d
 
 from actuator_lti import assemble_loops
@@ -52,9 +52,12 @@ def between_two_gears() -> model.Design:
     return replace(base, gears=(first, second), coupling=replace(base.coupling, after="first"))
 
 
+SKEWED = model.Filter(
+    kind="skewed-notch", zero_rad_s=2500.0, pole_rad_s=3500.0, width_rad_s=2000.0, depth=0.1
+)
 OPEN = replace(drive_d(), controller=model.Controller(period_s=1e-4, computing_delay_s=1.5e-4))
-PLAIN = {name: one for name, one in DRIVES.items() if not one.friction.points}  # its friction is a slope
-KINDS = {**PLAIN, "open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
+KINDS = {"open-loop voltage": OPEN, "coupling between two gears": between_two_gears()}
+KINDS |= {"every slot": everything(), "two masses": drive_d(SKEWED), "force source": emps(delay_s=5e-4)}
 DELAYS, RATES = (0.0, 0.5, 1.0, 1.5), ((1, 1), (2, 10))
 ESTIMATES = (
     model.Encoder(speed="difference"),

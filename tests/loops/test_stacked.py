@@ -5,20 +5,21 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, emps, sprung, without
+from loop_designs import controlled, sprung
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops, stability_margins
-from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
+from actuator_lti import assemble_loops, stability_margins
+from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.batch._figures import DC_GAIN
-from actuator_lti.design import load_design, parameter_value, with_overrides, with_values
+from actuator_lti.design import load_design, parameter_value, with_overrides
 from actuator_lti.design.access import stacked
-from actuator_lti.design.model import Command, Design, Encoder, Filter, FrictionPoint, Load, PositionLoop
+from actuator_lti.design.model import Command, Design, Encoder, Filter, PositionLoop
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
+from tests.validation.random_drives import drives
 
 FILTERS = (
     Filter(kind="lowpass", frequency_rad_s=2000.0, order=2),
@@ -26,11 +27,6 @@ FILTERS = (
     Filter(kind="leadlag", zero_rad_s=500.0, pole_rad_s=1500.0),
     Filter(kind="lowpass", frequency_rad_s=3000.0, on="speed"),
 )
-MAP = tuple(
-    FrictionPoint(speed_rad_s=speed, torque_Nm=torque)
-    for speed, torque in ((0.0, 3e-3), (20.0, 2e-3), (90.0, 2.6e-3), (400.0, 4e-3))
-)
-STATIC = ("output_rate", "motor_current", "acceleration", "torque_margin")
 
 
 def everything() -> Design:
@@ -57,20 +53,23 @@ def bent() -> Design:
     return replace(base, coupling=replace(base.coupling, **bends))
 
 
-DRIVES = {
-    "cascade": amber(2, 10, delay_s=1.5e-4),
-    "difference": amber(encoder=Encoder(speed="difference", difference_samples=3, filter_time_s=2e-4)),
-    "elastic load": amber(load=Load(path="back-drivable", moment_slope_Nm_rad=-40.0)),
-    "no current": without(amber(), "current", gain=0.01),
-    "no velocity": without(amber(), "velocity", gain=1.0),
-    "position only": without(amber(), "current", "velocity", gain=0.05),
-    "force source": emps(delay_s=5e-4),
-    "speed drive": drive_d(),
-    "torque drive": controlled(drive_d(), velocity=None),
-    "everything": everything(),
-    "friction map": replace(amber(), friction=replace(amber().friction, points=MAP)),
-    "bent spring": bent(),
-}
+def rich() -> Design:
+    """The joint, with everything that a joint may have besides."""
+    return with_overrides(load_design("joint"), {
+        "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
+        "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
+        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
+        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
+        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
+        "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
+        "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
+        "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",
+        "friction.offset_torque": "1 mN*m",
+    })  # fmt: skip
+
+
+KINDS = (everything(), replace(bent(), name="bent"), rich(), *drives(90_310, 10))
+DRIVES = {one.name: one for one in KINDS}
 
 
 def scattered(design: Design, count: int) -> dict[str, Any]:
@@ -130,7 +129,7 @@ def same(blocks: list[Any], k: int) -> None:
 @pytest.mark.parametrize(
     ("design", "k", "loop", "told"),
     [
-        (DRIVES["speed drive"], 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
+        (drive_d(), 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
         (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
         (sprung("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
         (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
@@ -162,39 +161,3 @@ def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope:
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
     closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
     assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
-
-
-def rich() -> Design:
-    """The joint, with everything that a joint may have besides."""
-    return with_overrides(load_design("joint"), {
-        "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
-        "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
-        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
-        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
-        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
-        "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
-        "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
-        "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",
-        "friction.offset_torque": "1 mN*m",
-    })  # fmt: skip
-
-
-@pytest.mark.parametrize("path", variable_paths(rich()))
-def test_a_stack_is_its_designs(path: str) -> None:
-    design = rich()
-    value = parameter_value(design, path)
-    other = 1.02 * value if value else 0.01
-    try:
-        alone = with_values(design, {path: other}, check=False)
-    except InputError:
-        pytest.skip("no other value is allowed")
-    stack = Population(design, {path: np.array([value, other])}, 2)
-    many = linear_figures(stack, time_figures=False)
-    single = linear_figures(Population(alone, {}, 1), time_figures=False)
-    for loop in many.loops:
-        for quantity in ("gain_margin", "phase_margin", "bandwidth"):
-            found = many.quantity(quantity, loop)[1]
-            assert found == pytest.approx(single.quantity(quantity, loop)[0], rel=1e-7, nan_ok=True), quantity
-    for quantity in STATIC:
-        expected = drive_figures(Population(alone, {}, 1), quantity, 5.0)[0]
-        assert drive_figures(stack, quantity, 5.0)[1] == pytest.approx(expected, rel=1e-9, nan_ok=True)

@@ -2,18 +2,16 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
 from loop_designs import controlled
 from two_mass import drive_d, drive_e
 
-from actuator_lti import Loops, assemble_loops, stability_margins
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.design import model
 from actuator_lti.drive.blocks import biquad
 from actuator_lti.drive.operating import Operating, slope_at
-from actuator_lti.drive.plant import motor_plant
 
 NOTCH = model.Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
 
@@ -72,17 +70,6 @@ def test_an_ever_stiffer_coupling_tends_to_the_rigid_drive(form: str) -> None:
     assert gaps[1] < 1e-3
 
 
-def test_driving_and_driven_change_the_reaction() -> None:
-    """With CM the motor feels T_s (1/N_c + CM' sgn(w T_s)); a gap takes the spring away."""
-    design = replace(drive_d(), friction=model.Friction(load_coefficient=0.02))
-    for point, share in (("driving", 0.1 + 0.02), ("driven", 0.1 - 0.02)):
-        plant = motor_plant(design, Operating(point=point))
-        w, twist = plant.states.index("w"), plant.states.index("twist")
-        assert plant.A[w, twist] == pytest.approx(-share * 400 / 2e-5, rel=1e-14)
-    gap = motor_plant(design, Operating(point="gap"))
-    assert gap.A[gap.states.index("W"), gap.states.index("twist")] == 0
-
-
 def test_output_sensor_sees_the_spring() -> None:
     """Below the resonance both sensors agree; above it the output lags the motor by half a turn."""
     drives = (drive_e(), controlled(drive_e(), position={"sensor": "output"}))
@@ -92,16 +79,6 @@ def test_output_sensor_sees_the_spring() -> None:
     # phi N_c/th = (c s + k)/(J_l s^2 + (c + Cv_l) s + k)
     expected = (0.1 * s + 400) / (2e-3 * s**2 + 0.11 * s + 400)
     np.testing.assert_allclose(ratio, expected, rtol=1e-9)
-
-
-def test_gravity_is_a_stiffness_at_its_angle() -> None:
-    def loops(**load: Any) -> Loops:
-        base = replace(drive_d(), coupling=None, friction=model.Friction())
-        return assemble_loops(replace(base, load=model.Load(path="back-drivable", **load)), angle_rad=2.5)
-
-    one = loops(gravity=model.Gravity(mass_kg=2.0, arm_m=0.3)).velocity
-    other = loops(moment_slope_Nm_rad=2.0 * 9.80665 * 0.3 * np.cos(2.5)).velocity
-    np.testing.assert_allclose(one.open_loop.A, other.open_loop.A, rtol=1e-13)
 
 
 def test_slope_and_describing_function_of_a_friction_map() -> None:

@@ -76,39 +76,13 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
     poles = np.linalg.eigvals(TickProgram(wire(design, at), "voltage").tick(0).A)
     assert np.max(np.abs(poles)) == pytest.approx(growth, rel=1e-12)
     assert np.max(np.angle(poles)) == pytest.approx(turn, rel=1e-9)
-    off = 1e-7 / case.order
-    run = simulate(design, commands.hold(), 0.3, initial=State(motor_angle_rad=case.stable + off))
-    swing, k = run.motor_angle_rad - case.stable, np.arange(run.time_s.size)
-    lead = ((1.0 - x) / growth - cos(turn)) / sin(turn)  # after one tick 1 - x is left
-    expected = growth**k * (np.cos(turn * k) + lead * np.sin(turn * k))
-    assert np.max(np.abs(swing / off - expected)) < 1e-5 * growth ** k[-1]
-
-
-@each
-def test_a_constant_torque_turns_the_rotor_to_where_it_is_held(case: Case) -> None:
-    """A sin(Z th + phase) + T = 0, on the stable side."""
-    T = 0.6 * A
-    run = simulate(
-        case.put(rotor(viscous=4e-4)), commands.hold(), 2.5, disturbance_Nm=T,
-        initial=State(motor_angle_rad=case.stable),
-    )  # fmt: skip
-    assert run.motor_angle_rad[-1] == pytest.approx(case.stable + asin(0.6) / case.order, rel=1e-9)
-    assert run.motor_speed_rad_s[-1] == pytest.approx(0.0, abs=1e-9)
 
 
 @each
 def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
-    design, speed = case.put(rotor()), 40.0
-    at = Operating(speed_rad_s=speed, angle_rad=0.3)
-    plain = TickProgram(wire(rotor(), at), "voltage").tick(0)
-    assert np.array_equal(TickProgram(wire(design, at), "voltage").tick(0).A, plain.A)
-    run = simulate(design, commands.hold(), 2.0, initial=State(motor_speed_rad_s=speed))
-    turned = run.motor_angle_rad[-1] - run.motor_angle_rad[0]
-    # J w^2/2 + A/Z cos(Z th + phase) is kept but for the hold: a torque A would have added 400 rad/s
-    energy = 0.5 * J * speed**2 + A / case.order * cos(PHASE)
-    w = np.sqrt(2.0 / J * (energy - A / case.order * np.cos(case.order * run.motor_angle_rad + PHASE)))
-    assert run.motor_speed_rad_s == pytest.approx(w, abs=0.1)
-    assert turned == pytest.approx(2.0 * np.mean(w), rel=1e-3)
+    at = Operating(speed_rad_s=40.0, angle_rad=0.3)
+    own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))
+    assert np.array_equal(own, plain)
 
 
 @each

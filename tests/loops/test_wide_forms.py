@@ -133,16 +133,6 @@ def test_ripple_of_the_overload_by_integration() -> None:
         assert (25.0 * 0.999 if b == 0.0 else 20.0) < np.max(run.y[0]) <= 25.0 * (1 + 1e-6)
 
 
-def test_any_loop_goes_through_python_control() -> None:
-    """Names of states and signals; its functions on them are in test_delay_system.py."""
-    loops = assemble_loops(everything())
-    for loop in (*loops.present.values(), *loops.break_points.values()):
-        assert len(set(loop.open_loop.state_labels)) == loop.open_loop.nstates
-        assert len(loop.closed_loop.poles()) == loop.closed_loop.nstates
-    assert "W" in loops.velocity.open_loop.state_labels
-    assert "torque2_0" in assemble_loops(everything(), "ideal").velocity.open_loop.state_labels
-
-
 def test_the_survey_and_its_budget_table_know_filters_and_the_gap() -> None:
     base = drive_d(*FILTERS[:2])
     coupling = replace(base.coupling, play_rad=0.01)

@@ -8,12 +8,29 @@ import sys
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from machine_kinds import kernels, kinds
 
+from tests.margins.margin_families import integrators_and_whole_samples, sections_permuted_and_scaled
+
 SCRIPT = Path(__file__).with_name("machine_facts.py")
 _ASKED = ("OPENBLAS_CORETYPE", "NPY_DISABLE_CPU_FEATURES")
+FAMILIES = (integrators_and_whole_samples, sections_permuted_and_scaled)
+
+
+def parts_of(loop: control.LTI) -> list[Any]:
+    """Of a random loop, for `machine_facts.made_of`."""
+    if isinstance(loop, control.TransferFunction):
+        return [loop.num[0][0].tolist(), loop.den[0][0].tolist(), loop.dt]
+    return [*(part.tolist() for part in (loop.A, loop.B, loop.C, loop.D)), loop.dt]
+
+
+@functools.cache
+def loops() -> str:
+    drawn = [FAMILIES[k % 2](np.random.default_rng([k, 11])) for k in range(60)]
+    return json.dumps([parts_of(loop) for loop in drawn])
 
 
 @functools.cache
@@ -23,6 +40,7 @@ def facts(kind: str | None) -> dict[str, Any]:
     environment |= kinds()[kind] if kind else {"OPENBLAS_NUM_THREADS": "1"}
     done = subprocess.run(
         [sys.executable, "-W", "error", str(SCRIPT)],
+        input=loops(),
         env=environment,
         capture_output=True,
         text=True,

@@ -55,26 +55,18 @@ def scaled(
     return control.tf(num * gain, den, PERIOD_S if sampled else 0)
 
 
-def cascade(rng: np.random.Generator, zeros: list[complex], poles: list[complex], gain: float) -> tuple:
+def cascade(zeros: list[complex], poles: list[complex], gain: float) -> control.StateSpace:
     """Real state space in series of first and second order sections; gain about one somewhere."""
 
     def sections(roots: list[complex]) -> list[np.ndarray]:
         pairs = [poly([r, r.conjugate()]) for r in roots if r.imag > 0]
-        return pairs + [poly([r]) for r in roots if r.imag == 0]
+        return sorted(pairs + [poly([r]) for r in roots if r.imag == 0], key=len, reverse=True)
 
-    A, B, C, D = np.zeros((0, 0)), np.zeros(0), np.zeros(0), 1.0
-    above = sorted(sections(zeros), key=len, reverse=True)
-    for den in sorted(sections(poles), key=len, reverse=True):
+    whole, above = control.ss([], [], [], [[gain]]), sections(zeros)
+    for den in sections(poles):
         k = next((i for i, f in enumerate(above) if len(f) <= len(den)), None)
-        num = above.pop(k) if k is not None else np.array([1.0])
-        n = len(den) - 1
-        num = np.concatenate((np.zeros(n + 1 - len(num)), num))
-        a, b = np.eye(n, k=-1), np.eye(n)[0]
-        a[0] = -den[1:]
-        c = num[1:] - num[0] * den[1:]
-        A = np.block([[A, np.zeros((B.size, n))], [np.outer(b, C), a]])
-        B, C, D = np.concatenate((B, b * D)), np.concatenate((num[0] * C, c)), num[0] * D
-    return A, B * gain, C, D * gain
+        whole = control.tf2ss(above.pop(k) if k is not None else [1.0], den) * whole
+    return whole
 
 
 def state_space(
@@ -82,14 +74,12 @@ def state_space(
 ) -> Loop:
     """The loop of `scaled` as a state space under a random similarity of a given condition."""
     whole = scaled(rng, zeros, poles, False)
-    A, B, C, D = cascade(rng, zeros, poles, float(whole.num[0][0][0] / whole.den[0][0][0]))
-    n = B.size
+    made = cascade(zeros, poles, float(whole.num[0][0][0] / whole.den[0][0][0]))
+    n = made.nstates
     U, V = (np.linalg.qr(rng.standard_normal((n, n)))[0] for _ in range(2))
     T = U @ np.diag(np.geomspace(1.0, condition, n)) @ V
-    loop = control.StateSpace(
-        T @ A @ np.linalg.inv(T), (T @ B)[:, None], (C @ np.linalg.inv(T))[None], [[D]],
-        remove_useless_states=False,
-    )  # fmt: skip
+    parts = (T @ made.A @ np.linalg.inv(T), T @ made.B, made.C @ np.linalg.inv(T), made.D)
+    loop = control.StateSpace(*parts, remove_useless_states=False)
     if not sampled:
         return loop
     period = 0.3 / max(float(np.abs(np.array(poles)).max()), 1e-3)
@@ -220,11 +210,11 @@ def sections_permuted_and_scaled(rng: np.random.Generator) -> Loop:
     whole = scaled(rng, zeros, poles, False)
     if sampled:
         zeros, poles = ([complex(np.exp(0.1 * r)) for r in part] for part in (zeros, poles))
-    A, B, C, D = cascade(rng, zeros, poles, float(whole.num[0][0][0] / whole.den[0][0][0]))
+    made = cascade(zeros, poles, float(whole.num[0][0][0] / whole.den[0][0][0]))
     order, scale = rng.permutation(n), 2.0 ** rng.integers(-8, 9, n)
-    A = (A * scale[:, None] / scale)[np.ix_(order, order)]
-    B, C = (B * scale)[order, None], (C / scale)[None, order]
-    return control.StateSpace(A, B, C, [[D]], PERIOD_S if sampled else 0, remove_useless_states=False)
+    A = (made.A * scale[:, None] / scale)[np.ix_(order, order)]
+    parts = (A, (made.B * scale[:, None])[order], (made.C / scale)[:, order], made.D)
+    return control.StateSpace(*parts, PERIOD_S if sampled else 0, remove_useless_states=False)
 
 
 FAMILIES: tuple[Callable[[np.random.Generator], Loop], ...] = (

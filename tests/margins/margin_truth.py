@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import control
 import numpy as np
-from flint import acb, arb, ctx, fmpz_poly
+from flint import acb, arb, ctx, fmpq, fmpq_mat, fmpq_poly, fmpz_poly
 from scipy.optimize import brentq
 
 from actuator_lti.margins import StabilityMargins
@@ -127,30 +127,18 @@ def late_gains(loop: control.LTI, delay_s: float, top: float) -> list[tuple[floa
 def polynomials(loop: control.LTI) -> tuple[fmpz_poly, fmpz_poly]:
     """Numerator and denominator of the very doubles, lowest power first, times one number."""
     if isinstance(loop, control.TransferFunction):
-        num, den = (np.trim_zeros(p[0][0], "f")[::-1] for p in (loop.num, loop.den))
-        both, _ = integers(np.concatenate((num, den)))
-        return fmpz_poly(both[: num.size].tolist()), fmpz_poly(both[num.size :].tolist())
-    (A, unit), (b, unit_b), (c, unit_c) = map(integers, (loop.A, loop.B[:, 0], loop.C[0]))
-    n = len(b)
-    M, below, above = np.eye(n, dtype=int).astype(object), [1], [0]
-    for k in range(1, n + 1):  # Faddeev and LeVerrier
-        above.append(c @ M @ b)
-        AM = A @ M
-        last = -sum(AM[i, i] for i in range(n))
-        assert last % k == 0
-        below.append(last // k)
-        M = AM + (last // k) * np.eye(n, dtype=int).astype(object)
-    den = fmpz_poly([int(x) * unit_b * unit_c * unit**k for k, x in enumerate(below[::-1])])
-    num = fmpz_poly([int(x) * unit ** (k + 1) for k, x in enumerate(above[::-1])])
-    direct, whole = float(loop.D[0, 0]).as_integer_ratio()
-    return num * whole + den * direct, den * whole
+        parts = (np.trim_zeros(p[0][0], "f")[::-1] for p in (loop.num, loop.den))
+        num, den = (fmpq_poly(rationals(part)) for part in parts)
+    else:
+        A, b, c = (fmpq_mat(*part.shape, rationals(part)) for part in (loop.A, loop.B[:, :1], loop.C[:1]))
+        den = A.charpoly()
+        num = (A - b * c).charpoly() + (rationals(loop.D)[0] - 1) * den  # D + det(s - A + b c)/det(s - A) - 1
+    unit = num.denom() * den.denom()
+    return (num * unit).numer(), (den * unit).numer()
 
 
-def integers(x: np.ndarray) -> tuple[np.ndarray, int]:
-    """Numbers times a power of two, and that power."""
-    ratios = [float(v).as_integer_ratio() for v in np.ravel(x)]
-    unit = max((d for _, d in ratios), default=1)
-    return np.array([a * (unit // d) for a, d in ratios], dtype=object).reshape(np.shape(x)), unit
+def rationals(x: np.ndarray) -> list[fmpq]:
+    return [fmpq(*float(v).as_integer_ratio()) for v in np.ravel(x)]
 
 
 def bilinear(p: fmpz_poly, n: int) -> fmpz_poly:

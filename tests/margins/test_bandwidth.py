@@ -64,7 +64,6 @@ def test_closed_loop_of_an_integrator_with_delay() -> None:
     b = closed_loop_bandwidth(closed)
     omega = np.linspace(1, 400, 400_001)
     L = K / (1j * omega) * np.exp(-1j * omega * T)
-    L = K / (1j * omega) * np.exp(-1j * omega * T)
     size, phase = np.abs(L / (1 + L)), np.unwrap(np.angle(L / (1 + L)))
     assert b.minus3db_rad_s == pytest.approx(omega[np.argmax(size < math.sqrt(0.5))], rel=1e-5)
     assert b.minus90deg_rad_s == pytest.approx(omega[np.argmax(phase < -np.pi / 2)], rel=1e-5)

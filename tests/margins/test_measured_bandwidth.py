@@ -24,13 +24,7 @@ CLOSED = {
     "fourth": 1 / (s + 1) ** 4,
     "resonant": W**2 / (s**2 + 0.1 * W * s + W**2),
 }
-OPEN = {
-    "A1": control.tf([25], [1, 10, 10, 10]),
-    "A3": control.tf([1], [1, 2, 1, 0]),
-    "A5": control.tf([24], [1, 6, 11, 6]),
-    "B2": control.tf([20e6], [1, 1, 1e6, 0]),
-    "C2": control.tf([100, 200, 100], np.polymul([1, 0, 0, 0], np.poly([-100.0] * 2) / 1e4)),
-}
+B2 = control.tf([20e6], [1, 1, 1e6, 0])
 
 
 def measured(
@@ -61,36 +55,9 @@ def test_bandwidth_ranges_hold_the_truth_at_one_percent_noise_nobody_stated(coun
     assert wrong <= 0.01 * total
 
 
-@pytest.mark.parametrize("count", [60, 400])
-def test_margin_ranges_hold_the_truth_at_one_percent_noise_nobody_stated(count: int) -> None:
-    wrong = total = 0
-    for system in OPEN.values():
-        exact = stability_margins(system)
-        at = [m.frequency_rad_s for m in (*exact.phase_margins, *exact.gain_margins)]
-        omega = np.geomspace(min(at) / 20.0, max(at) * 8.0, count)
-        smallest = np.abs(1.0 + system(1j * np.geomspace(omega[0], omega[-1], 50_001))).min()
-        for seed in range(15):
-            m = stability_margins(measured(system, omega, np.random.default_rng(seed)))
-            for listed, true, field, value in (
-                (m.phase_margins, exact.phase_margins, "deg_range", "deg"),
-                (m.gain_margins, exact.gain_margins, "ratio_range", "ratio"),
-            ):
-                for margin in listed:
-                    low, high = margin.bracket_rad_s
-                    inside = [t for t in true if low * 0.9999 <= t.frequency_rad_s <= high * 1.0001]
-                    least, most = getattr(margin, field)
-                    told = (least - 1e-9 <= getattr(t, value) <= most + 1e-9 for t in inside)
-                    wrong += not (inside and all(told))
-                    total += 1
-            wrong += not holds(m.modulus_range, smallest)
-            total += 1
-    assert total > 200
-    assert wrong <= 0.01 * total
-
-
 def test_points_too_coarse_for_the_damping_are_called_so() -> None:
     """B2 at 60 points: the resonance at 1000 rad/s, which makes the loop unstable, lies between two."""
-    m = stability_margins(measured(OPEN["B2"], np.geomspace(1, 8e3, 60), np.random.default_rng(0)))
+    m = stability_margins(measured(B2, np.geomspace(1, 8e3, 60), np.random.default_rng(0)))
     assert "too coarse for the damping between 948.272 and 1104.3 rad/s" in m.evidence_reason
     closed = CLOSED["light"]
     fine = closed_loop_bandwidth(control.frd(closed, np.geomspace(0.03, 30, 20)))
@@ -141,10 +108,7 @@ def test_phase_of_data_is_followed_over_whole_turns() -> None:
         (peaks, "modulus_margin"),
         (lambda d: unwrapped_phase_deg(d, 0.1), "outside of the measured band"),
         (lambda d: unwrapped_phase_deg(d, 1e4), "outside of the measured band"),
-        (
-            lambda d: unwrapped_phase_deg(control.frd(OPEN["B2"], np.geomspace(1, 8e3, 60)), 2e3),
-            "do not tell",
-        ),
+        (lambda _: unwrapped_phase_deg(control.frd(B2, np.geomspace(1, 8e3, 60)), 2e3), "do not tell"),
         (lambda d: closed_loop_bandwidth(control.frd(1 / s, np.geomspace(1, 10, 50))), "measure lower"),
         (lambda d: closed_loop_bandwidth(d, level="3"), "level"),
     ],

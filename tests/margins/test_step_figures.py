@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, newton
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
@@ -87,6 +87,14 @@ def test_small_delays_approach_the_loop_without() -> None:
 def test_refusals(system: control.LTI, message: str) -> None:
     with pytest.raises(InputError, match=message):
         step_figures(system)
+
+
+def test_what_no_time_is_enough_for_is_a_numerical_failure() -> None:
+    """Ten of the longest delay are 1e7 of the shortest."""
+    late = DelaySystem.from_system(control.tf([1], [1, 1])) * DelaySystem.delay(1.0)
+    quick = DelaySystem.from_system(1.0) + 0.5 * DelaySystem.delay(1e-6)
+    with pytest.raises(NumericalError, match="too long beside its delays"):
+        step_figures((late * quick).feedback(DelaySystem.from_system(0.1)))
 
 
 @pytest.mark.parametrize("grid", [[1e4], [1.0, 1e4], np.geomspace(1e-3, 1e4, 7), np.geomspace(1, 1e4, 1000)])

@@ -29,12 +29,14 @@ INLINE = Fakes(workers=0)
 
 
 def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
-    """A small report: one requirement on ``margin`` (not proven where ``unknown``) and a table of margins."""
+    """A small report: one requirement on ``margin`` (not proven where ``unknown``), a table of margins."""
     name, margin, limit = str(payload["name"]), float(payload["margin"]), float(payload.get("limit", 6.0))
     unknown = bool(payload.get("unknown"))
     found = {"value": margin, "distance": margin - limit, "passed": margin >= limit}
     if unknown:
         found = dict.fromkeys(found) | {"reason": "not determined"}
+    if payload.get("unstable"):
+        found = {"passed": False, "reason": "the position loop is unstable"}
     named = str(payload.get("requirement", "GM")), str(payload.get("label", "gain margin"))
     about = {"limit": limit, "comparison": "≥", "unit": "dB", "source": "test"}
     item = verdict(*named, **about, **found, waiver=str(payload.get("waiver", "")))

@@ -58,23 +58,6 @@ def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli
 
 
 @pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["nightly", "no-such-study.toml", "--site", "s"], "no-such-study.toml"),
-        (["nightly", "a", "b", "c", "--site", "s"], "nightly STUDY --site DIR"),
-        (["nightly", "approve", "ilr33-amber", "--site", "s"], "--by and --reason"),
-        (["nightly", "ilr33-amber"], "--site"),
-        (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "0"], "--time-limit"),
-        (["nightly", "ilr33-amber", "--site", "s", "--time-limit", "inf"], "--time-limit"),
-    ],
-)
-def test_bad_usage_is_one_line_and_writes_nothing(tmp_path, monkeypatch, cli, words, expected) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert expected in cli.refused(*words)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
     ("table", "expected"),
     [
         ("nightly = 1", "nightly: must be a table"),

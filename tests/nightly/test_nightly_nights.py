@@ -69,6 +69,20 @@ def test_the_worst_comes_first_and_a_failed_requirement_fails_the_night(nights) 
     assert (first.kind, first.worse) == ("verdict", True)
 
 
+def test_what_is_not_stable_is_the_worst_and_a_comparison_that_fails_is_counted_apart(nights) -> None:
+    whole = replace(job("All compared", 5.0), kind="comparison")
+    night = nights(job("far", -9.0), job("torn", unstable=True), job("good", 12.0), whole)
+    assert [d.name for d in night.designs] == ["torn", "far", "All compared", "good"]
+    assert (night.designs[0].result.worst, night.designs[0].result.worst_id) == (None, "GM")
+    assert night.counts == "2 failing, 1 passing; All compared: failing"
+    assert "| torn | ✗ failing | GM | not met | 0 |" in (nights.site / "summary.md").read_text()
+    torn = next(nights.site.glob("nights/*/torn-*.html")).read_text()
+    assert "the position loop is unstable" in torn
+    assert "of a margin, in % of the distance from −1 that the limit keeps" in torn
+    index = (nights.site / "index.html").read_text()
+    assert '<span class="worst neg">not met</span>' in index
+
+
 def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -> None:
     nights(job("a", 10.0))
     (design,) = nights(job("a", 9.0)).designs
@@ -133,7 +147,7 @@ def test_an_approval_needs_a_name_a_reason_and_a_result_and_a_site_its_own_folde
     assert sorted(p.name for p in other.iterdir()) == ["thesis.tex"]
 
 
-def test_missing_results_are_no_changes(nights) -> None:
+def test_missing_results_and_missing_nights_are_no_changes(nights) -> None:
     nights(job("a", 10.0), job("b"))
     broken = nights(job("a", 10.0, mode="raise", words="no such gear"), job("b"))
     (a, b) = broken.designs
@@ -143,11 +157,8 @@ def test_missing_results_are_no_changes(nights) -> None:
     assert not back.last_night.changes
     assert "1 night(s) without a result" in back.last_night.note
     assert nights(job("a", 10.0)).gone == ("b",)
-
-
-def test_nights_without_a_run_are_shown_as_such(nights) -> None:
-    for days in (1, 1, 1, 1, 4, 1):
-        night = nights(job("a"), days=days)
+    for days in (4, 1):  # nights without a run are shown as such
+        night = nights(job("a", 10.0), days=days)
     assert night.missing == ((3, 3),)
     assert "3 nights without a run" in (nights.site / "index.html").read_text()
     assert not night.designs[0].last_night.changes

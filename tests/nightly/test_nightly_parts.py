@@ -26,15 +26,11 @@ from tests.refusals import refused
 @given(st.text())
 @example("../../etc")
 @example("a" * 500)
-def test_a_name_is_one_plain_file_name(name: str) -> None:
-    for made, longest in ((hashed(name), 51), (slug(name), 67)):
-        assert set(made) <= set("abcdefghijklmnopqrstuvwxyz0123456789-")
-        assert 0 < len(made) <= longest
-
-
-def test_different_names_get_different_file_names() -> None:
+def test_a_name_is_one_plain_file_name_of_its_own(name: str) -> None:
     names = ["a/b", "a-b", "A-B", "a b", "../a-b", "a-b ", "а-b", "A", "a", "a_b", "a.b"]
-    for of in (hashed, slug):
+    for of, longest in ((hashed, 51), (slug, 67)):
+        assert set(of(name)) <= set("abcdefghijklmnopqrstuvwxyz0123456789-")
+        assert 0 < len(of(name)) <= longest
         assert len({of(n) for n in names}) == len(names)
 
 

@@ -1,13 +1,11 @@
 """Many runs have the bits of single ones, reducers agree with histories; gain and delay of probes."""
 
 import shutil
-from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from actuator_lti import load_design
-from actuator_lti.errors import InputError
 from nonlinear import Probe, Reducers, Rows, Run, commands, loads, simulate, simulate_many
 from nonlinear._kernels import layout
 from nonlinear.bench.probe import fractional_delay
@@ -137,27 +135,3 @@ def test_gain_and_delay_multiply_the_loop() -> None:
             response = np.sum(taps * np.exp(-1j * wT * (whole + np.arange(taps.size))))
             error = abs(response / np.exp(-1j * wT * delay) - 1.0)
             assert error < (wT / 2.0) ** taps.size * 2.0
-
-
-def probed(*probes: Probe) -> object:
-    return simulate("emps", commands.hold(), 0.1, probes=probes)
-
-
-LONG = Run(design=AMBER, command=commands.hold(), duration_s=0.1, reducers=Reducers(window_ticks=800))
-
-
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: simulate_many([]), "at least one"),
-        (lambda: simulate_many([LONG]), "must fit twice"),
-        (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
-        (lambda: probed(Probe(point="i_ref")), "no such stage"),
-        (lambda: probed(Probe(point="u"), Probe(point="u")), "one a point"),
-        (lambda: Probe(point="v"), "must be one of"),
-        (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
-    ],
-)
-def test_refusals(make: Callable[[], object], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        make()

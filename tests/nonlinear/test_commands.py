@@ -1,6 +1,7 @@
 """Commands, loads and results: values, units and refusals."""
 
 from collections.abc import Callable
+from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -9,7 +10,8 @@ from scipy import signal
 
 from actuator_lti import load_design
 from actuator_lti.errors import InputError, NumericalError
-from nonlinear import Drive, State, commands, loads, simulate
+from nonlinear import Drive, Probe, Reducers, Run, State, commands, loads, simulate, simulate_many
+from nonlinear._kernels import layout
 from nonlinear.commands import Command
 from nonlinear.runs.records import read_columns
 from tests.changed import changed
@@ -18,6 +20,12 @@ from tests.refusals import refused
 AMBER = load_design("ilr33-amber")
 TS = 1e-3
 T = np.arange(2000) * TS
+SHORT = {"design": AMBER, "command": commands.hold(), "duration_s": 0.1}
+TORQUE = {"position": None, "velocity": None}
+
+
+def run(controller: dict[str, None], **parts: dict[str, float]) -> object:
+    return simulate(changed(AMBER, controller=controller, **parts), commands.hold(), 0.01)
 
 
 @pytest.mark.parametrize(
@@ -85,23 +93,30 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
         (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
         (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+        (lambda: read_columns(Path("r.csv"), ("t", "a")), 'line 3, column 2 = "x"'),
+        (lambda: read_columns(Path("r.csv"), ("b",)), 'no column "b"; there are "t", "a"'),
         (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm, m"),
         (lambda: loads.constant(float("inf")), "finite"),
         (lambda: loads.proportional(float("nan")), "finite"),
         (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
         (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
+        (lambda: simulate_many([]), "at least one"),
+        (lambda: simulate_many([Run(**SHORT, reducers=Reducers(window_ticks=800))]), "must fit twice"),
+        (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
+        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="i_ref")]), "no such stage"),
+        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="u")] * 2), "one a point"),
+        (lambda: Probe(point="v"), "must be one of"),
+        (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
+        (lambda: run(TORQUE, command={"rate_rad_s": 1.0}), "need a position or a velocity loop"),
+        (lambda: run({}, command={"acceleration_rad_s2": 1.0, "jerk_rad_s3": 1e-4}), "a mean over"),
+        (lambda: run({"current": None}, limits={"peak_time_s": 1.0}), "needs a current loop"),
     ],
 )
-def test_refusals(make: Callable[[], object], words: str) -> None:
+def test_refusals(make: Callable[[], object], words: str, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("r.csv").write_text("t,a\n0,1\n1,x\n")
     with pytest.raises(InputError, match=words):
         make()
-
-
-def test_cells_that_are_no_numbers(tmp_path) -> None:
-    path = tmp_path / "r.csv"
-    path.write_text("t,a\n0,1\n1,x\n")
-    refused(read_columns, path, ("t", "a"), words='line 3, column 2 = "x"')
-    refused(read_columns, path, ("b",), words='no column "b"; there are "t", "a"')
 
 
 def test_trajectory_carries_units_and_leaves_as_a_frame() -> None:

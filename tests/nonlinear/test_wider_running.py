@@ -9,7 +9,6 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.design import model
-from actuator_lti.errors import InputError
 from nonlinear import Drive, Probe, State, commands, loads, simulate
 from tests.changed import changed
 
@@ -199,17 +198,3 @@ def test_profile_leaves_a_command_within_its_limits_untouched_and_holds_that_of_
     ramped = simulate(slow, commands.step(0.2), 0.3).speed_command_rad_s / AMBER.total_ratio
     assert np.diff(ramped).max() == pytest.approx(2.0 * AMBER.controller.period_s, rel=1e-9)
     assert ramped[-1] == pytest.approx(0.2, rel=1e-12)
-
-
-REFUSED = {
-    "need a position or a velocity loop": replace(TORQUE, command=model.Command(rate_rad_s=1.0)),
-    "a mean over": replace(AMBER, command=model.Command(acceleration_rad_s2=1.0, jerk_rad_s3=1e-4)),
-    "needs a current loop": changed(AMBER, controller={"current": None}, limits={"peak_time_s": 1.0}),
-}
-
-
-@pytest.mark.parametrize("what", REFUSED)
-def test_refusals(what: str) -> None:
-    """Others of a design's own are in tests/design."""
-    with pytest.raises(InputError, match=what):
-        simulate(REFUSED[what], commands.hold(), 0.01)

@@ -32,21 +32,16 @@ def requirement(quantity: str, **limits: float) -> Requirement:
     return Requirement(id=quantity, quantity=quantity, unit=unit, **limits)
 
 
-def test_the_tables_are_read_and_written() -> None:
-    again = read_design_text(write_design(FIN), "again")
+def test_the_tables_are_read_written_and_hashed_where_they_stand() -> None:
+    again, bare = read_design_text(write_design(FIN), "again"), load_design("fin")
     assert (again.failure, again.duty) == (FIN.failure, FIN.duty)
+    assert design_hash(again) == design_hash(FIN) != design_hash(replace(FIN, failure=None))
+    assert design_hash(read_design_text(write_design(bare), "again")) == design_hash(bare)
     asked, wanted = Asked.of(FIN), DutyAsked.of(FIN)
-    assert asked.detection_s == pytest.approx(0.02)
-    assert asked.load_Nm == 2.0
+    assert (asked.detection_s, asked.load_Nm) == (pytest.approx(0.02), 2.0)
     assert (wanted.frequency_hz, wanted.share, wanted.cycle_s) == (pytest.approx(2.0), 0.5, 20.0)
     assert Asked.of(FIN, load_Nm=1.0).load_Nm == 1.0
     assert not any(path.startswith(("failure.", "duty.")) for path in variable_paths(FIN))
-
-
-def test_what_is_asked_is_in_the_hash_only_where_it_is_asked() -> None:
-    assert design_hash(replace(FIN, failure=None)) != design_hash(FIN)
-    bare = load_design("fin")
-    assert design_hash(read_design_text(write_design(bare), "again")) == design_hash(bare)
 
 
 def test_every_requirement_reads_its_analysis() -> None:

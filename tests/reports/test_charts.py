@@ -69,16 +69,15 @@ def test_an_axis_places_its_ends_and_what_lies_between(low, ratio, part, log, re
     assert place == pytest.approx(1.0 - part if reversed_ else part, abs=1e-9)
 
 
-def test_limits_follow_the_values_and_survive_a_single_one() -> None:
+@pytest.mark.parametrize("before", [True, False])
+def test_limits_follow_the_values_that_an_axis_has_a_place_for_whenever_its_kind_is_said(
+    before: bool,
+) -> None:
     panel = Chart().panel()
     panel.curve([1.0, 1.0], [5.0, 5.0])
     (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()
     assert x0 < 1.0 < x1
     assert y0 < 5.0 < y1
-
-
-@pytest.mark.parametrize("before", [True, False])
-def test_a_logarithmic_axis_leaves_out_what_it_has_no_place_for_whenever_it_is_said(before: bool) -> None:
     panel = Chart().panel()
     panel.y.log = before
     panel.curve([1.0, 2.0, 3.0, 4.0], [0.0, -1.0, 10.0, 1000.0])
@@ -177,14 +176,11 @@ def test_every_point_of_an_outline_has_that_peak(centre_deg: float) -> None:
     magnitudes = {"S": lambda L: 1 / abs(1 + L), "T": lambda L: abs(L / (1 + L))}
     made = outlines(centre_deg)
     assert [kind for kind, _, _ in made] == ["+", "S", "T"]
+    assert critical_points(-700.0, 10.0) == [-540.0, -180.0, 180.0]  # odd half turns
     for kind, x, y in made[1:]:
         L = 10 ** (y / 20.0) * np.exp(1j * np.radians(x))
         np.testing.assert_allclose(20 * np.log10(magnitudes[kind](L)), 6.0, atol=1e-9)
         assert np.abs(np.diff(x)).max() < 60.0  # no jump of a turn
-
-
-def test_the_critical_points_are_odd_half_turns() -> None:
-    assert critical_points(-700.0, 10.0) == [-540.0, -180.0, 180.0]
 
 
 def test_the_rise_is_marked_where_it_begins_and_ends() -> None:

@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shlex
 import subprocess
 import sys
 
@@ -80,52 +81,115 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["margins", "ilr33-ambre"], 'nearest known: "ilr33-amber"'),
-        (["margins", "--load", "nan"], "load"),
-        (["margins", "--no-such-option"], "--no-such-option"),
-        (["margins", ""], '"": no such design; allowed: ilr33-amber'),  # an unset variable is no default
-        (["no-such-command"], "no-such-command"),
-        (["report", "missing.toml"], "missing.toml"),
-        (["report", "--processes", "2"], "--processes"),
-        (["margins", "--load", "4 kg"], '"kg" is the unit of a mass; allowed: a torque such as "4 N*m"'),
-        (["margins", "--load", "4,5"], 'use a decimal point: "4.5"'),
-        (["margins", "--load", "4 N"], '"N" is the unit of a force; allowed: a torque such as'),
-        (["margins", "emps", "--load", "4 N*m"], '"N*m" is the unit of a torque; allowed: a force such as'),
-        (["simulate", "emps", "--load", "4 N*m"], "--load '4 N*m': wrong dimension"),
-        (["simulate", "--amplitude", "0,5"], 'use a decimal point: "0.5"; allowed: "5 deg", or 5 in deg'),
-        (["margins", "--form", "sampld"], "--form 'sampld': one of sampled, continuous, ideal"),
-        (["margins", "--operating-point", "slide"], "--operating-point 'slide': one of sliding"),
-        (["margins", "--set", "control.period=0.1"], "has no unit; allowed: a number with a unit like s"),
-        (["margins", "--set", "motor.resistance"], "allowed: KEY=VALUE"),
-        (["margin"], "Did you mean 'margins'?"),
-        (["objects", "export", "emps"], "emps"),
-        (["objects", "import", "missing.xdc"], "missing.xdc"),
-        (["objects", "export", "--velocity-gain-per", "Hz"], 'per "Hz": allowed: "rad/s" or "rpm"'),
-        (["init", "."], "."),
-        (["report", "--summary"], "--summary: allowed with --pdf"),
-        (["report", "--also", "all-of-it"], "--also 'all-of-it': allowed: corners"),
-        (["tune", "--place", "spring"], "--place 'spring': allowed: notch"),
-        (["tune", "--aim", "least"], "Invalid value for '--aim': 'least' is not one of"),
-        (["montecarlo", "--samples", "1e3"], "'--samples': allowed: a whole number, such as 1000"),
-        (["montecarlo", "--at-least", "x"], "'--at-least': allowed: a number, such as 0.5, without its unit"),
-        (["compare", "emps", "--workers", "2"], "--workers 2: computes variants, and emps has none"),
+        ("margins ilr33-ambre", 'nearest known: "ilr33-amber"'),
+        ("margins --load nan", "load"),
+        ("margins --no-such-option", "--no-such-option"),
+        ("margins ''", '"": no such design; allowed: ilr33-amber'),  # an unset variable is no default
+        ("no-such-command", "no-such-command"),
+        ("report missing.toml", "missing.toml"),
+        ("report --processes 2", "--processes"),
+        ('margins --load "4 kg"', '"kg" is the unit of a mass; allowed: a torque such as "4 N*m"'),
+        ("margins --load 4,5", 'use a decimal point: "4.5"'),
+        ("margins --load '4 N'", '"N" is the unit of a force; allowed: a torque such as'),
+        ("margins emps --load '4 N*m'", '"N*m" is the unit of a torque; allowed: a force such as'),
+        ("simulate emps --load '4 N*m'", "--load '4 N*m': wrong dimension"),
+        ("simulate --amplitude 0,5", 'use a decimal point: "0.5"; allowed: "5 deg", or 5 in deg'),
+        ("margins --form sampld", "--form 'sampld': one of sampled, continuous, ideal"),
+        ("margins --operating-point slide", "--operating-point 'slide': one of sliding"),
+        ("margins --set control.period=0.1", "has no unit; allowed: a number with a unit like s"),
+        ("margins --set motor.resistance", "allowed: KEY=VALUE"),
+        ("margin", "Did you mean 'margins'?"),
+        ("objects export emps", "emps"),
+        ("objects import missing.xdc", "missing.xdc"),
+        ("objects export --velocity-gain-per Hz", 'per "Hz": allowed: "rad/s" or "rpm"'),
+        ("init .", "."),
+        ("report --summary", "--summary: allowed with --pdf"),
+        ("report --also all-of-it", "--also 'all-of-it': allowed: corners"),
+        ("tune --place spring", "--place 'spring': allowed: notch"),
+        ("tune --aim least", "Invalid value for '--aim': 'least' is not one of"),
+        ("montecarlo --samples 1e3", "'--samples': allowed: a whole number, such as 1000"),
+        (
+            "montecarlo --at-least x",
+            "--at-least 'x': a number and a unit are wanted; allowed: a number such as",
+        ),
+        ("duty --share '4 kg'", '"kg" is the unit of a mass; allowed: a number such as 0.5 or "50 %"'),
+        ("duty --frequency '4 s'", '"s" is the unit of a time; allowed: "5 Hz", or 5 in Hz'),
+        ("--time-limit x designs", "'--time-limit': allowed: a number, such as 0.5, without its unit"),
+        ("compare emps --workers 2", "--workers 2: computes variants, and emps has none"),
+        ("identify emps --set nothing", "allowed: KEY=VALUE"),
+        ("correlate emps none.csv --set limits.voltage", "allowed: KEY=VALUE"),
+        ("keys odrive", "objects import"),
+        ("margins ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),
+        ("report ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),
+        ("simulate --amplitude '5 mm'", "--amplitude '5 mm': wrong dimension"),
+        ("nightly no-such-study.toml --site s", "no-such-study.toml"),
+        ("nightly a b c --site s", "nightly STUDY --site DIR"),
+        ("nightly approve ilr33-amber --site s", "--by and --reason"),
+        ("nightly ilr33-amber", "--site"),
+        ("nightly ilr33-amber --site s --time-limit 0", "--time-limit"),
+        ("nightly ilr33-amber --site s --time-limit inf", "--time-limit"),
+        ("init mine.toml --kind crane", "crane"),
+        ("init mine.toml --kind fin --from joint", "--from"),
+        ("init mine.toml --motor maxon-re-40", 'nearest known: "maxon-re-40-150w-'),
+        ("init mine.toml --gear worm", "allowed: maxon-gp-26-b-84, "),
+        ("init mine.toml --gear maxon-gp-26-b-84 --kind fin", "--gear: not allowed beside --kind and --from"),
+        ("init mine.toml --motor '' --from fin", "--motor: not allowed beside --kind and --from"),
+        ("export fmu emps --fmi 4 --out out", "4: allowed: 2 or 3"),
+        ("export fmu emps --platform vax --out out", "allowed: linux64, win64"),
+        ("export controller emps --prefix 4fin --out out", "allowed: letters"),
+        ("export c no-such-design --out out", "no such design; allowed: "),
+        (
+            "export c fin --single --out out",
+            "an elastic drive train or a friction map needs double precision",
+        ),
+        ("simulate --command sine --frequency 5000", "below the Nyquist frequency"),
+        ("simulate --duration 0.00001", "at least one tick"),
+        ("simulate --duration nan", "finite"),
+        ("simulate --amplitude inf", "finite"),
+        ("simulate --command square", "must be one of"),
+        ("simulate --command recorded", "needs --record"),
+        ("simulate --every 0", "at least 1"),
+        ("simulate --duration 1e9", "ticks of one run; allowed"),
+        ("simulate --command stepped-sine --frequency 5 --to 20 --count 3 --duration 1", "takes 1.75 s"),
+        ("simulate --start 3 --duration 1", "the run ends at 1 s"),
+        ("simulate --start 1", "the run ends at 1 s"),
+        ("simulate --start -1", "--start"),
+        ("simulate --held", "--held"),
+        ("simulate --command hold --start 0.1", "--start 0.1: a hold is there from the first tick on"),
+        ("simulate --command sine --frequency 2 --cycles 3 --duration 1", "3 periods take 1.5 s"),
+        ("simulate --command step --cycles 3", "allowed with --command sine"),
+        ("simulate --frequency 2", "--frequency 2: allowed with --command sine, triangle"),
+        ("simulate --command sine --to 20", "--to 20: allowed with --command chirp"),
+        ("simulate --command chirp --seed 4", "--seed 4: allowed with --command multisine"),
+        ("simulate --plot run.png", "--plot run.png: allowed: a name that ends in .svg"),
+        ("simulate --command sine --frequency -2", "--frequency -2: must be positive"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(arguments: list[str], words: str, cli) -> None:
-    assert words in cli.refused(*arguments)
+def test_bad_input_is_one_line_and_status_2_and_writes_nothing(
+    arguments: str, words: str, tmp_path, monkeypatch, cli
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert words in cli.refused(*shlex.split(arguments))
+    assert list(tmp_path.iterdir()) == []
 
 
-def test_a_bad_design_writes_nothing(tmp_path, cli) -> None:
-    design = tmp_path / "bad.toml"
-    text = design_text("ilr33-amber").replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"')
-    design.write_text(text, encoding="utf-8")
+@pytest.mark.parametrize(
+    "given", [("2", "0.5", "20"), ("120 rpm", "50 %", "20 s"), ("2 Hz", "0.5", "20000 ms")]
+)
+def test_a_number_may_have_its_unit(given: tuple[str, str, str], cli) -> None:
+    options = zip(("--frequency", "--share", "--cycle"), given, strict=True)
+    told = cli.text("duty", "ilr33-amber", "--amplitude", "1 deg", *(word for one in options for word in one))
+    assert "±1 deg at 2 Hz" in told
+    assert "50 % of every 20 s" in told
+
+
+def test_a_bad_file_is_named_and_nothing_is_written(tmp_path, cli) -> None:
+    design, empty = tmp_path / "bad.toml", tmp_path / "empty.json"
+    design.write_text(design_text("ilr33-amber").replace('"9.2 g*cm^2"', '"-9.2 g*cm^2"'), encoding="utf-8")
+    empty.touch()
     assert "rotor_inertia" in cli.refused("report", design, "--out", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_document_that_is_empty_is_named(tmp_path, cli) -> None:
-    (tmp_path / "empty.json").touch()
-    assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", tmp_path / "empty.json")
+    assert "empty.json: is empty; allowed: a report.json" in cli.refused("pdf", empty)
+    assert {*tmp_path.iterdir()} == {design, empty}
 
 
 def test_report_writes_both_files_and_gives_the_document(tmp_path, cli) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 
 import pytest
 
-from actuator_lti.design import load_design, write_design
 from reports import document as doc
 from reports.cli.app import PANELS, flowed
 from reports.terminal import SideBySide, print_blocks
@@ -21,9 +20,11 @@ COMMANDS = commands()
 WORDS = ["gain", "crossover", "velocity", "position", "anti-windup"]
 
 
-def test_every_command_is_listed() -> None:
+def test_every_command_is_listed_and_help_breaks_at_the_width_of_the_terminal() -> None:
+    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
     tops = {name.split()[0] for name in COMMANDS}
     assert tops == {name for names in PANELS.values() for name in names}
+    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."
 
 
 @pytest.mark.parametrize("name", sorted(COMMANDS))
@@ -119,14 +120,6 @@ def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, printed)
         assert not re.search(r"^\s*\w\s*$", out, re.M)
 
 
-def test_a_name_of_a_record_is_changed_for_identify(tmp_path, cli) -> None:
-    file = tmp_path / "d.toml"
-    file.write_text(write_design(load_design("emps")))
-    said = cli.refused("identify", file, "--set", "nothing")
-    said += cli.refused("correlate", file, "none.csv", "--set", "limits.voltage")
-    assert "allowed: KEY=VALUE" in said
-
-
 @pytest.mark.parametrize("width", [40, 60, 80, 200])
 @pytest.mark.parametrize("columns", [1, 4, 12])
 def test_no_value_is_broken_and_no_line_is_too_long(width: int, columns: int, printed) -> None:
@@ -167,8 +160,3 @@ def test_the_program_runs_as_a_module() -> None:
     good, bad = ran("designs"), ran("margins", "no-such-design")
     assert (good.returncode, "ilr33-amber" in good.stdout) == (0, True)
     assert (bad.returncode, bad.stderr.count("\n")) == (2, 1)
-
-
-def test_help_breaks_lines_at_the_width_of_the_terminal() -> None:
-    """A paragraph of a docstring is one line for the terminal, whose own width breaks it."""
-    assert flowed("One.\n\n    Two goes\n    on.\n") == "One.\n\nTwo goes on."

@@ -72,24 +72,18 @@ def finding(text: str, where: str, severity: doc.Severity = "warn") -> doc.Findi
     return doc.Finding(severity=severity, text=text, where=where)
 
 
-def test_findings_come_from_the_sections_gravest_first_and_once() -> None:
+def test_findings_come_from_the_sections_gravest_first_once_and_in_turns() -> None:
+    """A section that has much to say leaves room for what the others have to say of the same weight."""
     mild, grave = finding("b", "two", "info"), finding("a", "one", "fail")
-    sections = [
+    one, two = (
         doc.section("one", "One", [], findings=[mild, grave]),
         doc.section("two", "Two", [], findings=[mild]),
-        {"id": "of-an-older-file"},
-    ]
-    assert gathered(sections) == [grave, mild]
-
-
-def test_sections_take_turns_on_the_first_screen() -> None:
-    """One that has much to say leaves room for what the others have to say of the same weight."""
-    loud = [finding(text, "loud") for text in "abcd"]
-    sections = [
-        doc.section("loud", "Loud", [], findings=loud),
-        doc.section("quiet", "Quiet", [], findings=[finding("e", "quiet"), finding("f", "quiet", "fail")]),
-    ]
-    assert "".join(item["text"] for item in gathered(sections)) == "faebcd"
+    )
+    assert gathered([one, two, {"id": "of-an-older-file"}]) == [grave, mild]
+    loud = doc.section("loud", "Loud", [], findings=[finding(text, "loud") for text in "abcd"])
+    said = [finding("e", "quiet"), finding("f", "quiet", "fail")]
+    quiet = doc.section("quiet", "Quiet", [], findings=said)
+    assert "".join(item["text"] for item in gathered([loud, quiet])) == "faebcd"
 
 
 @pytest.mark.parametrize(

@@ -65,6 +65,8 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert (current.margins.stable, current.sound) == (False, True)  # J s^2 + Cv s - k: a root on the right
     assert figures["position"].stable
     assert held_loop(assemble_loops(design), "position") is None
+    # without a load that pushes, an unstable current loop inside a stable drive stays what it is
+    assert held_loop(assemble_loops(pushed(-1.0)), "current") is None
     assert current.judged.margins.phase_margin_deg == pytest.approx(expected, abs=1e-6)
     asked = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
     verdicts = evaluate_requirements(replace(design, requirements=(asked,)), figures)
@@ -75,11 +77,6 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     assert "held" not in found["velocity"].reason
     budget = survey_loops(replace(design, requirements=())).budgets["current"]
     assert (budget.rotor, 180.0 + budget.total_deg) == ("locked", pytest.approx(expected, abs=1e-6))
-
-
-def test_a_loop_that_its_own_gain_makes_unstable_is_not_held() -> None:
-    """Without a load that pushes, an unstable current loop inside a stable drive stays what it is."""
-    assert held_loop(assemble_loops(pushed(-1.0)), "current") is None
 
 
 def test_a_p_velocity_loop_is_judged_under_a_constant_load() -> None:

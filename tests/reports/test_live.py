@@ -245,16 +245,12 @@ def test_nothing_of_a_design_becomes_markup_and_no_other_script_runs(page: Page)
     assert page.locator("script").count() == 1
 
 
-def test_a_script_that_is_not_the_page_s_own_does_not_run(browser: Browser, made: Path) -> None:
+def test_no_other_script_runs_and_without_scripts_figures_are_whole(browser: Browser, made: Path) -> None:
     page = browser.new_context(offline=True).new_page()
     page.goto(made.as_uri())
-    page.evaluate(
-        "document.body.append(Object.assign(document.createElement('script'), { text: 'window.ran = 1' }))"
-    )
+    add = "document.body.append(Object.assign(document.createElement('script'), { text: 'window.ran = 1' }))"
+    page.evaluate(add)
     assert page.evaluate("window.ran") is None
-
-
-def test_without_scripts_the_figures_stand_still_but_whole(browser: Browser, made: Path) -> None:
     page = browser.new_context(java_script_enabled=False).new_page()
     page.goto(made.as_uri())
     page.locator(".claim summary").first.click()  # a fold opens by itself

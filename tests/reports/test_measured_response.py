@@ -106,8 +106,5 @@ def test_command_line(tmp_path, cli) -> None:
     (section,) = [one for one in made["sections"] if one["id"] == "measured-response"]
     assert "velocity loop. The model explains the measurement within 0.00 dB" in section["result"]
     assert "--response-of speed: allowed: " in cli.refused(*asked, "speed")
-    for command in ("margins", "report"):
-        said = cli.refused(command, "ilr33-amber", "--averages", "8", "--out", tmp_path / "x")
-        assert "--averages: allowed with --response" in said
     with pytest.raises(InputError, match="no two frequencies below"):
         measured_over(LOOPS, Response([1.0, 1j], [1e6, 2e6]), "current")

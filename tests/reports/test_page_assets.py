@@ -1,8 +1,6 @@
 """Style and scripts of a page: contrast, the bundle of its modules, ranges of sliders, the glossary."""
 
 import re
-import shutil
-import subprocess
 from html import unescape
 
 import pytest
@@ -73,30 +71,17 @@ def test_modules_in_a_circle_are_refused(monkeypatch) -> None:
         scripts.bundled.__wrapped__("a")
 
 
-@pytest.mark.skipif(shutil.which("node") is None, reason="no node on this machine")
-def test_a_bundle_runs_as_its_modules_would(monkeypatch, tmp_path) -> None:
-    texts = {"page/a.js": 'import { two } from "./b.js";\nconst own = 3;\nconsole.log(own * two());\n',
-             "page/b.js": "const own = 2;\nexport const two = () => own;\n"}  # fmt: skip
-    monkeypatch.setattr(scripts, "asset", texts.__getitem__)
-    (tmp_path / "a.js").write_text(scripts.bundled.__wrapped__("a"), encoding="utf-8")
-    done = subprocess.run(["node", str(tmp_path / "a.js")], capture_output=True, text=True, check=True)
-    assert done.stdout == "6\n"
-
-
-@pytest.mark.parametrize("value", [-1e-3, 1e-3])
-def test_a_value_below_zero_has_both_signs(value: float) -> None:
-    design = AMBER.with_values({"friction.offset_torque": value})
-    one = next(s for s in followed(design).free if s["path"] == "friction.offset_torque")
-    low = SLIDER_FACTOR * value if value < 0.0 else value / SLIDER_FACTOR
-    assert (one["low"], one["high"]) == pytest.approx((low, SLIDER_FACTOR * abs(value)))
-
-
-def test_whole_numbers_and_all_values_lie_inside() -> None:
+def test_a_slider_holds_its_value_whole_numbers_stay_so_and_below_zero_it_has_both_signs() -> None:
     for one in followed(AMBER).free:
         assert one["low"] <= one["value"] <= one["high"]
         if one["whole"]:
             assert one["low"] >= 1.0
             assert one["high"] > one["low"]
+    for value in (-1e-3, 1e-3):
+        design = AMBER.with_values({"friction.offset_torque": value})
+        one = next(s for s in followed(design).free if s["path"] == "friction.offset_torque")
+        low = SLIDER_FACTOR * value if value < 0.0 else value / SLIDER_FACTOR
+        assert (one["low"], one["high"]) == pytest.approx((low, SLIDER_FACTOR * abs(value)))
 
 
 def test_every_figure_and_term_has_one_line() -> None:

@@ -120,17 +120,14 @@ def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
     assert order.index("mine") < order.index("duty")  # as the command puts what it includes
     with pytest.raises(InputError, match="also = 'all'"):
         reports.report("ctms-motor-position", also=["all"])
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
+        build_time()
 
 
 @pytest.mark.parametrize("package", [actuator_lti, analyses, nonlinear, reports])
 def test_a_package_shows_its_public_names(package) -> None:
     assert [name for name in dir(package) if not name.startswith("__")] == sorted(package.__all__)
-
-
-def test_a_time_that_is_none_is_refused(monkeypatch) -> None:
-    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
-    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
-        build_time()
 
 
 def test_the_page_asks_no_network_and_is_small(built: Built) -> None:

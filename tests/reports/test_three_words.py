@@ -90,12 +90,17 @@ def test_a_loop_whose_stability_is_not_known_is_no_pass(monkeypatch, cli) -> Non
     assert first.startswith("NOT PROVEN  ilr33-amber: stability not known: Current loop.")
 
 
-def test_a_waiver_is_read_written_and_hashed_where_there_is_one() -> None:
-    bare, waived = asking(), asking(WAIVED)
-    assert read_design_text(write_design(waived), "again").waivers == (WAIVED,)
+def test_a_waiver_is_read_written_and_hashed_where_there_is_one_and_holds_for_every_loop_and_check() -> None:
+    check = replace(WAIVED, requirement="validation-border")
+    bare, waived = asking(), asking(WAIVED, check)
+    design = read_design_text(write_design(waived), "again")
+    assert design.waivers == (WAIVED, check)
     assert design_hash(waived) != design_hash(bare)
     day = write_design(waived).replace('date = "2026-11-22"', "date = 2026-11-22")
-    assert read_design_text(day, "again").waivers == (WAIVED,)
+    assert read_design_text(day, "again").waivers == design.waivers
+    assert design.waiver_of("hot/velocity") == WAIVED
+    assert design.waiver_of("validation-border") == check
+    assert design.waiver_of("validation-sawtooth-gain") is None
 
 
 def test_a_waiver_that_waives_nothing_is_refused() -> None:
@@ -107,14 +112,6 @@ def test_a_waiver_that_waives_nothing_is_refused() -> None:
         text = write_design(asking(replace(WAIVED, **change)))
         with pytest.raises(InputError, match=f"waiver.{words}"):
             read_design_text(text, "d.toml")
-
-
-def test_one_waiver_holds_for_a_requirement_on_every_loop_and_for_a_check() -> None:
-    check = replace(WAIVED, requirement="validation-border")
-    design = read_design_text(write_design(asking(WAIVED, check)), "d.toml")
-    assert design.waiver_of("hot/velocity") == WAIVED
-    assert design.waiver_of("validation-border") == check
-    assert design.waiver_of("validation-sawtooth-gain") is None
 
 
 @pytest.mark.parametrize(

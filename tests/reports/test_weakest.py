@@ -102,7 +102,7 @@ def test_a_required_limit_stands_for_the_customary_one(survey: LoopSurvey) -> No
     assert words_of(point)["status"] == "fail"
 
 
-def test_the_spread_is_that_of_the_operating_points() -> None:
+def test_the_spread_is_that_of_the_operating_points_which_margins_names(cli) -> None:
     found = spread(operating_points(FIN, [], described=False, certify=False))["position"]["gain_margin"]
     loads = FIN.validation.loads_Nm
     every, margins = {"driving": 0.0, "driven": 0.0, "gap": 0.0, "sliding": 0.0}, []
@@ -110,12 +110,9 @@ def test_the_spread_is_that_of_the_operating_points() -> None:
         loop = assemble_loops(FIN, operating_point=point, load_Nm=load).position
         margins.append(abs(stability_margins(loop.open_loop).gain_margin_db))
     assert (found.least, found.most) == (pytest.approx(min(margins)), pytest.approx(max(margins)))
-    assert found.where == "motor driven by the load"
-
-
-def test_margins_shows_the_spread_and_names_the_points(cli) -> None:
     data = cli.data("margins", "fin")
-    assert data["spread"]["position"]["gain_margin"]["where"] == "motor driven by the load"
+    told = data["spread"]["position"]["gain_margin"]["where"]
+    assert found.where == told == "motor driven by the load"
     said = cli.text("margins", "--help")
     for name in ("sliding", "rest", "describing-function", "driving", "driven", "gap"):
         assert name in said

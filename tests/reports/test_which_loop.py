@@ -192,14 +192,12 @@ def test_a_locked_loop_that_fails_is_never_judged_by_the_free_one(rotor: str, mo
     assert [one.part for one in missing] == ["current loop with the rotor locked"] * (rotor == "free")
 
 
-def test_the_keys_are_read_written_and_hashed_where_they_stand() -> None:
-    bare, chosen = asking(load_design("ilr33-amber")), asking(load_design("ilr33-amber"), to="reference")
+def test_the_keys_are_read_written_and_hashed_where_they_stand_and_refused_where_they_say_nothing() -> None:
+    amber = load_design("ilr33-amber")
+    chosen = asking(amber, to="reference")
     assert read_design_text(write_design(chosen), "d").requirements == chosen.requirements
-    assert design_hash(chosen) != design_hash(bare)
-
-
-def test_a_key_that_says_nothing_is_refused() -> None:
+    assert design_hash(chosen) != design_hash(asking(amber))
     of_margin = {"to": "reference", "quantity": "phase_margin", "unit": "deg"}
     for keys in ({"rotor": "locked"}, of_margin, {"to": "reference", "loop": "velocity"}):
         with pytest.raises(InputError, match=f"requirement.r.{next(iter(keys))}"):
-            read_design_text(write_design(asking(load_design("ilr33-amber"), **keys)), "d")
+            read_design_text(write_design(asking(amber, **keys)), "d")

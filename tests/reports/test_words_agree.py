@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from math import pi
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from analyses.motion.settling import Settling
 from analyses.specification.requirements import which_response
 from analyses.specification.weakest import spread
 from analyses.validation.places import Bench
-from analyses.validation.row import judged
+from analyses.validation.row import Row, judged
 from nonlinear.settling.rest import Rest
 from reports import document as doc
 from reports.as_json import as_json
@@ -136,10 +137,17 @@ def test_terminal_and_page_round_a_number_once(capsys: pytest.CaptureFixture[str
     assert f"{page:.2f}" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize(("seconds", "shown"), [(67.8295, (67.8295, "s")), (0.0023, (2.3, "ms"))])
-def test_a_time_of_seconds_is_not_told_in_ms(seconds: float, shown: tuple[float, str]) -> None:
-    row = validation.table([judged("time", "drive", seconds, seconds, 1e-6, unit="s")], "Times")["rows"][0]
-    assert (row["predicted"], row["unit"]) == shown
+def predicted(*rows: Row) -> list[Any]:
+    return validation.table(list(rows), "")["rows"]
+
+
+def test_predictions_tell_seconds_and_decibels_as_elsewhere() -> None:
+    times = predicted(*(judged("time", "drive", t, t, 1e-6, unit="s") for t in (67.8295, 0.0023)))
+    assert [(row["predicted"], row["unit"]) for row in times] == [(67.8295, "s"), (2.3, "ms")]
+    up = judged("gain_margin", "velocity", 4.0, 4.0, 1e-9, unit="1")
+    down = judged("gain_margin", "position", 0.5, 0.5, 1e-9, unit="1")
+    names = [row["quantity"] for row in predicted(up, down)]
+    assert names == ["gain margin, 12.04 dB", "gain margin, down to −6.02 dB"]  # 20 log10 4, 20 log10 1/2
 
 
 def test_friction_is_not_blamed_for_another_limit() -> None:
@@ -166,10 +174,3 @@ def test_a_drive_that_stands_still_unproven_is_not_said_to_rest_after_every_step
     )
     ends = [row["end"] for row in made["blocks"][-1]["rows"]]
     assert ends == ["stands still, not known for how long", "at rest"]
-
-
-def test_gain_margins_of_predictions_are_in_decibels_as_elsewhere() -> None:
-    up = judged("gain_margin", "velocity", 4.0, 4.0, 1e-9, unit="1")
-    down = judged("gain_margin", "position", 0.5, 0.5, 1e-9, unit="1")
-    names = [row["quantity"] for row in validation.table([up, down], "")["rows"]]
-    assert names == ["gain margin, 12.04 dB", "gain margin, down to −6.02 dB"]  # 20 log10 4, 20 log10 1/2

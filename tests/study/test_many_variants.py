@@ -2,6 +2,7 @@
 
 import csv
 import io
+import math
 import random
 from dataclasses import replace
 
@@ -12,11 +13,13 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.comparison.variants import Comparison, compare
 from analyses.slugs import slug
 from analyses.specification.requirements import RequirementVerdict
+from analyses.specification.sensitivity import moved as moved_designs
+from analyses.specification.sensitivity import population_figures
 from analyses.studies.study import Variant, study_of
 from reports import document as doc
 from reports.sections.compare import brief
 from reports.sections.compare import section as sections
-from reports.sections.compare_best import MANY, choice, table_text
+from reports.sections.compare_best import MANY, choice, nearness, table_text
 from reports.verdict_summary import verdict_of
 
 COUNT = 3_000
@@ -97,3 +100,47 @@ def test_the_table_has_every_figure_of_every_design(many) -> None:
     failing = next(row for row in rows if row["design"] == FAILING)
     assert (failing["not_met"], failing["not_proven"]) == ("1", "0")
     assert float(failing["room_percent"]) < 0.0
+
+
+UNSTABLE = """
+[study]
+base = "joint"
+[[variant]]
+name = "Torn 400"
+override = { "control.position.gain" = "400 1/s" }
+"""
+
+
+def test_an_unstable_variant_has_no_margins_is_named_so_and_is_the_worst(tmp_path) -> None:
+    """The position loop is proportional to its gain: 400 of 8 1/s is 34 dB, and the joint has 25.9."""
+    path, joint = tmp_path / "s.toml", load_design("joint")
+    path.write_text(UNSTABLE)
+    found, gain = compare(path, validation=False), "control.position.gain"
+    (torn,), base, raised = found.variants, found.base, 20.0 * math.log10(400.0 / 8.0)
+    figures = population_figures(moved_designs(joint, {gain: 8.0}, [{gain: 400.0}]), joint)
+    least = base.figures["position.gain_margin"]
+    assert figures["position.gain_margin"] == pytest.approx([least, least - raised], abs=1e-6)
+    assert least < raised
+    assert torn.unstable == ("position",)
+    lost = {key for key, value in torn.figures.items() if value is None and base.figures[key] is not None}
+    assert {"position.gain_margin", "position.modulus_margin", "drive.least_stiffness@0"} <= lost
+    assert {nearness(v) for v in torn.verdicts if v.loop == "position"} == {-math.inf}
+    each, best = sections(found)[0]["blocks"]
+    assert each["rows"][1]["weakest"] == "not stable: Position loop"
+    assert "Position loop: gain margin lost" in each["rows"][1]["gives"]
+    assert [row["worst"] for row in best["rows"]].count("Torn 400: not stable") == 3
+    assert " Not stable: Torn 400, Position loop." in brief(found).words
+    row = list(csv.DictReader(io.StringIO(table_text(found))))[1]
+    assert (row["unstable"], row["room_percent"], row["position.phase_margin [deg]"]) == ("position", "", "")
+
+
+@pytest.mark.parametrize("columns", [60, 140])
+def test_the_terminal_shows_every_design_by_its_own_name(columns, cli, monkeypatch, tmp_path) -> None:
+    monkeypatch.setenv("COLUMNS", str(columns))
+    gains = [f"control.position.gain={k} 1/s" for k in (7, 9, 10, 11, 12)] + ["limits.voltage=47 V"]
+    sets = [word for gain in gains for word in ("--set", gain)]
+    out = cli.text("compare", "joint", *sets, "--no-validate", "--out", tmp_path, status=1)
+    loops = " ".join(out.partition("Loops")[2].split())
+    assert "Loops, part 2" in loops
+    assert [gain for gain in gains if gain.rpartition("=")[2].split()[0] not in loops] == []
+    assert "47 v" not in loops

@@ -162,15 +162,6 @@ def test_each_exact_bound_holds_at_least_as_claimed(probability):
         assert 0.95 <= binom.pmf(np.arange(201), 200, probability)[holds].sum() <= 1.0
 
 
-@pytest.mark.parametrize(("passed", "count", "low", "high"), [
-    (300, 300, 0.05 ** (1 / 300), 1.0),
-    (0, 300, 0.0, 1.0 - 0.05 ** (1 / 300)),
-    (1, 2, 1.0 - 0.95**0.5, 0.95**0.5),  # 1 - (1 - p)^2 = 5 %; p^2 = 95 %
-])  # fmt: skip
-def test_bounds_are_one_sided(passed, count, low, high):
-    assert clopper_pearson(passed, count) == pytest.approx((low, high), rel=1e-12)
-
-
 def test_each_bound_holds_for_sobol_points_too():
     """400 studies of 128 points of a known probability: P(x + y < 0.3) = 0.045 in the unit square."""
     covered = np.zeros(2)

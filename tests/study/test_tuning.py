@@ -11,12 +11,13 @@ from toleranced import QUICK, need, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
 from actuator_lti.design import with_values
-from actuator_lti.design.model import Controller, Design, Friction, Limits, Motor, PositionLoop, Validation
+from actuator_lti.design.model import PositionLoop
 from actuator_lti.design.objects import export_objects
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
 from analyses.tuning.start import magnitude_optimum, rule_gains, symmetric_optimum
+from tests.loops.loop_designs import source_drive
 from tests.refusals import refused
 
 PERIOD, DELAY = 1e-3, 3e-3
@@ -24,12 +25,9 @@ PERIOD, DELAY = 1e-3, 3e-3
 
 def integrator(*requirements):
     """K T z^-3/(z - 1): a drag so strong that the speed follows the drive at once, four samples in all."""
-    return Design(
-        name="integrator", title="", motor=Motor(rotor_inertia_kgm2=1e-9, source_gain_Nm_V=1.0),
-        friction=Friction(viscous_Nms_rad=1.0), limits=Limits(voltage_V=10.0),
-        controller=Controller(period_s=PERIOD, computing_delay_s=DELAY, position=PositionLoop(gain=5.0)),
-        validation=Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
-    )  # fmt: skip
+    control = {"computing_delay_s": DELAY, "position": PositionLoop(gain=5.0)}
+    more = {"friction": {"viscous_Nms_rad": 1.0}, "requirements": requirements}
+    return source_drive(1e-9, 1.0, PERIOD, 10.0, controller=control, **more)
 
 
 @pytest.mark.parametrize("margin", [30.0, 45.0, 60.0])

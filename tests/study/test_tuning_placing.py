@@ -9,12 +9,13 @@ from toleranced import QUICK, need
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
 from actuator_lti.design import model
-from actuator_lti.design.model import Coupling, Design, Gear, Load, Motor, PositionLoop
+from actuator_lti.design.model import Coupling, Gear, PositionLoop
 from actuator_lti.errors import InputError
 from analyses.tuning import tune
 from analyses.tuning.problem import loop_requirements, problem_of
 from analyses.tuning.start import allowed_range, place, step_of_gain
 from tests.changed import changed
+from tests.loops.loop_designs import source_drive
 
 
 def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position=None):
@@ -23,15 +24,12 @@ def servo(*requirements, stiffness=None, gain=0.02, integral_time=None, position
     if stiffness is not None:
         damping = 0.02 * (stiffness * inertia / 2) ** 0.5
         coupling = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping)
-    return Design(
-        name="servo", title="", motor=Motor(rotor_inertia_kgm2=inertia, source_gain_Nm_V=1.0),
-        gears=(Gear(name="none", ratio=1.0),), coupling=coupling,
-        load=Load(inertia_kgm2=inertia, path="back-drivable"),
-        friction=model.Friction(viscous_Nms_rad=1e-4), limits=model.Limits(voltage_V=10.0),
-        controller=model.Controller(
-            period_s=2.5e-4, computing_delay_s=2.5e-4, position=position,
-            velocity=model.VelocityLoop(gain=gain, integral_time_s=integral_time)),
-        validation=model.Validation(full_deflection_rad=0.1), requirements=tuple(requirements),
+    loop = model.VelocityLoop(gain=gain, integral_time_s=integral_time)
+    control = {"computing_delay_s": 2.5e-4, "position": position, "velocity": loop}
+    return source_drive(
+        inertia, 1.0, 2.5e-4, 10.0, gears=(Gear(name="none", ratio=1.0),), coupling=coupling,
+        load={"inertia_kgm2": inertia, "path": "back-drivable"}, friction={"viscous_Nms_rad": 1e-4},
+        controller=control, requirements=requirements,
     )  # fmt: skip
 
 

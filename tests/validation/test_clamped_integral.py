@@ -16,7 +16,6 @@ import pytest
 from actuator_lti import assemble_loops
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model
-from analyses.large_signal.map import amplitude_map
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 from nonlinear import Rows, commands, simulate
@@ -70,18 +69,6 @@ def test_the_clamp_is_judged(law: str) -> None:
     rows = [row for place in Bench(design, design).onsets() for row in small_signal(place)]
     assert [row.name for row in rows] == ["voltage_onset", "voltage_onset_integral"][: 1 + (law == "clamped")]
     assert {row.verdict for row in rows} == {Verdict.MET}
-
-
-def test_the_map_draws_the_border_that_is_judged() -> None:
-    design = drive("clamped")
-    shown = amplitude_map(design, assemble_loops(design), counts=(12, 6))
-    output, integral = sizes(shown.frequency_hz)
-    lowest = LIMIT / np.maximum(output, integral)
-    np.testing.assert_allclose(shown.onset_rad["voltage"], lowest, rtol=1e-7)
-    acting = shown.limiter_fraction.max(axis=2) > 0.0
-    x = shown.amplitude_rad[:, None] / lowest[None, :]
-    assert not acting[x < 0.98].any()
-    assert acting[x > 1.02].all()
 
 
 @pytest.mark.parametrize("law", ["clamped", "conditional"])

@@ -28,13 +28,57 @@ KICKS = {
 }  # fmt: skip
 
 
-def test_threshold_of_a_force_source_is_friction_over_stiffness() -> None:
-    """EMPS: (Fc -+ offset)/(gtau kv kp), forward and backward; the simulator agrees to its grid of 0.2 %."""
-    result = friction_effects(EMPS).points[0].threshold
-    stiffness = 35.15065 * 243.45 * 160.18
-    assert result.static.forward_rad == pytest.approx((20.3935 - 3.1648) / stiffness, rel=1e-12)
-    assert result.static.backward_rad == pytest.approx((20.3935 + 3.1648) / stiffness, rel=1e-12)
-    assert result.simulated_rad == pytest.approx(result.static.forward_rad, rel=1.1 * result.resolution)
+def extruder(position_s: float | None = None, velocity_s: float | None = None) -> model.Design:
+    """A voltage drive whose friction is a map, with integral times of its loops."""
+    loops = {
+        "velocity": model.VelocityLoop(gain=0.25, integral_time_s=velocity_s),
+        "position": model.PositionLoop(gain=25.0, integral_time_s=position_s),
+    }
+    return model.Design(
+        name="map",
+        motor=changed(MOTOR, resistance_ohm=2.0, inductance_H=3e-4),
+        gears=(model.Gear(name="g", ratio=20.0),),
+        load=model.Load(inertia_kgm2=0.002, path="self-locking"),
+        friction=model.Friction(points=stribeck((0.0, 30e-3), (8.0, 36e-3), (300.0, 60e-3))),
+        limits=model.Limits(voltage_V=36.0),
+        controller=model.Controller(period_s=2e-4, computing_delay_s=1e-4, **loops),
+        validation=model.Validation(full_deflection_rad=math.pi / 4.0, loads_Nm=(0.0,)),
+    )
+
+
+COGGING = {"motor.cogging": 1e-3, "motor.cogging_periods": 4.0, "motor.cogging_phase": math.pi / 6.0}
+FORCE, SLOPE = 35.15065 * 243.45 * 160.18, 0.05 / 2.0 * 0.25 * 25.0 * 20.0  # of the force source and the map
+THRESHOLDS: dict[str, tuple[model.Design, float, float, float, str]] = {
+    # torque to overcome over stiffness, and the integral times of speed and position
+    "a force source": (EMPS, (20.3935 - 3.1648) / FORCE, math.inf, math.inf, ""),
+    "a speed integral": (AMBER, 2.25e-3 / STIFFNESS, 15e-3, math.inf, "speed"),
+    "behind a spring": (load_design("ilr33-amber-compliant"), 2.25e-3 / STIFFNESS, 15e-3, math.inf, "speed"),
+    # cogging of 1 mN m turns forward, half of it where the drive stands
+    "cogging": (with_values(AMBER, COGGING), (2.25e-3 - 0.5e-3) / STIFFNESS, 15e-3, math.inf, "speed"),
+    "a friction map": (extruder(), 30e-3 / SLOPE, math.inf, math.inf, ""),
+    "a position integral": (extruder(0.4), 30e-3 / SLOPE, math.inf, 0.4, "position"),
+    "one behind the other": (extruder(0.4, 0.08), 30e-3 / SLOPE, 0.08, 0.4, "speed"),
+}
+
+
+@pytest.mark.parametrize("name", THRESHOLDS)
+def test_a_small_step_waits_until_the_integrals_overcome_friction(name: str) -> None:
+    """A constant error A of the threshold A0: the torque grows as 1 + t/T + t/U + t^2/(2 T U) up to A0/A."""
+    design, unloaded_rad, T, U, integrator = THRESHOLDS[name]
+    found, rate, bend = friction_effects(design), 1.0 / T + 1.0 / U, 0.5 / T / U
+    assert found.integrator == integrator
+    assert ("No controller integrates" in section(found)["result"]) == (not integrator)
+    for point in found.points:
+        result = point.threshold
+        forward_rad = unloaded_rad + (point.dry_torque_Nm - found.points[0].dry_torque_Nm) / STIFFNESS
+        assert result.static.forward_rad == pytest.approx(forward_rad, rel=1e-12)
+        assert integrator or result.simulated_rad == pytest.approx(forward_rad, rel=1.1 * result.resolution)
+        assert len(result.waiting) == (5 if integrator else 0)
+        for wait in result.waiting:
+            more = forward_rad / wait.amplitude_rad - 1.0
+            expected = (math.sqrt(rate**2 + 4.0 * bend * more) - rate) / (2.0 * bend) if bend else more / rate
+            assert wait.predicted_s == pytest.approx(expected, rel=1e-9)
+            assert wait.simulated_s == pytest.approx(expected, rel=1e-2 if bend else 0.0, abs=6e-4)
 
 
 def _joint_rate(loop: Hysteresis) -> float:
@@ -75,31 +119,10 @@ def test_the_error_that_stays_of_a_force_source_is_less_than_its_threshold() -> 
     assert f"an error of up to {1e6 * max(errors):.3g} µm is left" in section(result)["result"]
 
 
-@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant"])
-def test_a_small_step_waits_for_the_integral(name: str) -> None:
-    """Tn (A0/A - 1), and a few ticks until the current follows; the threshold is Tc/(kM Kp Kv N).
-
-    Behind a spring too: it carries the load before the step comes.
-    """
-    for point in friction_effects(load_design(name)).points:
-        result = point.threshold
-        assert result.static.forward_rad == pytest.approx(point.dry_torque_Nm / STIFFNESS, rel=1e-12)
-        for wait in result.waiting:
-            assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
-
-
-def test_a_small_step_waits_at_the_angle_where_it_stands() -> None:
-    """Cogging of 1 mN m that turns forward, half of it where the drive stands, leaves less to overcome."""
-    cogging = {"motor.cogging": 1e-3, "motor.cogging_periods": 4.0, "motor.cogging_phase": math.pi / 6.0}
-    result = threshold(quiet(with_values(AMBER, cogging)), 0.0)
-    assert result.static.forward_rad == pytest.approx((2.25e-3 - 0.5e-3) / STIFFNESS, rel=1e-12)
-    for wait in result.waiting:
-        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=6e-4)
-
-
 def test_the_threshold_is_that_of_breakaway_and_none_of_a_drive_too_weak_to_move() -> None:
     higher = with_values(AMBER, {"friction.breakaway_ratio": 1.5})
     assert static_threshold(higher).forward_rad == pytest.approx(1.5 * static_threshold(AMBER).forward_rad)
+    assert static_threshold(EMPS).backward_rad == pytest.approx((20.3935 + 3.1648) / FORCE, rel=1e-12)
     weak = changed(AMBER, limits={"peak_current_A": 0.3})
     assert static_threshold(weak).forward_rad == math.inf
     assert friction_effects(weak).points[0].threshold is None
@@ -196,64 +219,6 @@ def test_not_applicable_without_dry_friction() -> None:
     result = friction_effects(load_design("ctms-motor-position"))
     assert result.points == ()
     assert "no dry friction" in result.reason
-
-
-def extruder(position_s: float | None = None, velocity_s: float | None = None) -> model.Design:
-    """A voltage drive whose friction is a map, with integral times of its loops."""
-    loops = {
-        "velocity": model.VelocityLoop(gain=0.25, integral_time_s=velocity_s),
-        "position": model.PositionLoop(gain=25.0, integral_time_s=position_s),
-    }
-    return model.Design(
-        name="map",
-        motor=changed(MOTOR, resistance_ohm=2.0, inductance_H=3e-4),
-        gears=(model.Gear(name="g", ratio=20.0),),
-        load=model.Load(inertia_kgm2=0.002, path="self-locking"),
-        friction=model.Friction(points=stribeck((0.0, 30e-3), (8.0, 36e-3), (300.0, 60e-3))),
-        limits=model.Limits(voltage_V=36.0),
-        controller=model.Controller(period_s=2e-4, computing_delay_s=1e-4, **loops),
-        validation=model.Validation(full_deflection_rad=math.pi / 4.0, loads_Nm=(0.0,)),
-    )
-
-
-def test_a_friction_map_is_dry_friction() -> None:
-    """The torque at rest over the stiffness: 30 mN m / (kM/R Kp Kv N)."""
-    stiffness, result = 0.05 / 2.0 * 0.25 * 25.0 * 20.0, friction_effects(extruder())
-    assert result.integrator == ""
-    (point,) = result.points
-    assert point.dry_torque_Nm == pytest.approx(0.03)
-    assert point.threshold.static.forward_rad == pytest.approx(0.03 / stiffness, rel=1e-12)
-    assert point.threshold.simulated_rad == pytest.approx(0.03 / stiffness, rel=3e-3)
-    assert "No controller integrates" in section(result)["result"]
-
-
-def test_the_position_integral_moves_a_small_step() -> None:
-    """T (A0/A - 1) with the position's integral time; no error stays, and the words say who integrates."""
-    result = friction_effects(extruder(0.4))
-    assert result.integrator == "position"
-    waits = result.points[0].threshold.waiting
-    assert len(waits) == 5
-    for k, wait in enumerate(waits):
-        assert wait.predicted_s == pytest.approx(0.4 * (1.0 / (0.2, 0.3, 0.5, 0.7, 0.9)[k] - 1.0))
-        assert wait.simulated_s == pytest.approx(wait.predicted_s, abs=2e-3)
-    words = section(result)["result"]
-    assert "position" in words
-    assert "No controller" not in words
-
-
-def test_two_integrals_one_behind_the_other() -> None:
-    """Constant error: the torque grows as 1 + t/T + t/U + t^2/(2 T U), integrated here step by step."""
-    result = friction_effects(extruder(0.4, 0.08))
-    assert result.integrator == "speed"
-    for wait in result.points[0].threshold.waiting:
-        ratio = result.points[0].threshold.static.forward_rad / wait.amplitude_rad
-        t, outer, inner, dt = 0.0, 0.0, 0.0, 1e-5
-        while (1.0 + outer) + inner < ratio:
-            inner += (1.0 + outer) * dt / 0.08
-            outer += dt / 0.4
-            t += dt
-        assert wait.predicted_s == pytest.approx(t, rel=1e-3, abs=1e-4)
-        assert wait.simulated_s == pytest.approx(t, rel=1e-2, abs=2e-3)
 
 
 @pytest.mark.parametrize("kick", KICKS)

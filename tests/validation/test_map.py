@@ -88,13 +88,6 @@ def test_without_friction_the_linear_response_holds_below_the_border() -> None:
             assert names == list(border.active)
 
 
-def test_the_linear_response_is_that_of_the_loops() -> None:
-    loops, omega = assemble_loops(AMBER), 2.0 * np.pi * np.array([0.5, 20.0, 300.0])
-    system = loops.reference_to_output
-    expected = system(np.exp(1j * omega * system.dt))
-    np.testing.assert_allclose(tones.linear_steady_state(loops, omega).output, expected, rtol=1e-9)
-
-
 def test_what_the_map_shows(amber_map: AmplitudeMap) -> None:
     cause, waveform, middle = amber_map.cause, amber_map.waveform, len(amber_map.amplitude_rad) // 2
     shown = {row: (CAUSES[cause[row, 0]], WAVEFORMS[waveform[row, 0]]) for row in (-1, 0, middle)}

@@ -32,7 +32,7 @@ RANDOM = range(300_000, 300_030)
 FAILED_ONCE = [710_132, 710_235, 710_141, 710_248, 710_259, 710_265, 710_301, 730_011, 730_035, 740_026,
                741_646, 90_006, 770_155, 910_883, 1_010_043,
                1_010_057, 1_101_223, 1_101_436, 1_102_029, 1_102_211, 1_301_202, 2_100_068,
-               5_300_352]  # fmt: skip
+               5_300_352, 1_211_006, 1_211_041]  # fmt: skip
 
 
 def stood(design: Design) -> tuple[Design, Loops]:
@@ -69,23 +69,6 @@ def test_every_loop_and_break_point_is_that_of_the_linear_writing(drive: str | i
         assert np.max(off) <= max(1e-6, 10.0 * found.stated_error), place
 
 
-def test_an_integrator_in_closed_form() -> None:
-    """A P loop on an ideal source without friction: the torque is held, the angle a double integrator.
-
-    ``J w' = g u``, ``u = -K th``: over a tick th gains T w + g u T^2/(2 J), w gains g u T/J.
-    """
-    smooth = {"viscous_Nms_rad": 0.0, "viscous_reverse_Nms_rad": None}
-    bare = {"velocity": None, "computing_delay_s": 0.0}
-    design = changed(load_design("emps"), friction=smooth, controller=bare)
-    found, control = tangent(design, "u"), design.controller
-    T, push = control.period_s, design.effective_motor.source_gain_Nm_V / design.inertia_kgm2
-    push *= control.position_loop.gain
-    wanted = np.roots([1.0, 0.5 * push * T**2 - 2.0, 1.0 + 0.5 * push * T**2])
-    poles = np.linalg.eigvals(found.A)
-    for pole in wanted:
-        assert np.min(np.abs(poles - pole)) < 1e-9
-
-
 def test_a_gain_at_the_place_is_a_gain_of_the_controller() -> None:
     """`Tangent.at_gain` against the tangent of the drive with that gain."""
     design = load_design("ilr33-amber-multirate")
@@ -93,14 +76,6 @@ def test_a_gain_at_the_place_is_a_gain_of_the_controller() -> None:
     louder = tangent(changed(design, controller={"current": {"gain_V_A": gain}}), "u")
     radii = [np.max(np.abs(np.linalg.eigvals(A))) for A in (tangent(design, "u").at_gain(1.7), louder.A)]
     assert radii[0] == pytest.approx(radii[1], rel=1e-9)
-
-
-def test_spectral_radius_crosses_one_at_the_gain_margin() -> None:
-    bench, loops = stood(load_design("ilr33-amber"))
-    ratio = min(m.ratio for m in stability_margins(loops.position.open_loop).gain_margins if m.ratio > 1.0)
-    found = tangent(bench, "position")
-    radii = [np.max(np.abs(np.linalg.eigvals(found.at_gain(ratio * x)))) for x in (1.0 - 1e-6, 1.0 + 1e-6)]
-    assert radii[0] < 1.0 < radii[1]
 
 
 def test_python_control_draws_it() -> None:
@@ -112,14 +87,11 @@ def test_python_control_draws_it() -> None:
 
 @pytest.mark.parametrize("seed", FAILED_ONCE)
 def test_drives_that_failed_once(seed: int) -> None:
-    """A filter of the command lags behind a ramp; margins, peaks at rest lie on a mode at rest, an angle.
-
-    A slow pair was taken for the rest that an integral holds; a response of 1e-10 was left to rounding.
-    A slow pole was taken for the one that passes 1 beside it; a quotient of roundings led away from a margin.
-    A mode at rest was taken out over an integrator that hardly takes part in it, or a soft spring was one.
-    """
+    """Slow poles beside 1, modes at rest, figures of roundings; gains beyond 200 dB are not listed."""
     result = validate(full_drive(seed), CHECKS)
     assert result.passed, [str(row) for row in result.not_met]
+    assert all(row.verdict == Verdict.MET for row in result.rows)
+    assert all(row.predicted > 1e-10 for row in result.rows if row.name == "gain_margin")
 
 
 def test_a_slow_pole_is_judged_by_its_own_error() -> None:
@@ -136,15 +108,6 @@ def test_a_slow_pole_is_judged_by_its_own_error() -> None:
     assert rows[1].allowed > abs(seen[1] - seen[0])
 
 
-@pytest.mark.parametrize("seed", [1_211_006, 1_211_041])
-def test_a_gain_margin_beyond_200_db_is_no_check(seed: int) -> None:
-    """268 dB at 0 Hz: a gain that moves a pole by less than rounding is not listed; all else is met."""
-    result = validate(full_drive(seed), CHECKS)
-    assert result.passed, [str(row) for row in result.not_met]
-    assert all(row.verdict == Verdict.MET for row in result.rows)
-    assert all(row.predicted > 1e-10 for row in result.rows if row.name == "gain_margin")
-
-
 NOT_PROVEN_ONCE = {
     730_131: ("command", "load"), 730_124: ("position", "w_ref", "command"), 720_019: ("velocity", "i_ref"),
     240: ("command", "load"), 800_742: ("u",), 1_010_199: ("position", "i_ref"),
@@ -157,15 +120,10 @@ NOT_PROVEN_ONCE = {
 
 @pytest.mark.parametrize("seed", NOT_PROVEN_ONCE)
 def test_drives_that_were_not_proven_once(seed: int) -> None:
-    """Cogging of which large steps saw the mean; a twist beside a large angle; angles moved by 1e-13.
+    """Steps that are large beside cogging or tanh, or lost beside a large angle or speed.
 
-    A drive that stands with its coupling pressed was fed forward to the angle of its output (240).  The pole
-    that crosses at 0 Hz was taken for half a pair with the mode at rest (800 742).  Within a long period the
-    speed left the flat part of tanh unseen (1 010 199, 1 010 254); a pressed coupling parted at steps of
-    which tenths were lost in rounding (1 010 187).  What pressed a coupling was 5e-10 to 9e-5 of its play
-    (1 500 430, 1 400 122, 1 700 648).  An output moved by 1e-15 was lost beside the speed (1 400 214,
-    1 400 330); the motion began with a jump of its feed-forward (1 400 195).  A rest that an integral and a
-    hanging load hold was sought evenly in all rows; some are known to rounding (1 500 506, 1 500 082).
+    Couplings pressed by next to nothing (240, 1 500 430, 1 400 122, 1 700 648); rests that an integral and a
+    hanging load hold (1 500 506, 1 500 082); a pole at 0 Hz beside a mode at rest (800 742).
     """
     design = full_drive(seed)
     bench = Bench(design, design)
@@ -194,17 +152,6 @@ def test_a_rest_that_an_integral_holds_is_no_border_under_any_delay() -> None:
     assert certified.stable
     assert not certified.delay_margins
     assert exact_margins(loops, "u").delay_s == np.inf
-
-
-def test_a_load_that_hangs_is_a_spring() -> None:
-    """m g l sin(x + pi) has the slope -m g l at 0; what is less than pi is rounded to moved nothing."""
-    design = full_drive(910_883)
-    slope = -design.load.gravity.mass_kg * 9.80665 * design.load.gravity.arm_m
-    spring = changed(design, load={"gravity": None, "moment_slope_Nm_rad": slope})
-    for place in ("position", "w_ref"):
-        hangs, sprung = (Bench(one, one).place(place).tangent for one in (design, spring))
-        off = relative(hangs.closed(Z), sprung.closed(Z))
-        assert np.max(off) <= max(1e-9, hangs.stated_error), place
 
 
 def test_a_margin_at_rest_is_proven_as_far_as_it_is_resolved() -> None:

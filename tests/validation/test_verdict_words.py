@@ -1,14 +1,14 @@
 """What a validation says: an unstable loop, a drive that hunts, rows that are not met, and their words."""
 
 from dataclasses import fields, replace
-from math import degrees, exp, log
+from math import degrees
 
 import numpy as np
 import pytest
 
 from actuator_lti import load_design
 from actuator_lti.design import with_values
-from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.design.model import Requirement, Waiver
 from analyses.large_signal.from_rest import RestSweep
 from analyses.limit_cycles import LimitCycles
 from analyses.motion.settling import SMALL, Settling, noticed, settlings_of
@@ -17,10 +17,7 @@ from analyses.motion.settling import words as end_words
 from analyses.specification import asked_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.validation import CHECKS, Validation, validate
-from analyses.validation.places import Bench
 from analyses.validation.row import judged
-from analyses.validation.small_signal import small_signal
-from nonlinear import tangent
 from nonlinear.settling.rest import Rest
 from reports import document as doc
 from reports.sections.beyond import described
@@ -33,32 +30,8 @@ EMPS = load_design("emps")
 WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
-def _with_gain(gain: float) -> Design:
-    return changed(EMPS, controller={"velocity": {"gain": gain}})
-
-
-def _velocity_rate(gain: float) -> float:
-    """Growth of the sampled speed loop of EMPS, from its matrix: x and v, and two positions before."""
-    M, F, g, T = 95.1089, 203.5034, 35.15065, 1e-3
-    a = exp(-F / M * T)
-    v_u, x_v = g * (1.0 - a) / F, (1.0 - a) * M / F
-    x_u = g / F * (T - x_v)
-    k = np.array([-gain / (2.0 * T), 0.0, 0.0, gain / (2.0 * T)])  # u = -K (x_k - x_{k-2}) / 2T
-    plant = np.array([[1.0, x_v, 0.0, 0.0], [0.0, a, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]])
-    A = plant + np.outer([x_u, v_u, 0.0, 0.0], k)
-    return log(np.abs(np.linalg.eigvals(A)).max()) / T
-
-
-@pytest.mark.parametrize("gain", [6.0e3, 9.0e3])
-def test_an_unstable_loop_grows_as_its_matrix_says(gain: float) -> None:
-    rate = _velocity_rate(gain)
-    assert rate > 0.0
-    found = tangent(_with_gain(gain), "velocity")
-    assert log(np.abs(np.linalg.eigvals(found.A)).max()) / found.period_s == pytest.approx(rate, rel=1e-6)
-
-
 def test_an_unstable_loop_is_not_met_and_its_response_still_is() -> None:
-    result = validate(_with_gain(6.0e3), CHECKS)
+    result = validate(changed(EMPS, controller={"velocity": {"gain": 6.0e3}}), CHECKS)
     assert result.verdict == "not met"
     assert "the velocity loop is unstable" in str(result)
     assert not result.not_met  # the simulator's poles and response are those predicted, unstable as they are
@@ -172,12 +145,3 @@ def test_points_without_motion_are_left_out_without_a_warning() -> None:
     words = described(replace(sweep, measured=measured, described=expected))
     assert "up to 6 dB and 90 deg" in words
     assert "not compared" in described(replace(sweep, measured=nothing, described=expected))
-
-
-@pytest.mark.parametrize("key", ["control.velocity.gain", "motor.rotor_inertia", "control.computing_delay"])
-def test_a_wrong_model_is_seen(key: str) -> None:
-    """One per cent of a gain, of the inertia, of the delay: rows are not met, and say which."""
-    design = load_design("ilr33-amber")
-    bench = Bench(design, design.with_values({key: 1.01 * design.parameters[key].value}))
-    verdicts = {row.name: row.verdict for row in small_signal(bench.place("position"))}
-    assert verdicts["response"] == verdicts["gain_margin"] == "not met"

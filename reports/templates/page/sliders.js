@@ -41,12 +41,13 @@ const makeSlider = (key, k) => {
   field.addEventListener("change", () => {
     const value = typed(field.value), good = allowed(key, value * key.factor);
     slider.wrong = good ? "" : `"${field.value}": allowed: ${key.whole ? "a whole number, " : ""}${key.allowed}`;
+    slider.at = past.values[k];
     if (good) set(k, value === inUnit(key, key.value) ? key.value : value * key.factor);
     else show();
   });
   field.addEventListener("input", () => { slider.wrong = ""; });
   const label = html("label", { htmlFor: id, title: key.about }, key.path.slice(titleOf(key.path).length + 1).replaceAll("_", " "));
-  const slider = { key, row: html("div", { className: "row", dataset: { path: key.path } }, label, field, html("span", "unit", key.unit), track, was), range, field, was, wrong: "" };
+  const slider = { key, row: html("div", { className: "row", dataset: { path: key.path } }, label, field, html("span", "unit", key.unit), track, was), range, field, was, wrong: "", at: key.value };
   return slider;
 };
 const rows = keys.map(makeSlider);
@@ -61,8 +62,8 @@ export const makePanel = () => {
 };
 
 export const show = () => {
-  rows.forEach(({ key, row, range, field, was, wrong }, k) => {
-    const value = past.values[k], moved = value !== key.value;
+  rows.forEach(({ key, row, range, field, was, wrong: refused, at }, k) => {
+    const value = past.values[k], moved = value !== key.value, wrong = value === at ? refused : ""; // moved since: another value
     if (document.activeElement !== range || !range.matches(":active")) range.value = 1000 * within(share(key, value), 0, 1);
     range.ariaValueText = `${said(key, value)} ${key.unit}`;
     if (document.activeElement !== field) field.value = said(key, value).replace("−", "-");
