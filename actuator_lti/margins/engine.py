@@ -48,9 +48,10 @@ def stability_margins(
         Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
     band_rad_s : tuple of float, optional
         Where margins are listed. Default: everywhere, gain margins within 200 dB; under a delay, whose phase
-        crossovers never end, up to where the gain stays below -40 dB, or nearer to one where that would be
-        more than 1e5 turns of the delay (``.band_rad_s`` of the result, and a note). The verdict, the
-        modulus and the disk margin are those of the whole axis in any case.
+        crossovers never end, up to where the gain stays below -40 dB and for four turns of the delay, farther
+        where the nearest margin lies beyond, or nearer where that would be more than 1e5 turns
+        (``.band_rad_s`` of the result, and a note). The verdict, the modulus and the disk margin are those of
+        the whole axis in any case.
     certify : bool, optional
         Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
         ones with exact delays. A fraction of a sample and measured data stay as they are.

@@ -1,13 +1,14 @@
 """Make the corners of a design and judge each by the linear loops."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTITIES
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.access import with_values
+from actuator_lti.design.checks import contradictions
 from actuator_lti.design.model import Design, Temperature, Tolerance
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.errors import InputError
@@ -28,15 +29,18 @@ class Corner:
     design: Design
     figures: Mapping[str, LoopFigures]  # of its sampled, sliding loops
     verdicts: tuple[RequirementVerdict, ...]
+    # Keys whose values there contradict others, with why: a speed that the supply does not reach, say
+    refused: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def tally(self) -> Tally:
-        """The requirements, and that every loop is stable."""
-        return tally(self.verdicts) + Tally.of(Verdict.of(one.sound) for one in self.figures.values())
+        """The requirements, that every loop is stable, and that no value contradicts another."""
+        sound = (one.sound for one in self.figures.values())
+        return tally(self.verdicts) + Tally.of(map(Verdict.of, (*sound, *(False for _ in self.refused))))
 
     @property
     def passed(self) -> bool:
-        """Whether no requirement fails and every loop is stable."""
+        """Whether no requirement fails, every loop is stable and no value contradicts another."""
         return self.tally.passes
 
 
@@ -90,7 +94,8 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
         there = replace(there, requirements=kept)
         figures = all_loop_figures(assemble_loops(there))
         verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, _not_here))
-        made.append(Corner(name, words, there, figures, verdicts))
+        refused = {key: f"{key} = {value}: {why}" for key, value, why in contradictions(there)}
+        made.append(Corner(name, words, there, figures, verdicts, refused))
     return Corners(design, asked, tuple(made), left_out)
 
 
@@ -121,7 +126,7 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
             sides = [([path for path in away if way * away[path] > 0.0], way) for way in (1, -1)]
             ends = [f"{', '.join(paths)} {'high' if way > 0 else 'low'}" for paths, way in sides if paths]
             words = f"each tolerance at the end that {worse} it: {'; '.join(ends)}"
-            yield name, words, with_values(design, values)
+            yield name, words, with_values(design, values, check=False)
 
 
 def at_temperature(design: Design, degC: float) -> Design:

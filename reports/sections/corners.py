@@ -16,7 +16,7 @@ def section(result: Corners) -> doc.Section:
         "The worst ends are those that one by one lower the margin of the loop where it is smallest, all "
         "taken together; the worst-case search of montecarlo looks inside the box as well."
     )
-    named = [doc.text(f"{corner.name.capitalize()}: {corner.words}.") for corner in result.corners[1:]]
+    named = [doc.text(_described(corner)) for corner in result.corners[1:]]
     caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
     alt = f"{caption} The figures stand in the table of every loop at every corner."
     details = doc.details("Every loop at every corner", [_loop_table(result), *named])
@@ -42,11 +42,16 @@ def summary(result: Corners) -> str:
     return f"The drive fails at {where}: {', '.join(what)}.{more}"
 
 
+def _described(corner: Corner) -> str:
+    return ". ".join([f"{corner.name.capitalize()}: {corner.words}", *corner.refused.values()]) + "."
+
+
 def _failings(corner: Corner) -> list[str]:
     doubts = {name: one.sound for name, one in corner.figures.items() if not one.sound}
     known = {None: "not known to be stable", False: "not stable"}
     loops = [f"{name} loop {known[stable]}" for name, stable in doubts.items()]
-    return [*loops, *(one.id for one in corner.verdicts if not one.passes)]
+    refused = [f"{key} not allowed there" for key in corner.refused]
+    return [*refused, *loops, *(one.id for one in corner.verdicts if not one.passes)]
 
 
 def worst(corner: Corner, quantity: Quantity) -> tuple[float, str] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -73,6 +73,17 @@ class ExactDelayLoop:
     def at_rest(self) -> tuple[fmpq_poly, fmpq_poly]:
         """Taylor series of N and D at s = 0."""
         return self.N.series(HIGHEST_ORDER), self.D.series(HIGHEST_ORDER)
+
+    @property
+    def delay(self) -> float:
+        """The longest delay of any term, s."""
+        return max(float(arb(tau).mid()) for _, tau in (*self.N.terms, *self.D.terms))
+
+    @cached_property
+    def early(self) -> ExactDelayLoop:
+        """Without the delay that all of N has, which does not change abs(L)."""
+        common = min((tau for _, tau in self.N.terms), default=fmpq(0))
+        return replace(self, N=self.N.late(-common))
 
     @property
     def lead(self) -> arb:
