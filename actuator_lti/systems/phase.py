@@ -30,8 +30,8 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is
     -omega delay; that of a system with inner delays is counted from where it meets the negative real axis. At
     zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270), and 180 deg less for a
-    negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by -180 deg,
-    as a damped one does.
+    negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by
+    -180 deg, as a damped one does.
 
     Parameters
     ----------
