@@ -14,6 +14,7 @@ from actuator_lti.asked.verdict import Verdict
 from reports import document as doc
 from reports.certain import certain
 from reports.cli.output import console, printable
+from reports.document_schema import GOES_ON
 from reports.html import show_signed
 from reports.numbers import prose, show
 from reports.verdict_summary import role, why
@@ -170,7 +171,7 @@ def _side_by_side(side: SideBySide) -> Table:
 
 def _label(column: Mapping[str, Any]) -> str:
     """Write a column's label and unit in one line; a continuation is set back."""
-    name = column["label"] if column["label"] not in doc.GOES_ON else f"  {column['label']}".rstrip() or " "
+    name = column["label"] if column["label"] not in GOES_ON else f"  {column['label']}".rstrip() or " "
     return f"{name}, {column['unit']}" if column["unit"] and name.strip() else f"{name} {column['unit']}"
 
 
