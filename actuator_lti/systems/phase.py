@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, delay_number
 from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.exact.loop import exact_loop
@@ -16,7 +16,7 @@ from actuator_lti.margins.loop import RationalLoop, loop_of
 from actuator_lti.margins.measured.bounds import bounds
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.margins.trust import Doubtful
-from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.measured_response import is_measured, measured_response
 from actuator_lti.types import Real
 
@@ -62,17 +62,21 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     >>> round(float(unwrapped_phase_deg(lag, 1e4, delay_s=0.02)), 1)
     -11548.6
     """
-    omega = np.asarray(omega_rad_s, dtype=float)
+    delay_s = delay_number(delay_s)
+    try:
+        omega = np.asarray(omega_rad_s, dtype=float)
+    except (TypeError, ValueError):
+        omega = np.array(np.nan)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):
         raise InputError("omega_rad_s: every frequency must be positive and finite")
     flat = np.atleast_1d(omega).ravel()
     if is_measured(system):
         return np.degrees(_measured_phase(system, flat, delay_s)).reshape(omega.shape)
     if hasattr(system, "delays_s"):
-        if system.delays_s.size:
+        if (plain := plain_behind_delay(system, delay_s)) is None:
             phase = DelayResponse.of(delay_form(system)).phase(flat)
             return np.degrees(phase - flat * delay_s).reshape(omega.shape)
-        system = system.to_state_space()
+        system, delay_s = plain
     given = given_of(system)
     period = given.period_s
     if period is not None and (flat * period > math.pi * (1.0 + 1e-12)).any():

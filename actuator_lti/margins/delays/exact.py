@@ -17,6 +17,10 @@ from actuator_lti.margins.given import ULP, Given, moved
 
 _MOST_DELAYS = 8
 HIGHEST_ORDER = 16
+_FEED_THROUGH = (
+    "a direct feed-through with a delay that is fed back or beside another path: allowed are systems whose "
+    "gain falls off at high frequency, or one delay in series with all of the system"
+)
 
 
 @dataclass(frozen=True)
@@ -132,9 +136,7 @@ def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ..
     """A continuous rational loop behind a delay, common factors cancelled, and its neighbours 8 ulp away."""
     loop = exact_loop(given)
     if loop.N.degree() >= loop.D.degree():
-        raise InputError(
-            "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
-        )
+        raise InputError(_FEED_THROUGH)
     out = []
     for near, way in zip((loop, *neighbours(given, loop)), (0.0, 1.0, -1.0), strict=True):
         delay = rational(delay_s + way * ULP * float(np.spacing(delay_s)))
@@ -173,9 +175,7 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     fed_back = _determinants(whole - column * row, n)
     above = [(p + (through - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
     if any(p.degree() >= n for p, _ in below[1:]) or any(p.degree() >= n for p, _ in above):
-        raise InputError(
-            "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
-        )
+        raise InputError(_FEED_THROUGH)
     N, D = ([(p, tau) for p, tau in terms if p.degree() >= 0] for terms in (above, below))
     while reduced and N and n and all(p[0] == 0 for p, _ in (*N, *D)):
         N, D = ([(p // fmpq_poly([0, 1]), tau) for p, tau in terms] for terms in (N, D))
