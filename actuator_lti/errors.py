@@ -101,6 +101,14 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
     return number
 
 
+def delay_number(delay_s: Any) -> float:
+    """A delay in s that is one finite number and not negative."""
+    allowed = "finite and not negative, in s"
+    if (number := finite_number("delay_s", delay_s, allowed)) < 0.0:
+        raise InputError(f"delay_s = {shown(delay_s)}: must be {allowed}")
+    return number
+
+
 def whole_number(name: str, value: Any, least: int = 1) -> int:
     """An argument that is a whole number from ``least`` on.
 

@@ -91,6 +91,8 @@ def caught(part: str, work: Callable[[], T]) -> tuple[T | None, Missing | None]:
 def reason(error: BaseException) -> str:
     """What went wrong in one line."""
     words = "".join(c if c.isprintable() else "?" for c in " ".join(str(error).split())[:400])
+    if isinstance(error, OutOfTime):
+        return words
     kind = "numerical failure" if isinstance(error, FORESEEN) else f"unforeseen {type(error).__name__}"
     return f"{kind}: {words}" if words or isinstance(error, FORESEEN) else kind
 

@@ -222,8 +222,6 @@ def facts(items: Iterable[FactItem]) -> Block:
     return {"kind": "facts", "items": [plain(item) for item in items]}
 
 
-GOES_ON = ("", "at")
-"""Labels of columns that go on with the column before them."""
 COMPARISONS = {">=": "≥", "<=": "≤"}
 
 

@@ -66,6 +66,10 @@ def _row_state(row: Tree) -> Tree:
 Row = Annotated[dict[str, Cell], AfterValidator(_row_state)]
 
 
+GOES_ON = ("", "at")
+"""Labels of columns that go on with the column before them."""
+
+
 class Column(TypedDict):
     """A column of a table; see `reports.document.column`."""
 

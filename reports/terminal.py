@@ -7,6 +7,7 @@ from typing import Any
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.measure import Measurement
+from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
 
@@ -14,6 +15,7 @@ from actuator_lti.asked.verdict import Verdict
 from reports import document as doc
 from reports.certain import certain
 from reports.cli.output import console, printable
+from reports.document_schema import GOES_ON
 from reports.html import show_signed
 from reports.numbers import prose, show
 from reports.verdict_summary import role, why
@@ -107,16 +109,20 @@ def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Ta
         cells = [_cell(row.get(column["key"]), column["format"]) for row in block["rows"]]
         longest = max((cell.cell_len for cell in cells), default=0)
         least = longest if column["align"] == "right" else min(longest, wrapped)
-        least = max(least, *map(len, label.split(" ")))
+        words = " ".join([label, *(cell.plain for cell in cells)]).split()
+        least = max(least, *map(len, words))  # no word is cut: a key, a file's name
         label = label.replace(" ", "\n") if narrow and len(label) > least else label
-        made.add_column(Text(label), justify=column["align"], min_width=least)
+        made.add_column(Text(label), justify=column["align"], min_width=least, no_wrap=least >= longest)
     for row in block["rows"]:
         made.add_row(*(_cell(row.get(column["key"]), column["format"]) for column in block["columns"]))
     return made
 
 
 def _fits(laid: Table, out: Console) -> bool:
-    return Measurement.get(out, out.options.update(width=10_000), laid).minimum <= out.width
+    """Whether no word is wider than its column, nor the table, laid out, than the terminal."""
+    least = Measurement.get(out, out.options.update(width=10_000), laid).minimum
+    lines = Segment.split_lines(out.render(laid))
+    return max(least, *map(Segment.get_line_length, lines)) <= out.width
 
 
 def stacked(block: Mapping[str, Any]) -> Text:
@@ -170,7 +176,7 @@ def _side_by_side(side: SideBySide) -> Table:
 
 def _label(column: Mapping[str, Any]) -> str:
     """Write a column's label and unit in one line; a continuation is set back."""
-    name = column["label"] if column["label"] not in doc.GOES_ON else f"  {column['label']}".rstrip() or " "
+    name = column["label"] if column["label"] not in GOES_ON else f"  {column['label']}".rstrip() or " "
     return f"{name}, {column['unit']}" if column["unit"] and name.strip() else f"{name} {column['unit']}"
 
 

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from actuator_lti.bandwidth.measured import measured_bandwidth
 from actuator_lti.bandwidth.rational_response import RationalResponse
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Peaks
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, delay_number
 from actuator_lti.margins.along import Along
 from actuator_lti.margins.axis_search import half_turn
 from actuator_lti.margins.delays.form import delay_form, in_series
@@ -24,7 +24,7 @@ from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
-from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.exact_fraction import Fraction, dc_noise, exact_fraction, shown
 from actuator_lti.systems.measured_response import is_measured
 from actuator_lti.systems.plain_system import PlainSystem
@@ -53,7 +53,8 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     Raises
     ------
     InputError
-        T is zero or infinite at zero frequency: there is nothing to measure the fall from.
+        T is zero or infinite at zero frequency: there is nothing to measure the fall from. A direct
+        feed-through with a delay that is no plain shift of T: one in a loop or beside another path.
 
     Examples
     --------
@@ -63,12 +64,13 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     """
     if level not in SQUARES:
         raise InputError(f"level = {level!r}: one of {list(SQUARES)}")
+    delay_s = delay_number(delay_s)
     if is_measured(system):
         return measured_bandwidth(system, delay_s, level)
     if hasattr(system, "delays_s"):
-        if system.delays_s.size:
+        if (plain := plain_behind_delay(system, delay_s)) is None:
             return _of_delays(system, delay_s, level)
-        system = system.to_state_space()
+        system, delay_s = plain
     system = _without_rest_mode(system)
     loop, fraction = rational_loop(system), exact_fraction(system)
     seen = shown(fraction, loop)
@@ -84,7 +86,10 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
     if abs(response.lead) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     floor = _FLOOR * abs(response.lead)
-    turn = first_turn(loop, delay_s, floor) if delay_s else response.first_turn(floor)
+    if delay_s:
+        turn = first_turn(loop_of(given_of(system), warp=True), delay_s, floor)
+    else:
+        turn = response.first_turn(floor)
     return _bandwidth(response, turn, level, loop.period_s)
 
 
@@ -148,6 +153,7 @@ def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
     delay_s : float, optional
         Exact delay in series with L, s.
     """
+    delay_s = delay_number(delay_s)
     if is_measured(system):
         raise InputError(
             "measured data: the peak of S is 1 over stability_margins(L).modulus_margin, in its range"

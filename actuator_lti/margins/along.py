@@ -17,6 +17,7 @@ from actuator_lti.margins.factored import SAME, polished
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
+from actuator_lti.margins.tail import tail_note
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.types import Complex, Real
 
@@ -33,7 +34,7 @@ class Along:
 
     def __init__(self, factors: Factored, loop: RationalLoop, band: tuple[float, float] | None) -> None:
         self.factors, self.loop, self._band = factors, loop, band
-        self._parts, self._listed_to, self._floor = axis_parts(factors, band)
+        self._parts, self._listed_to, self._quiet = axis_parts(factors, band)
         order = factors.at_zero
         first = complex(math.inf if order < 0.0 else 0.0) if order else loop.at_rest()
         self.ends = first, loop.at_end()
@@ -62,12 +63,11 @@ class Along:
 
     @property
     def reals(self) -> tuple[Crossing, ...]:
-        """Those of the negative real axis that are listed or too far to be, the ends among them."""
-        listed = (np.abs(self.real_L) >= self._floor) | (np.log(np.abs(self.real_L)) < -FAR_LOG)
+        """Those of the negative real axis, the ends among them."""
         turning = self.loop.period_s is None and self.loop.delay
         ends = (0.0, self.ends[0]), (math.inf, 0j if turning else self._onto_axis())
         first, last = ([Crossing(w, L)] if -math.inf < L.real < 0.0 else [] for w, L in ends)
-        return (*first, *_crossings(self.real_w[listed], self.real_L[listed]), *last)
+        return (*first, *_crossings(self.real_w, self.real_L), *last)
 
     def margins(
         self,
@@ -150,16 +150,15 @@ class Along:
 
     def _tail_note(self) -> tuple[str, ...]:
         top, factors = self._listed_to, self.factors
-        if not math.isfinite(top) or self._band is not None:
+        if not factors.delay or self._band is not None:
             return ()
-        if not factors.at_infinity:
-            every = 2.0 * math.pi / factors.delay
-            return (
-                f"gain margins beyond {top:.4g} rad/s, every {every:.4g} rad/s without end, are not listed: "
-                f"their ratio is {math.exp(-factors.log_gain):.6g}",
-            )
-        quiet = -20.0 * math.log10(self._floor)
-        return (f"gain margins above {quiet:.4g} dB beyond {top:.4g} rad/s are not listed",)
+        if factors.at_infinity:
+            return tail_note(top, self._quiet)
+        every = 2.0 * math.pi / factors.delay
+        return (
+            f"gain margins beyond {top:.4g} rad/s, every {every:.4g} rad/s without end, are not listed: "
+            f"their ratio is {math.exp(-factors.log_gain):.6g}",
+        )
 
 
 def _crossings(w: Real, L: Complex) -> tuple[Crossing, ...]:

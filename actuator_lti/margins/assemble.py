@@ -9,7 +9,7 @@ from actuator_lti.margins.given import unwarped
 from actuator_lti.margins.results import Evidence, StabilityMargins, Verdict
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
 
-_FARTHEST = 1e10  # 200 dB
+FARTHEST = 1e10  # 200 dB
 Place = tuple[float, float]  # a smallest distance, and its w
 
 
@@ -24,7 +24,7 @@ class Crossing:
     @property
     def out_of_sight(self) -> bool:
         """Whether it is not listed as a gain margin: that is beyond 200 dB, up or down."""
-        return not 1.0 / _FARTHEST <= abs(self.L) <= _FARTHEST
+        return not 1.0 / FARTHEST <= abs(self.L) <= FARTHEST
 
 
 @dataclass(frozen=True)

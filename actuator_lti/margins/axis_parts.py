@@ -2,19 +2,23 @@
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.assemble import FARTHEST
 from actuator_lti.margins.axis_search import Factored, Found
+from actuator_lti.margins.tail import listed, turns
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.types import Mask, Real
 
 _LOW, _HIGH = 1e-3, 1e3  # of the smallest and largest root: where the ends of the axis begin
 _NEAR_ONE = 1e-6
 _HARDLY = 1e-12  # rad
-_FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain below which, behind a delay, no crossing of the real axis is listed
-_LEAST_GAIN = 1e-8
+_FLOORS = (0.01, 0.1, 0.5, 0.9)  # gain: behind a delay margins are listed up to where L stays below
+_LEAST_GAIN = 1e-11
+_TOLD = 1e-12  # of the log gain, to either side of a place
 _MOST_TURNS = 100_000  # of the delay that are listed, about a second's work
 
 
@@ -38,24 +42,15 @@ class Part:
 def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[list[Part], float, float]:
     """The axis in one part where the gain falls off or turns for ever, else in two: infinity is zero of 1/w.
 
-    With them, up to where crossings of the real axis are listed, and above which gain.
+    With them, up to where crossings of the real axis are listed, and a gain that L does not reach beyond.
     """
     size = np.abs(factors.roots[factors.roots != 0.0])
     scale = 1.0 / factors.delay if factors.delay else 1.0
     least, most = (float(size.min()), float(size.max())) if size.size else (scale, scale)
     low = _start(factors, _LOW * min(least, scale if factors.delay else least))
     if factors.delay:
-        most_turned = 2.0 * math.pi * _MOST_TURNS / factors.delay
-        high, listed_to, floor = _turning_stop(factors, low, most, most_turned)
-        if band is not None:
-            listed_to, high, floor = float(band[1]), max(high, 2.0 * float(band[1])), 0.0
-        if listed_to > most_turned:
-            turns = factors.delay * listed_to / (2.0 * math.pi)
-            raise NumericalError(
-                f"the delay turns the loop {turns:.1e} times where margins are listed; "
-                "shorten the delay, or ask for a narrower band_rad_s"
-            )
-        return [Part(factors, factors.search(low, high, listed_to), False)], listed_to, floor
+        found, listed_to, gain = _behind_delay(factors, low, most, band)
+        return [Part(factors, found, False)], listed_to, gain
     high, slope = _HIGH * most, factors.at_infinity
     if slope:
         stop = _told(factors, max(high, 10.0 * high * math.exp(-factors.log_at(high)[0] / slope)), slope)
@@ -66,23 +61,38 @@ def axis_parts(factors: Factored, band: tuple[float, float] | None) -> tuple[lis
     return [first, last], math.inf, 0.0
 
 
-def _turning_stop(
-    factors: Factored, low: float, most: float, most_turned: float
-) -> tuple[float, float, float]:
-    """Under a delay: a frequency above which |L| is next to nothing, and up to where crossings are listed.
-
-    With them the gain above which they are: the lowest of `_FLOORS` that does not list too many turns.
-    """
+def _behind_delay(
+    factors: Factored, low: float, most: float, band: tuple[float, float] | None
+) -> tuple[Found, float, float]:
+    """The axis up to where |L| is next to nothing, with crossings of the band, or as `listed` has them."""
     slope, high = factors.at_infinity, _HIGH * most
-    if not slope:
-        listed_to = 10.0 * most + 8.0 * math.pi / factors.delay
-        return 10.0 * max(high, listed_to), listed_to, 0.0
-    top = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
-    for floor in _FLOORS:
-        listed_to = float(factors.passages(low, top, math.log(floor)).max(initial=low))
-        if listed_to <= most_turned:
-            break
-    return top, listed_to, floor
+    if slope:
+        high = max(high, high * math.exp((math.log(_LEAST_GAIN) - factors.log_at(high)[0]) / slope))
+    if band is not None or not slope:
+        to = band[1] if band else 10.0 * most + turns(factors.delay)
+        return _searched(factors, low, max(high, 10.0 * to), to), to, 0.0
+
+    @cache
+    def quiet(gain: float) -> float:
+        return float(factors.passages(low, high, math.log(gain) - _TOLD).max(initial=low))
+
+    def search(to: float) -> tuple[Found, float]:
+        found = _searched(factors, low, high, to)
+        gain = np.exp(-np.abs(factors.log_value(found.real_w)[0]))
+        return found, float(gain[gain * FARTHEST >= 1.0].max(initial=0.0))
+
+    most_turned = 2.0 * math.pi * _MOST_TURNS / factors.delay
+    floor = next((f for f in _FLOORS if quiet(f) <= most_turned), _FLOORS[-1])
+    return listed(search, quiet, factors.delay, floor, quiet(1.0 / FARTHEST))
+
+
+def _searched(factors: Factored, low: float, high: float, listed_to: float) -> Found:
+    if (count := factors.delay * listed_to / (2.0 * math.pi)) > _MOST_TURNS:
+        raise NumericalError(
+            f"the delay turns the loop {count:.1e} times where margins are listed; "
+            "shorten the delay, or ask for a narrower band_rad_s"
+        )
+    return factors.search(low, high, listed_to)
 
 
 def _start(factors: Factored, low: float) -> float:

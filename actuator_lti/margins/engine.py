@@ -4,7 +4,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
-from actuator_lti.errors import InputError, NumericalError, finite_number
+from actuator_lti.errors import InputError, NumericalError, delay_number, shown
 from actuator_lti.margins.assemble import assembled
 from actuator_lti.margins.checked import checked_margins
 from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
@@ -48,9 +48,10 @@ def stability_margins(
         Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
     band_rad_s : tuple of float, optional
         Where margins are listed. Default: everywhere, gain margins within 200 dB; under a delay, whose phase
-        crossovers never end, up to where the gain stays below -40 dB, or nearer to one where that would be
-        more than 1e5 turns of the delay (``.band_rad_s`` of the result, and a note). The verdict, the
-        modulus and the disk margin are those of the whole axis in any case.
+        crossovers never end, up to where the gain stays below -40 dB and for four turns of the delay, farther
+        where the nearest margin lies beyond, or nearer where that would be more than 1e5 turns
+        (``.band_rad_s`` of the result, and a note). The verdict, the modulus and the disk margin are those of
+        the whole axis in any case.
     certify : bool, optional
         Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
         ones with exact delays. A fraction of a sample and measured data stay as they are.
@@ -75,12 +76,7 @@ def stability_margins(
     >>> m.stable, round(m.gain_margin_db, 4), round(m.phase_margin_deg, 4), round(1e3 * m.delay_margin_s, 5)
     (True, 9.943, 61.3521, 10.70796)
     """
-    finite_number("delay_s", delay_s, "finite and not negative, in s")
-    if delay_s < 0.0:
-        raise InputError(f"delay_s = {delay_s}: must be finite and not negative")
-    if band_rad_s is not None and not 0.0 <= band_rad_s[0] < band_rad_s[1]:
-        raise InputError(f"band_rad_s = {band_rad_s}: two frequencies, 0 <= low < high, in rad/s")
-    band_rad_s = None if band_rad_s is None else (float(band_rad_s[0]), float(band_rad_s[1]))
+    delay_s, band_rad_s = delay_number(delay_s), _band(band_rad_s)
     if is_measured(system):
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):
@@ -98,6 +94,18 @@ def stability_margins(
     if samples is None:
         return _behind_delay(given, delay_s, band_rad_s, certify)
     return replace(_rational(replace(given, samples=samples), band_rad_s, certify), delay_s=delay_s)
+
+
+def _band(band: Any) -> tuple[float, float] | None:
+    if band is None:
+        return None
+    try:
+        low, high = map(float, band)
+    except (TypeError, ValueError):
+        low = high = 0.0
+    if not 0.0 <= low < high:
+        raise InputError(f"band_rad_s = {shown(band)}: two frequencies, 0 <= low < high, in rad/s")
+    return low, high
 
 
 def _rational(given: Given, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:

@@ -17,7 +17,8 @@ SAME = 1e-4  # relative: the loop and the product of its factors
 _NEARLY_REAL = 1e-12
 _SEEN = math.log(1e10)  # of L, to either side of one
 _NEWTON_STEPS = 6
-_NEWTON_STEP = 1e-9
+_NEWTON_STEP, _NEWTON_STEP_ON_L = 1e-9, 1e-6  # relative
+_LAST = 4e-16  # of x
 _ROUNDED = 1e-13  # of gain and phase: no step says more
 _FAR, _FAR_ROUNDED = math.log(10.0**1.5), 1e-7  # 30 dB from one, where a steep gain leaves fewer digits
 _FAR_OFF = 1e-4  # relative: a crossing of the factors and one of the loop
@@ -37,8 +38,9 @@ def polished(loop: RationalLoop, w: Real, gain: bool) -> tuple[Real, Complex]:
         L = loop.late(x, L)
         step = _newton_step(L, rate, gain)
         x = x - step
-        rounded = np.where(np.abs(np.log(np.abs(L))) > _FAR, _FAR_ROUNDED, _ROUNDED)
-        if ((np.abs(step) <= _NEWTON_STEP * x) | (np.abs(step * rate) <= rounded)).all():
+        far = np.where(np.abs(np.log(np.abs(L))) > _FAR, _FAR_ROUNDED, _ROUNDED)
+        on_L, on_x = np.abs(step * rate), np.abs(step / x)
+        if ((on_x <= _NEWTON_STEP) & (on_L <= _NEWTON_STEP_ON_L) | (on_L <= far) | (on_x <= _LAST)).all():
             break
     else:
         raise Doubtful("a crossing did not settle")

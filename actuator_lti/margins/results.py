@@ -26,7 +26,7 @@ class StabilityMargins:
     The figures to quote, and how they are chosen:
 
     - ``gain_margin_db``: of all gain margins the one nearest to 0 dB, upper (> 0) or lower (< 0);
-      ``inf`` where there is none.
+      ``inf`` where there is none within 200 dB.
     - ``phase_margin_deg``: of all phase margins the one nearest to 0 deg, with its sign; ``inf`` where the
       gain never crosses one.
     - ``delay_margin_s``: the smallest of all delay margins; ``inf`` where the gain never crosses one, and
@@ -128,7 +128,7 @@ class StabilityMargins:
 
     @property
     def gain_margin_db(self) -> float | None:
-        """Gain margin to quote, dB (``inf``: none; ``None``: withheld, or none in measured data)."""
+        """Gain margin to quote, dB (``inf``: none within 200 dB; ``None``: withheld, or none in data)."""
         quoted = self.gain_margin
         return self._none if quoted is None else quoted.db
 

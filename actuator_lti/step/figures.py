@@ -1,6 +1,6 @@
 """Step response and its figures: rise, overshoot, settling."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,7 @@ from actuator_lti.margins.loop import RationalLoop, rational_loop
 from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
+from actuator_lti.systems.delay_response import plain_behind_delay
 from actuator_lti.systems.exact_fraction import exact_sum
 from actuator_lti.systems.measured_response import refuse_measured
 from actuator_lti.types import Real
@@ -68,7 +69,8 @@ def step_figures(system: Any) -> StepFigures:
     Raises
     ------
     InputError
-        The system is not stable, its final value is zero, or it is measured data.
+        The system is not stable, its final value is zero, or it is measured data; or a direct feed-through
+        with a delay that is no plain shift: one in a loop or beside another path.
     NumericalError
         The final value is lost in the rounding of the entries, or when it settles cannot be told.
 
@@ -80,11 +82,23 @@ def step_figures(system: Any) -> StepFigures:
     """
     refuse_measured(system)
     if hasattr(system, "delays_s"):
-        if system.delays_s.size:
+        if (plain := plain_behind_delay(system)) is None:
             return _figures(*delayed_response(system))
-        system = system.to_state_space()
+        system, late = plain
+        return _later(step_figures(system), late) if late else step_figures(system)
     loop = rational_loop(system)
     return _figures(*rational_motion(system, loop), period_s=loop.period_s, notes=_notes(loop))
+
+
+def _later(figures: StepFigures, delay_s: float) -> StepFigures:
+    """Behind a delay in series."""
+    return replace(
+        figures,
+        settling_time_s=figures.settling_time_s + delay_s,
+        peak_time_s=figures.peak_time_s + delay_s,
+        time_s=np.concatenate(([0.0, delay_s], figures.time_s + delay_s)),
+        response=np.concatenate(([0.0, 0.0], figures.response)),
+    )
 
 
 def _figures(

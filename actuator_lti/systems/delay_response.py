@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from flint import arb, ctx, fmpq, fmpq_poly
@@ -12,13 +13,23 @@ from flint import arb, ctx, fmpq, fmpq_poly
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.delays.axis import IMAGINARY, REAL, Axis, Form, smallest, zeros
 from actuator_lti.margins.delays.exact import HIGHEST_ORDER, ExactDelayLoop, Quasi, exact_inside_delays
-from actuator_lti.margins.delays.form import DelayForm
+from actuator_lti.margins.delays.form import DelayForm, delay_form, without_series_delays
 from actuator_lti.margins.distances import Distance
+from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.types import Real
 
 _BITS = 128
 _SAME = fmpq(1, 100)  # relative: what 8 ulp of the entries change by more is not told from zero
 _AT_REST = 6  # coefficients asked
+
+
+def plain_behind_delay(system: Any, delay_s: float = 0.0) -> tuple[PlainSystem, float] | None:
+    """A system whose delays stand in series with all of it, without them, and their sum with one more, s."""
+    if (plain := without_series_delays(delay_form(system, delay_s))) is None:
+        return None
+    given, late = plain
+    assert given.A is not None
+    return PlainSystem(given.A, given.b[:, None], given.c[None], np.array([[given.d]]), 0), late
 
 
 @dataclass(frozen=True)

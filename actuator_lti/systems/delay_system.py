@@ -14,13 +14,15 @@ see `actuator_lti.systems.control_face`.
 
 from __future__ import annotations
 
+from functools import reduce
+from operator import mul
 from typing import Any
 
 import control
 import numpy as np
 from control.iosys import InputOutputSystem
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, delay_number, shown, whole_number
 from actuator_lti.margins.loop import rational_loop
 from actuator_lti.systems.control_face import ControlFace
 from actuator_lti.systems.plain_system import PlainDelaySystem, descriptor, in_parallel, in_series, response
@@ -121,7 +123,7 @@ class DelaySystem(ControlFace):
     @classmethod
     def delay(cls, delay_s: float, **names: Any) -> DelaySystem:
         """The pure delay exp(-s delay_s)."""
-        if delay_s == 0:
+        if delay_number(delay_s) == 0.0:
             return cls.from_system(1.0, **names)
         return cls([], [], [], [], [], [[0.0]], [[1.0]], [[1.0]], [[0.0]], [delay_s], **names)
 
@@ -260,12 +262,21 @@ class DelaySystem(ControlFace):
         return DelaySystem.of(in_series(self.plain, DelaySystem.from_system(other).plain))
 
     def __truediv__(self, other: Any) -> DelaySystem:
-        if not isinstance(other, int | float | np.number):
-            return NotImplemented
+        if not isinstance(other, int | float | np.number) or not other:
+            raise InputError(f"{self} / {shown(other)}: a system with delays is divided by a number, not 0")
         return self * (1.0 / float(other))
+
+    def __rtruediv__(self, other: Any) -> DelaySystem:
+        raise InputError(f"{shown(other)} / {self}: no division by a system with delays, it would look ahead")
+
+    def __pow__(self, power: Any) -> DelaySystem:
+        """The system in series with itself."""
+        return reduce(mul, [self] * whole_number("power", power, 0), DelaySystem.from_system(1.0))
 
     def feedback(self, other: Any = 1, sign: int = -1) -> DelaySystem:
         """Closed loop ``self / (1 - sign self other)``.
+
+        ``control.feedback`` takes it as its first system only: `from_system` makes one of the first.
 
         Raises
         ------

@@ -6,20 +6,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, delay_number
 from actuator_lti.margins.axis_search import Factored, half_turn
 from actuator_lti.margins.delays.form import delay_form
 from actuator_lti.margins.exact.loop import exact_loop
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of
-from actuator_lti.margins.loop import loop_of
+from actuator_lti.margins.loop import RationalLoop, loop_of
 from actuator_lti.margins.measured.bounds import bounds
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.margins.trust import Doubtful
-from actuator_lti.systems.delay_response import DelayResponse
+from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.measured_response import is_measured, measured_response
 from actuator_lti.types import Real
 
+_AT_REST = 1e-10  # of the median: a root this near to zero is one at zero, beside which the side is rounding
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
 
 
@@ -28,8 +29,9 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
 
     The phase of a rational system is the sum of the phases of its poles and zeros, that of a delay is
     -omega delay; that of a system with inner delays is counted from where it meets the negative real axis. At
-    zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270),
-    and 180 deg less for a negative gain. An undamped resonance turns by -180 deg, as a damped one does.
+    zero frequency the phase is -90 deg for each integrator (1/s^3 starts at -270), and 180 deg less for a
+    negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by
+    -180 deg, as a damped one does.
 
     Parameters
     ----------
@@ -60,17 +62,21 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     >>> round(float(unwrapped_phase_deg(lag, 1e4, delay_s=0.02)), 1)
     -11548.6
     """
-    omega = np.asarray(omega_rad_s, dtype=float)
+    delay_s = delay_number(delay_s)
+    try:
+        omega = np.asarray(omega_rad_s, dtype=float)
+    except (TypeError, ValueError):
+        omega = np.array(np.nan)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):
         raise InputError("omega_rad_s: every frequency must be positive and finite")
     flat = np.atleast_1d(omega).ravel()
     if is_measured(system):
         return np.degrees(_measured_phase(system, flat, delay_s)).reshape(omega.shape)
     if hasattr(system, "delays_s"):
-        if system.delays_s.size:
+        if (plain := plain_behind_delay(system, delay_s)) is None:
             phase = DelayResponse.of(delay_form(system)).phase(flat)
             return np.degrees(phase - flat * delay_s).reshape(omega.shape)
-        system = system.to_state_space()
+        system, delay_s = plain
     given = given_of(system)
     period = given.period_s
     if period is not None and (flat * period > math.pi * (1.0 + 1e-12)).any():
@@ -102,14 +108,25 @@ def _rational_phase(given: Given, w: Real) -> Real:
         factors = factored(loop)
     except Doubtful:
         factors = _exact_factors(given)
-    first = 1e-3 * float(np.abs(factors.roots[factors.roots != 0.0]).min(initial=1.0))
-    phase = factors.log_value(np.append(w, first))[1]
-    start = float(np.angle(loop.at(np.array([first]))[0]))
-    phase += half_turn(start - phase[-1])
-    half_turns = round(float(phase[-1] / np.pi - 0.5 * factors.at_zero))  # odd: a negative gain
-    phase = phase[:-1] - np.pi * (half_turns + half_turns % 2)
-    correction = np.angle(loop.at(w) * np.exp(-1j * phase))
-    return phase + np.where(np.isfinite(correction), correction, 0.0)  # on a pole: between both sides
+    size = np.abs(factors.roots)
+    at_rest = size <= _AT_REST * np.median(size) if size.size else size > 0.0
+    first = 1e-3 * float(size[~at_rest].min(initial=1.0))
+    phase = factors.log_value(np.append(w, first))[1] + _sign(loop, factors)
+    phase, start = phase[:-1], phase[-1]
+    half_turns = round(float(start / np.pi - 0.5 * factors.weights[at_rest].sum()))  # odd: a negative gain
+    phase -= np.pi * (half_turns + half_turns % 2)
+    correction = np.angle(loop.at(w) * np.exp(-1j * phase))  # of the last digits; more is rounding, or a pole
+    return phase + np.where(np.abs(correction) < 0.5 * np.pi, correction, 0.0)
+
+
+def _sign(loop: RationalLoop, factors: Factored) -> float:
+    """The half turns by which the factors' phase is off, told where the loop is known best: nearest to 1."""
+    size = np.abs(factors.roots)
+    w = 1.01 * (size[size > 0.0] if size.any() else np.ones(1))
+    L = loop.at(w)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        k = int(np.nan_to_num(np.abs(np.log(np.abs(L))), nan=np.inf).argmin())
+    return half_turn(float(np.angle(L[k]) - factors.log_value(w[k : k + 1])[1][0]))
 
 
 def _exact_factors(given: Given) -> Factored:

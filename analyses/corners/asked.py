@@ -33,7 +33,8 @@ class Asked:
     def __post_init__(self) -> None:
         """Refuse what is no corner."""
         if not -273.15 < self.cold_degC < self.hot_degC < 1000.0:
-            raise InputError(f"cold {self.cold_degC:g}, hot {self.hot_degC:g} degC: allowed: cold below hot")
+            allowed = "cold below hot, both above -273.15 and below 1000 degC"
+            raise InputError(f"cold {self.cold_degC:g}, hot {self.hot_degC:g} degC: allowed: {allowed}")
         if not 0.0 < self.supply_V < inf:
             raise InputError(f"low supply {self.supply_V:g} V: must be positive")
         if not 1.0 <= self.cold_viscous <= 1e3:

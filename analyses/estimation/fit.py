@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -131,11 +131,6 @@ class Fit:
         values[here] = own.values
         covariance[np.ix_(here, here)] = own.covariance + beside @ inverse @ beside.T
         return replace(self, values=values, covariance=covariance)
-
-    def only(self, names: Sequence[str]) -> Floats:
-        """The covariance of some of the values."""
-        at = [self.names.index(name) for name in names]
-        return np.asarray(self.covariance[np.ix_(at, at)])
 
     def renamed(self, names: Mapping[str, str]) -> Fit:
         """The values that have a new name, under it, and their covariance."""

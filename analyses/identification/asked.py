@@ -26,7 +26,7 @@ class Settings:
 
     fix: Annotated[
         list[str] | None,
-        Option("Hold a value, such as friction.load_coefficient=0; repeatable.", "KEY=VALUE"),
+        Option("Hold a value, such as friction.viscous=0; repeatable.", "KEY=VALUE"),
     ] = None
     residual_limit: Annotated[
         float, Option("Largest relative residual for which a design is written; 20.", "%")
@@ -133,8 +133,8 @@ class Asked(Settings):
     noise: Annotated[
         float | None,
         Option(
-            "With --plan: noise of the recorded current (without one, voltage), rms; the design's "
-            "instruments.current_noise.",
+            "With --plan: noise of the recorded current (without one, voltage), rms; "
+            "current_noise of the design.",
             "A",
         ),
     ] = None

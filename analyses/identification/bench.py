@@ -136,7 +136,8 @@ def identify_bench(
         refined = refine_records(made, used, values.names, progress=progress)
         if both is not None:  # its values are those at the constants that the voltage tells
             both = both.refined(refined)
-            refined = replace(refined, covariance=both.only(refined.names))
+            own = both.renamed({name: name for name in refined.names})
+            refined = replace(refined, covariance=own.covariance)
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
         made = made if both is None else with_correlations(made, both)
     written = read_design_text(write_design(made))

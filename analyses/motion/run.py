@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.bounds import TONES
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, whole_number
 from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
 from analyses.motion.settling import Conduct, conduct
 from nonlinear import Trajectory, commands, loads, simulate
@@ -80,7 +80,7 @@ def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None]
         friction_on=not asked.no_friction,
         limits_on=not asked.no_limits,
         energy=asked.energy,
-        record_every=asked.every,
+        record_every=whole_number("every", asked.every),
         progress=progress,
     )
     if asked.csv is not None:

@@ -288,11 +288,14 @@ TANH = P_SIZE
 LEVELS = 16
 # one level: transition over h/2 (12), over h (12), phi1 at h/2 (3), weights of N(u), N(a)+N(b), N(c) (9)
 LEVEL = 2 * TRANSITION + 12
-# behind them the largest rate times step, the share of its way that the current goes in each segment, 1/w_s
+# behind them the largest rate times step, the share of its way that the current goes in each segment, 1/w_s,
+# the fastest rate of the linear plant and the part of an acceleration that such a motion has
 TANH_RATE = TANH + 2 * LEVELS * LEVEL
 TANH_SHARE = TANH_RATE + 1
 TANH_PER_SPEED = TANH_SHARE + 2
-TANH_SIZE = 2 * LEVELS * LEVEL + 4
+TANH_FASTEST = TANH_PER_SPEED + 1
+TANH_SHAKEN = TANH_FASTEST + 1
+TANH_SIZE = 2 * LEVELS * LEVEL + 6
 # and with energies: integrals over one step as forms of (i, w, u, T, n0, nm, nc), n0, nm, nc the friction
 # torque at its beginning, middle and end: i (7), i^2, i w and w^2 (28 each), n w (28)
 TANH_FORM = 119

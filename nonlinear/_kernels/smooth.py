@@ -1,11 +1,17 @@
 """The smoothed friction law Tc tanh(w/w_s), by exponential Runge-Kutta steps of fourth order.
 
 The linear plant and the held voltage are propagated exactly; only the tanh term is approximated (Cox and
-Matthews 2002, ETD4RK), so a small inductance costs nothing.  A step h is chosen from the tolerance:
-rate h <= STEP_FACTOR tolerance^(1/4), where ``rate`` is the relaxation rate Tc/(J w_s) plus the
-rate |w'|/w_s at which the tanh is run through, so that the tolerance bounds the error of the speed
-that a tick adds, in smoothing speeds; steps are a segment divided by a power of two.  Beyond
-SATURATED smoothing speeds tanh is 1 to the last bit but one and a whole segment is exact.
+Matthews 2002, ETD4RK), so a small inductance costs nothing.  A step h is chosen such that the tolerance
+bounds the error of the speed that a tick adds, in smoothing speeds:
+
+    rate h <= STEP_FACTOR (tolerance/bent)^(1/4)  and  rate h <= LONGEST,
+    bent Tc/(J w_s) h a min(1, (fastest h)^4/480) <= tolerance.
+
+``rate`` is the relaxation rate Tc/(J w_s) plus the rate |w'|/w_s at which the tanh is run through; ``bent``,
+1 - tanh^2, bounds all derivatives of the tanh, one of which is in every term of the error, and grows by
+exp(2 rate h) at most within a step.  The last line is what Simpson's rule loses over the fastest motion of
+the linear plant, of size a, which the torque follows.  Steps are a segment divided by a power of two.
+Beyond SATURATED smoothing speeds tanh is 1 to the last bit but one and a whole segment is exact.
 
 Such a step is exactly the motion of the linear plant under a friction torque that is quadratic in time,
 through N(u) at its beginning, (N(a) + N(b))/2 in its middle and N(c) at its end.  The energies are those of
@@ -23,6 +29,7 @@ from nonlinear._kernels.slipping import MATRIX, exponential, plant, transition
 
 SATURATED = 19.0
 STEP_FACTOR = 4.0  # leaves about a factor of twenty to the error seen
+LONGEST = 0.5  # rate h of a step
 HALF, FULL = 0, layout.TRANSITION
 STAGE = 2 * layout.TRANSITION
 WEIGHT_1, WEIGHT_2, WEIGHT_3 = STAGE + 3, STAGE + 6, STAGE + 9
@@ -46,6 +53,7 @@ def prepare_tanh(p, s):
     """Fill the coefficients of every level for both segments, and what chooses among them."""
     p[layout.TANH_PER_SPEED] = 1.0 / p[layout.SMOOTHING]
     p[layout.TANH_RATE] = STEP_FACTOR * math.sqrt(math.sqrt(p[layout.TANH_TOLERANCE]))
+    prepare_fastest(p)
     for part in range(2):
         h = p[layout.LENGTH + part]
         if p[layout.SOURCE] <= 0.0:
@@ -58,6 +66,18 @@ def prepare_tanh(p, s):
                 if p[layout.WITH_ENERGY] > 0.0:
                     prepare_level_forms(p, h, s, layout.TANH_FORMS + which * layout.TANH_FORM)
             h *= 0.5
+
+
+@kernel
+def prepare_fastest(p):
+    """The fastest rate of the linear plant in 1/s, and what part of an acceleration it carries."""
+    damping = p[layout.VISCOUS] / p[layout.INERTIA]
+    p[layout.TANH_FASTEST], p[layout.TANH_SHAKEN] = damping, 1.0
+    if p[layout.SOURCE] <= 0.0:
+        tau = p[layout.INDUCTANCE] / p[layout.RESISTANCE]
+        square = p[layout.TORQUE_CONSTANT] * p[layout.BACK_EMF] / (p[layout.INERTIA] * p[layout.INDUCTANCE])
+        p[layout.TANH_FASTEST] = max(max(1.0 / tau, math.sqrt(square)), damping)
+        p[layout.TANH_SHAKEN] = min(1.0, (square + damping * damping) * tau * tau)
 
 
 @kernel
@@ -164,22 +184,37 @@ def tanh_torque(p, w, Tcp, Tcm):
 
 
 @kernel
-def level_for(p, part, i, u, Tb, Tc, n0):
+def bent(p, w):
+    """What bounds the derivatives of the friction torque at a speed, beside those at rest."""
+    if p[layout.VISCOUS_REVERSE] != p[layout.VISCOUS]:
+        return 1.0
+    T = tanh(w * p[layout.TANH_PER_SPEED])
+    return 1.0 - T * T
+
+
+@kernel
+def level_for(p, part, i, w, u, Tb, Tc, n0):
     """Number of halvings of a segment that the tolerance asks for under the friction torque n0."""
     if p[layout.TANH_LEVEL] >= 0.0:
         return int(p[layout.TANH_LEVEL])
-    J, ws = p[layout.INERTIA], p[layout.SMOOTHING]
-    drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb + n0
-    rate = (Tc / J + abs(drive) / J) / ws
-    rate += abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) / J
+    per = 1.0 / (p[layout.INERTIA] * p[layout.SMOOTHING])
+    drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb + n0 - p[layout.VISCOUS] * w
+    change, h, bend, fastest = abs(drive) * per, p[layout.LENGTH + part], bent(p, w), p[layout.TANH_FASTEST]
+    viscous = abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) / p[layout.INERTIA]
+    rate = Tc * per + viscous + change
+    shaken = change * p[layout.TANH_SHAKEN]
     if p[layout.SOURCE] <= 0.0:
-        # the drive changes within the step as fast as the current does
-        jump = p[layout.TORQUE_CONSTANT] * abs(u / p[layout.RESISTANCE] - i)
-        rate += jump * p[layout.TANH_SHARE + part] / (J * ws)
-    wanted = rate * p[layout.LENGTH + part] / p[layout.TANH_RATE]
+        # the torque changes within the step as fast as the current does
+        missing = (u - p[layout.BACK_EMF] * w) / p[layout.RESISTANCE] - i
+        jump = p[layout.TORQUE_CONSTANT] * abs(missing) * per
+        rate += jump * p[layout.TANH_SHARE + part]
+        shaken += jump * p[layout.RESISTANCE] / (p[layout.INDUCTANCE] * fastest)
+    x = fastest * h
+    lost = (Tc * per * bend + viscous) * shaken * h * h / (max(x, 1e-300) * p[layout.TANH_TOLERANCE])
+    wanted = rate * h * max(math.sqrt(math.sqrt(bend)) / p[layout.TANH_RATE], 1.0 / LONGEST)
     level = 0
-    while wanted > 1.0 and level < layout.LEVELS - 1:
-        wanted *= 0.5
+    while level < layout.LEVELS - 1 and (wanted > 1.0 or lost * min(1.0, x * x * x * x / 480.0) > 1.0):
+        wanted, lost, x = 0.5 * wanted, 0.5 * lost, 0.5 * x
         level += 1
     return level
 
@@ -239,7 +274,7 @@ def tanh_segment(p, s, part, u):
     kink = bend / p[layout.INERTIA] * whole / steps / allowed if p[layout.TANH_LEVEL] < 0.0 else 0.0
     while done < steps:
         n0 = tanh_torque(p, w, Tcp, Tcm)
-        level = level_for(p, part, i, u, Tb, max(Tcp, Tcm), n0)
+        level = level_for(p, part, i, w, u, Tb, max(Tcp, Tcm), n0)
         unit = steps >> level
         while (done & (unit - 1)) != 0:
             unit >>= 1

@@ -124,9 +124,17 @@ class Run:
         return row
 
 
+def _design_row(design: Design, *switches: bool) -> Floats:
+    """The row of a design alone."""
+    try:
+        return _kept_row(design, *switches)
+    except TypeError:  # a list in place of a tuple
+        return _kept_row.__wrapped__(design, *switches)
+
+
 @lru_cache(maxsize=16)
-def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
-    """The row of a design alone, kept: a design is mostly run more than once."""
+def _kept_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
+    """The same, kept: a design is mostly run more than once."""
     return design_row(design, friction_on=friction_on, limits_on=limits_on)
 
 

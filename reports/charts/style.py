@@ -64,7 +64,10 @@ def decibels(values: np.ndarray) -> np.ndarray:
 
 
 def phases(values: np.ndarray) -> np.ndarray:
-    return np.degrees(np.unwrap(np.angle(values)))
+    """Unwrapped phase in deg; nothing has none, which a chart leaves out."""
+    out, there = np.full(np.shape(values), np.nan), np.abs(values) > 0.0
+    out[there] = np.degrees(np.unwrap(np.angle(values[there])))
+    return out
 
 
 def bode_axes(top: Panel, bottom: Panel, phase: Iterable[float | None]) -> None:

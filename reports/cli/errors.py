@@ -56,7 +56,7 @@ def run(call: Callable[[], object], options: Callable[[], Mapping[str, str]] = d
         status = _run(call, options)
     except Exception as error:  # noqa: BLE001 - the one place for what nobody foresaw
         if late := time_limit.struck():
-            return _say(f"numerical failure: {late}", NO_RESULT)
+            return _say(late, NO_RESULT)
         return _say(f"{reason(error)}; traceback: {write_crash_file(traceback_of(error))}", NO_RESULT)
     finally:
         time_limit.stop()
@@ -80,8 +80,10 @@ def _run(call: Callable[[], object], options: Callable[[], Mapping[str, str]]) -
         return max(_say(str(one), BAD_INPUT) for one in error.mistakes)
     except InputError as error:
         return _say(_by_option(error, options), BAD_INPUT)
-    except (NumericalError, OutOfTime) as error:
+    except NumericalError as error:
         return _say(f"numerical failure: {error}", NO_RESULT)
+    except OutOfTime as error:
+        return _say(str(error), NO_RESULT)
     except BrokenPipeError:
         return _quiet_pipe()
     except SystemExit as leaving:

@@ -51,7 +51,7 @@ SetOption = Annotated[
     typer.Option(
         "--set",
         metavar="KEY=VALUE",
-        help='Change a value of the design, e.g. control.position.gain="90 1/s" (repeatable).',
+        help='Change a value of the design, e.g. limits.voltage="24 V" (repeatable).',
     ),
 ]
 

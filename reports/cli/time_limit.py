@@ -61,7 +61,7 @@ def _refuse(seconds: float) -> None:
 
 def _end(seconds: float) -> None:
     """End the process where the error did not get through."""
-    sys.stderr.write(f"actuator-lti: numerical failure: {_words(seconds)}\n")
+    sys.stderr.write(f"actuator-lti: {_words(seconds)}\n")
     sys.stderr.flush()
     os._exit(3)
 

@@ -69,7 +69,9 @@ def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
     changes = changes_row(design, path)
     if changes is None:
         return UNFOLLOWED
-    return "" if changes or any(changes_figure(design, path, *each) for each in figures) else UNUSED
+    if changes or any(changes_figure(design, path, *each) for each in figures):
+        return ""
+    return UNUSED if value else ZERO
 
 
 def _top(design: Design, path: str) -> float:

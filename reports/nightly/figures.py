@@ -10,7 +10,7 @@ from typing import Any, TypeGuard
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Tally
 from actuator_lti.files.tree import Tree
-from reports import document as doc
+from reports.document_schema import GOES_ON
 from reports.nightly.text import one_line
 from reports.verdict_summary import role, verdict_words, walk, why
 
@@ -151,7 +151,7 @@ def _headings(columns: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Name each column by its label; one that goes on with the column before it by that label as well."""
     before = ""
     for column in columns:
-        goes_on = column["label"] in doc.GOES_ON
+        goes_on = column["label"] in GOES_ON
         before = before if goes_on else column["label"]
         more = column["label"] or f"in {column['unit']}"
         yield f"{before} {more}".strip() if goes_on else before

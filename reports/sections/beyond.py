@@ -12,7 +12,7 @@ from analyses.limit_cycles.counts import WITHIN, Counts
 from analyses.limit_cycles.run import Confirmation
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import POINTS, Unit, output_unit, speed_unit
+from reports.sections.names import POINTS, Unit, fine_unit, output_unit, speed_unit
 
 
 def large_commands(conditional: Conditional, axis: str = "rotary") -> doc.Section:
@@ -103,7 +103,7 @@ def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
     )
     cycles = [(one, cycle) for one in found for cycle in one.cycles]
     blocks: list[doc.Block] = [_facts(one, axis) for one in found]
-    blocks += [_cycles(cycles, output_unit(axis))] if cycles else []
+    blocks += [_cycles(cycles, fine_unit(axis))] if cycles else []
     words = [sentence(one, axis) for one in found]
     findings = [doc.Finding(severity="info", text=text, where="counts") for text in words]
     title = "Counts of the encoders"
@@ -116,12 +116,12 @@ def sentence(one: Counts, axis: str) -> str:
     if one.speed_step_rad_s is not None:
         words.append(f"steps of {one.speed_step_rad_s:.3g} {speed} in the speed estimate")
     if one.standing_rad:
-        words.append(f"up to {output_unit(axis).of(one.standing_rad, 2)} of standing error")
+        words.append(f"up to {fine_unit(axis).of(one.standing_rad, 2)} of standing error")
     return f"{NAMES[one.sensor]}: counts add {', '.join(words)}."
 
 
 def _facts(one: Counts, axis: str) -> doc.Block:
-    out, speed = output_unit(axis), Unit(1.0, speed_unit(axis))
+    out, speed = fine_unit(axis), Unit(1.0, speed_unit(axis))
     within = f"Linear within {100 * WITHIN:.0f} %"
     rows = (
         (f"{NAMES[one.sensor]}: one count", one.quantum_rad, out, 0),

@@ -138,9 +138,8 @@ def chart_of(run: Trajectory) -> style.Chart:
             if np.isfinite(limit):
                 panel.note(f"limit ±{limit:.4g}, off scale", corner="top left", colour=style.MUTED)
         elif np.isfinite(limit):
-            panel.y.see([-limit, limit])
-            for sign in (1.0, -1.0):
-                panel.rule_y(sign * limit, colour=style.RED, width=1.2, dash=1)
+            for sign, words in ((1.0, f"limit ±{limit:.4g}"), (-1.0, "")):
+                panel.rule_y(sign * limit, words, seen=True, colour=style.RED, width=1.2, dash=1)
     panels[-1].x.limits(time[0], time[-1])
     return chart
 

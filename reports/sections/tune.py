@@ -79,8 +79,7 @@ def _at_limit(r: BindingRequirement) -> bool:
 
 
 def _verdict(r: BindingRequirement, design: Design) -> doc.VerdictItem:
-    structure = Structure.of(design)
-    units = {path: located(design, path)[0].unit(structure) for path in r.corner}
+    units = {path: located(design, path)[0].unit(Structure.of(design)) for path in r.corner}
     said = (f"{path} {with_unit(value, units[path], '.4g')}" for path, value in r.corner.items())
     corner = "; ".join(said) or "nominal"
     reason = [_amount(r)] * (r.distance is None) + ["binds"] * r.binds + [f"at {corner}"]

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from actuator_lti.design import load_design, model
+from actuator_lti.design.asked import FrozenMap
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 from tests.changed import changed
@@ -17,7 +18,7 @@ NOISE_A = 0.02
 
 def bare(name: str) -> model.Design:
     """A shipped design without what is told of its values."""
-    return replace(load_design(name), parameters={}, requirements=(), correlations=(), facts=())
+    return replace(load_design(name), parameters=FrozenMap(), requirements=(), correlations=(), facts=())
 
 
 def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = None) -> Trajectory:

@@ -179,5 +179,5 @@ def test_the_checksum_is_that_of_what_was_read_with_a_byte_order_mark(tmp_path, 
 def test_odrive_rows_are_counted(odrive_files: dict[str, Path]) -> None:
     record = open_record(odrive_files["step1"])
     assert record.counts.rows_in == 1309
-    assert record.counts.dropped == {"with a missing value": 8, "time below 1": 11}
+    assert record.counts.dropped == {"with a missing value": 8, "time below 1 s": 11}
     assert record.counts.rows_out == len(record) == 1290

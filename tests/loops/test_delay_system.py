@@ -203,3 +203,17 @@ def test_what_needs_a_finite_state_space_is_refused() -> None:
     joined = control.interconnect([plant, part], inputs="a", outputs="c")
     with pytest.raises(InputError, match=r"take system\.pade"):
         control.input_output_response(joined, np.linspace(0, 1, 5), np.ones(5))
+
+
+def test_products_with_itself_are_exact_and_what_looks_ahead_is_refused() -> None:
+    late = DelaySystem.from_system(control.tf([2.0], [1.0, 1.0])) * DelaySystem.delay(0.5)
+    at = 2.0 / (1.0 + 3.0j) * np.exp(-1.5j)
+    for power in (0, 1, 3):
+        assert (late**power)(3j) == pytest.approx(at**power, rel=1e-12)
+    plain = control.ss(-1.0, 1.0, 1.0, 0.0)
+    for refused in (
+        lambda: late / 0, lambda: late / plain, lambda: late / late, lambda: late / "a", lambda: plain / late,
+        lambda: 1.0 / late, lambda: late**-1, lambda: late**0.5, lambda: DelaySystem.delay("a"),
+    ):  # fmt: skip
+        with pytest.raises(InputError):
+            refused()

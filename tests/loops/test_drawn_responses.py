@@ -4,6 +4,7 @@ import control
 import numpy as np
 import pytest
 
+from actuator_lti import assemble_loops, unwrapped_phase_deg
 from actuator_lti.systems.plain_system import PlainSystem
 from analyses.linear.responses import LARGE, curve, response_at
 
@@ -43,6 +44,27 @@ def test_speed_against_a_spring_begins_at_90_deg_whatever_rounding_does_to_its_z
     phase = curve(loop, OMEGA).phase_deg
     assert phase[0] == pytest.approx(90.0, abs=1.0)
     assert (np.abs(np.diff(phase)) < 180.0).all()
+
+
+@pytest.mark.parametrize("off", [0.0, 1e-15, -1e-15, 1e-12, -1e-12])
+def test_what_rounding_leaves_of_a_zero_at_rest_turns_no_phase(off: float) -> None:
+    """(z - 1)/((z - 0.8)(z - 0.9)): of z - 1 a quarter turn and half the angle, of z - p its angle."""
+    omega = np.linspace(1e-3, 3000.0, 20_001)
+    z = np.exp(1j * omega * PERIOD_S)
+    expected = 0.5 * np.pi + 0.5 * omega * PERIOD_S - np.angle(z - 0.8) - np.angle(z - 0.9)
+    loop = control.tf([1.0, -1.0 - off], [1.0, -1.7, 0.72], PERIOD_S)
+    for form in (loop, control.ss(loop)):
+        assert unwrapped_phase_deg(form, omega) == pytest.approx(np.degrees(expected), abs=1e-4)
+
+
+@pytest.mark.parametrize("name", ["fin", "joint"])
+def test_speed_of_a_held_load_begins_at_90_deg_and_never_jumps(name: str) -> None:
+    """Against a load that springs back the speed at rest is none: a zero at z = 1."""
+    loop = assemble_loops(name).velocity
+    omega = np.linspace(1e-4, 0.9999, 5001) * np.pi / loop.open_loop.dt
+    phase = unwrapped_phase_deg(loop.open_loop, np.append(1e-3, omega))
+    assert phase[0] == pytest.approx(90.0, abs=0.1)
+    assert (np.abs(np.diff(phase[1:])) < 180.0).all()
 
 
 @pytest.mark.parametrize(("sign", "den"), SIGNED)

@@ -24,7 +24,19 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 from margin_families import FAMILIES, PERIOD_S, poly, roots_of, scaled, signs, uniform
-from margin_truth import DEG, RATIO, Facts, behind_delay, determined, facts, polynomials, truth_of, unlike
+from margin_truth import (
+    DEG,
+    RATIO,
+    Facts,
+    behind_delay,
+    below,
+    determined,
+    facts,
+    nearest,
+    polynomials,
+    truth_of,
+    unlike,
+)
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins import GainMargin, PhaseMargin, StabilityMargins, stability_margins
@@ -88,6 +100,8 @@ def plain_sampled(rng: np.random.Generator) -> control.TransferFunction:
     return control.tf(poly(zeros) * uniform(rng, -1.5, 1.0) * signs(rng, 0.3), poly(poles), PERIOD_S)
 
 
+FAR = 1e9  # ratio of gain margins that are compared behind a delay: 180 dB
+MOST_RAD = 300.0  # that the delay turns by
 CERTIFIED_LATE = 0.05  # share of the loops behind a delay: by intervals in certified arithmetic, the slow way
 Family = Callable[[np.random.Generator], control.LTI]
 ALL: tuple[Family, ...] = (
@@ -153,8 +167,13 @@ def delayed_forms(
     one = stability_margins(loop, delay_s=delay_s)
     if one.withheld:
         return
+    top = min(one.band_rad_s[1], MOST_RAD / delay_s)
     if hidden_free(loop) and not any(p.tangent for p in one.phase_margins):
-        yield "delay_s", replace(facts(one), gains=[]), behind_delay(loop, delay_s), 90.0
+        far = 30.0 if leaves_out(one) else FAR
+        yield "delay_s", below(facts(one), top), behind_delay(loop, delay_s, top), far
+        if top < MOST_RAD / delay_s:
+            beyond = behind_delay(loop, delay_s, 3.0 * MOST_RAD / delay_s)
+            yield "nearest of delay_s", nearest(facts(one)), nearest(beyond), far
     others = {
         "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s))
     }
@@ -162,8 +181,9 @@ def delayed_forms(
         others["certified"] = partial(stability_margins, loop, delay_s=delay_s, certify=True)
     for name, margins in others.items():
         if not (m := margins()).withheld:
-            far = 30.0 if leaves_out(one) or leaves_out(m) else 90.0
-            yield f"delay_s against {name}", facts(one), facts(m), far
+            far = 30.0 if leaves_out(one) or leaves_out(m) else FAR
+            top = min(one.band_rad_s[1], m.band_rad_s[1]) * 0.999
+            yield f"delay_s against {name}", below(facts(one), top), below(facts(m), top), far
 
 
 def behind_part_of_a_sample(family: Family, seed: int, k: int) -> tuple[str, str]:

@@ -1,12 +1,14 @@
 """Crossings and unstable poles of rational loops from exact doubles and certified roots, for the tests."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from itertools import pairwise
 
 import control
 import numpy as np
 from flint import acb, arb, ctx, fmpq, fmpq_mat, fmpq_poly, fmpz_poly
+from scipy.optimize import brentq
 
 from actuator_lti.margins import StabilityMargins
 
@@ -14,6 +16,8 @@ FARTHEST = 1e10
 RATIO, DEG = 1e-9, 1e-7
 ULP = 8  # by how much the entries may be wrong
 NEIGHBOURS = 6
+STEP = arb(2) ** -100
+NEXT = 1e-12  # relative: to the end of an interval
 BITS = (256, 1024, 4096, 16384)
 
 
@@ -59,8 +63,8 @@ def truth_of(loop: control.LTI, part: Fraction = Fraction(0)) -> Facts:
     return Facts(unstable, sorted(g for g in gains if 1.0 / FARTHEST <= g[1] <= FARTHEST), phases)
 
 
-def behind_delay(loop: control.LTI, delay_s: float) -> Facts:
-    """Unstable poles and phase margins of a strictly proper continuous loop behind a delay; no gain margins.
+def behind_delay(loop: control.LTI, delay_s: float, top: float = 0.0) -> Facts:
+    """Of a strictly proper continuous loop behind a delay, gain margins up to a frequency.
 
     Poles pass over the axis only where |L| = 1: into the right half plane, by pairs, where it falls, and back
     where it rises, at the delay that uses up the phase margin and after each further turn (Walton and
@@ -74,7 +78,50 @@ def behind_delay(loop: control.LTI, delay_s: float) -> Facts:
         unstable += into * max(turns, 0)
         into = -into
         phases.append((w, -math.degrees(math.remainder(delay_s * w - math.radians(deg), 2.0 * math.pi))))
-    return Facts(unstable, [], phases[::-1])
+    at_rest = [g for g in free.gains if g[0] == 0.0]
+    return Facts(unstable, at_rest + late_gains(loop, delay_s, top), phases[::-1])
+
+
+def late_gains(loop: control.LTI, delay_s: float, top: float) -> list[tuple[float, float]]:
+    """Gain margins behind a delay, 0 < w < top.
+
+    The phase, a sum of angles to certified roots, goes one way between the roots of its exact slope.
+    """
+    num, den = polynomials(loop)
+    hidden = num.gcd(den)
+    num, den = num // hidden, den // hidden
+    (ae, ao), (be, bo) = even_odd(num.derivative() * den - num * den.derivative()), even_odd(num * den)
+    v, late = fmpz_poly([0, 1]), Fraction(delay_s)
+    slope = late.denominator * (ae * be + v * ao * bo) - late.numerator * (be * be + v * bo * bo)
+    with ctx.workprec(BITS[0]):
+        weighed = [(acb(z), n * sign) for p, sign in ((num, 1), (den, -1)) for z, n in roots(p)]
+
+        def half_turns(w: arb | float) -> arb:
+            """Of the phase, less one: even where L is on the negative real axis."""
+            total = arb(0) if num[num.degree()] * den[den.degree()] > 0 else arb.pi()
+            for z, weight in weighed:
+                angle = acb(abs(z.real), arb(w) - z.imag).arg()
+                total += weight * (arb.pi() - angle if z.real > 0 else angle)
+            return (total - arb(late.numerator) / late.denominator * arb(w)) / arb.pi() - 1
+
+        def gain_margin(w: float, k: int) -> tuple[float, float]:
+            x = arb(w)
+            for _ in range(2):  # on a sharp resonance a double is too coarse for the gain
+                here, beside = half_turns(x), half_turns(x * (1 + STEP))
+                x = (x - (here - 2 * k) * x * STEP / (beside - here)).mid()
+            return w, float(abs(den(acb(0, x)) / num(acb(0, x))))
+
+        axis = [float(z.imag) for z, _ in weighed if z.real.contains(0) and z.imag > 0]
+        edges = sorted({0.0, top, *(w for w in (*axis, *map(float, positive(slope))) if w < top)})
+        found = []
+        for low, high in pairwise(edges):
+            low, high = low * (1.0 + NEXT) or NEXT * high, high * (1.0 - NEXT)
+            first, last = sorted((half_turns(low) / 2, half_turns(high) / 2), key=float)
+            turns = range(int(first.ceil().unique_fmpz()), int(last.floor().unique_fmpz()) + 1)
+            for k in turns:
+                w = brentq(lambda w, k=k: float(half_turns(w) - 2 * k), low, high, xtol=1e-300, rtol=1e-15)
+                found.append(gain_margin(w, k))
+        return [g for g in sorted(found) if 1.0 / FARTHEST <= g[1] <= FARTHEST]
 
 
 def polynomials(loop: control.LTI) -> tuple[fmpz_poly, fmpz_poly]:
@@ -142,6 +189,16 @@ def facts(m: StabilityMargins) -> Facts:
     phases = [(p.frequency_rad_s, p.deg) for p in m.phase_margins if not p.tangent]
     counts = (m.agreement.unstable_poles, m.agreement.unstable_nyquist)
     return Facts(next((c for c in counts if c is not None), None), gains, phases)
+
+
+def below(f: Facts, top: float) -> Facts:
+    """With gain margins below a frequency alone."""
+    return replace(f, gains=[g for g in f.gains if g[0] < top])
+
+
+def nearest(f: Facts) -> Facts:
+    """With the gain margin nearest to one alone."""
+    return replace(f, gains=sorted(f.gains, key=lambda g: abs(math.log(g[1])))[:1])
 
 
 def unlike(a: Facts, b: Facts, ratio: float = RATIO, deg: float = DEG, far: float = FARTHEST) -> str | None:

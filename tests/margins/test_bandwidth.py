@@ -1,6 +1,8 @@
 """Bandwidths (cases F3, F5, F6, F7), resonance, peaks of S and T, against closed forms."""
 
+import cmath
 import math
+from functools import partial
 from typing import Any
 
 import control
@@ -10,7 +12,9 @@ import pytest
 from actuator_lti.bandwidth import closed_loop_bandwidth, peaks
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
+from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
+from actuator_lti.systems.phase import unwrapped_phase_deg
 
 s = control.tf("s")
 W = 2 * math.pi * 30
@@ -174,3 +178,57 @@ def test_fast_sampling_does_not_blur_the_bandwidth() -> None:
     b = closed_loop_bandwidth(held)
     assert b.minus3db_rad_s == pytest.approx(math.sqrt(2**0.25 - 1), rel=1e-6)
     assert b.minus90deg_rad_s == pytest.approx(math.tan(math.pi / 8), rel=2e-4)
+
+
+SAMPLED = control.tf([0.1], [1.0, -0.9], 0.1)
+
+
+@pytest.mark.parametrize("form", [SAMPLED, control.ss(SAMPLED)], ids=["tf", "ss"])
+@pytest.mark.parametrize("delay_s", [0.03, 0.1])
+def test_a_sampled_response_behind_a_delay(form: control.LTI, delay_s: float) -> None:
+    """0.1/(z - 0.9): gain and phase by hand, at the frequencies that are said."""
+    b = closed_loop_bandwidth(form, delay_s=delay_s)
+    assert b.minus3db_rad_s is not None
+    assert b.minus90deg_rad_s is not None
+    assert abs(0.1 / (cmath.exp(0.1j * b.minus3db_rad_s) - 0.9)) == pytest.approx(math.sqrt(0.5), rel=1e-9)
+    at = 0.1 / (cmath.exp(0.1j * b.minus90deg_rad_s) - 0.9) * cmath.exp(-1j * b.minus90deg_rad_s * delay_s)
+    assert cmath.phase(at) == pytest.approx(-0.5 * math.pi, abs=1e-9)
+
+
+def test_a_delay_in_series_with_all_of_a_lead_is_a_plain_shift() -> None:
+    """(1 - s)/(2 (s + 1)) exp(-s): step 0.5 - exp(1 - t) from 1 s on, phase -2 arctan w - w, gain 0.5."""
+    given = control.tf([-0.5, 0.5], [1.0, 1.0])
+    late = DelaySystem.delay(0.4) * DelaySystem.from_system(given) * DelaySystem.delay(0.6)
+    b = closed_loop_bandwidth(late)
+    assert b.minus3db_rad_s is None
+    w = b.minus90deg_rad_s
+    assert w is not None
+    assert w + 2.0 * math.atan(w) == pytest.approx(0.5 * math.pi, rel=1e-9)
+    step = step_figures(late)
+    assert step.settling_time_s == pytest.approx(1.0 + math.log(100.0), rel=1e-9)
+    assert step.rise_time_s == pytest.approx(math.log(9.0), rel=1e-9)
+    after = step.time_s > 1.0
+    assert step.response[after] == pytest.approx(0.5 - np.exp(1.0 - step.time_s[after]), abs=1e-9)
+    assert not step.response[step.time_s < 1.0].any()
+    phase = unwrapped_phase_deg(late, [1.0, 3.0])
+    assert phase == pytest.approx(np.degrees([-0.5 * math.pi - 1.0, -2.0 * math.atan(3.0) - 3.0]), abs=1e-9)
+    with pytest.raises(InputError, match="one delay in series with all of the system"):
+        closed_loop_bandwidth((late * 0.5).feedback())
+
+
+@pytest.mark.parametrize("delay_s", [-1, None, math.nan, math.inf, "1 ms", [1], 1j])
+@pytest.mark.parametrize("system", ["tf", "delays", "data"])
+def test_a_delay_that_is_none_is_refused_in_one_line(system: str, delay_s: Any) -> None:
+    plain = control.tf([1.0], [1.0, 1.0])
+    given = {
+        "tf": plain,
+        "delays": DelaySystem.from_system(plain) * DelaySystem.delay(0.1),
+        "data": control.frd(plain, np.geomspace(0.01, 100.0, 50)),
+    }[system]
+    for asked in (
+        partial(closed_loop_bandwidth, given),
+        partial(stability_margins, given),
+        partial(unwrapped_phase_deg, given, [1.0]),
+    ):
+        with pytest.raises(InputError, match=r"^delay_s = .*: must be finite and not negative, in s$"):
+            asked(delay_s=delay_s)

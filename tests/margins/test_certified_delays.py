@@ -1,7 +1,6 @@
 """Exact delays, certified: verdict by the direct method of Walton and Marshall, crossings by a dense grid."""
 
 import math
-from dataclasses import replace
 
 import control
 import numpy as np
@@ -34,12 +33,15 @@ def test_verdict_crossovers_and_crossings_under_a_delay(seed: int) -> None:
     m = stability_margins(loop, delay_s=delay_s, certify=True)
     assert m.evidence == "certified", m.evidence_reason
     assert m.stable is (m.agreement.unstable_poles == 0)
-    assert unlike(replace(facts(m), gains=[]), behind_delay(loop, delay_s), deg=1e-6) is None
+    expected = behind_delay(loop, delay_s, m.band_rad_s[1])
+    assert unlike(facts(m), expected, 1e-8, deg=1e-6) is None
     crossed, nearest = on_a_grid(loop, delay_s, m.band_rad_s[1])
-    result = [(g.frequency_rad_s, g.ratio) for g in m.gain_margins if g.frequency_rad_s > 0]
+    result = [
+        (g.frequency_rad_s, g.ratio) for g in m.gain_margins if g.frequency_rad_s > 0.0 and g.ratio < 100
+    ]
     assert len(result) == len(crossed)
     assert result == [(pytest.approx(w, rel=1e-3), pytest.approx(k, rel=0.02)) for w, k in crossed]
-    assert m.modulus_margin <= nearest * (1 + 1e-6) or (m.modulus_margin == 1.0 and nearest > 0.9999)
+    assert m.modulus_margin <= nearest * (1 + 1e-9)
 
 
 def on_a_grid(
@@ -74,7 +76,7 @@ def test_delays_inside_and_in_series_are_certified_alike() -> None:
     p = 300.0 / (1j * w * (1j * w / 80.0 + 1.0)) * np.exp(-0.002j * w)
     L = p / (1.0 + p) * np.exp(-0.001j * w) * 30.0 / (1j * w)
     gain = np.flatnonzero((np.abs(L[1:]) > 1.0) != (np.abs(L[:-1]) > 1.0))
-    real = np.flatnonzero((L.imag[1:] * L.imag[:-1] < 0.0) & (L.real[1:] < 0.0) & (np.abs(L[1:]) > 0.01))
+    real = np.flatnonzero((L.imag[1:] * L.imag[:-1] < 0.0) & (L.real[1:] < 0.0))
     assert [p.frequency_rad_s for p in m.phase_margins] == pytest.approx(w[gain], rel=1e-4)
     assert [g.ratio for g in m.gain_margins] == pytest.approx(1.0 / np.abs(L[real]), rel=1e-2)
     assert m.modulus_margin == pytest.approx(np.abs(1.0 + L).min(), rel=1e-6)

@@ -218,3 +218,15 @@ def test_a_band_may_be_any_pair(certify: bool) -> None:
         found = stability_margins(loop, band_rad_s=band, certify=certify)
         assert found.gain_margins[0].ratio == pytest.approx(2.0, rel=1e-12)
         assert found.band_rad_s == (0.1, 10.0)
+
+
+@pytest.mark.parametrize("band", [(1,), 5, ("a", "b"), "ab", (2, 1), (1, 2, 3), (None, 1), (math.nan, 1)])
+def test_a_band_that_is_no_pair_is_refused(band: object) -> None:
+    with pytest.raises(InputError, match=r"^band_rad_s = .*: two frequencies, 0 <= low < high, in rad/s$"):
+        stability_margins(control.tf([1.0], [1.0, 1.0]), band_rad_s=band)
+
+
+@pytest.mark.parametrize("omega", ["a", None, 1j, [[1], [1, 2]]])
+def test_frequencies_that_are_none_are_refused(omega: object) -> None:
+    with pytest.raises(InputError, match="omega_rad_s: every frequency must be positive and finite"):
+        unwrapped_phase_deg(control.tf([1.0], [1.0, 1.0]), omega)

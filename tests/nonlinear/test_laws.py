@@ -6,6 +6,7 @@ import math
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import mpmath
 import numpy as np
@@ -14,7 +15,7 @@ from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
 from actuator_lti.compiled import emit_c
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Limits
 from nonlinear import Probe, Rows, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh
 from nonlinear.export.program import single
@@ -80,6 +81,36 @@ def test_tanh_against_an_integrator(tolerance: float) -> None:
         x = solve_ivp(rate, (0.0, Ts), x, "DOP853", args=(held[k],), rtol=1e-12, atol=1e-13).y[:, -1]
     assert np.abs(speeds).max() > 10.0
     assert np.abs(run.motor_speed_rad_s - speeds).max() < 10.0 * tolerance * f.smoothing_speed_rad_s + 1e-9
+
+
+def test_a_tick_adds_no_larger_an_error_than_its_tolerance_whatever_the_drive() -> None:
+    """Bare motors over decades, from states in and beside the bend; against steps for a millionth of it."""
+    rng, count, tolerance = np.random.default_rng(11), 300, 1e-6
+    bare = replace(smooth().controller, position=None, velocity=None, current=None, computing_delay_s=0.0)
+    rows = Rows.of(replace(smooth(), controller=bare, limits=Limits(voltage_V=math.inf)), count)
+    exponents = {
+        "inertia": (-7, -2), "period": (-5, -2.5), "smoothing": (-2, 1.5), "dry": (-5, 0),
+        "resistance": (-1, 1), "torque_constant": (-2.5, 0), "viscous": (-7, -1.5),
+    }  # fmt: skip
+    drawn = {name: 10.0 ** rng.uniform(*ends, count) for name, ends in exponents.items()}
+    k, R, dry = drawn["torque_constant"], drawn["resistance"], drawn["dry"]
+    w = drawn["smoothing"] * rng.uniform(-1.0, 1.0, count) * 10.0 ** rng.uniform(-1.0, 1.5, count)
+    current = dry / k * rng.standard_normal(count) * 10.0 ** rng.uniform(-1.0, 1.0, count)
+    drawn |= {
+        "back_emf": k, "dry_reverse": dry, "viscous_reverse": drawn["viscous"], "offset": 0.0,
+        "inductance": R * 10.0 ** rng.uniform(-5.0, -1.5, count), "speed_start": w, "current_start": current,
+        "ticks": 2,
+    }  # fmt: skip
+    for name, values in drawn.items():
+        rows[name] = values
+    rows.step("command", k * w + R * current * rng.uniform(-2.0, 2.0, count))
+    found = []
+    for allowed in (tolerance, 1e-6 * tolerance):
+        rows["tanh_tolerance"] = allowed
+        found.append(np.array([rows.trajectory(n).motor_speed_rad_s[1] for n in range(count)]))
+    errors = np.abs(found[0] - found[1]) / drawn["smoothing"]
+    assert errors.max() > 1e-3 * tolerance
+    assert errors.max() < tolerance
 
 
 BALANCED = [  # drive, amplitude (None: a quarter of full deflection), Hz, seconds, load, what happens in it

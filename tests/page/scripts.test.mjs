@@ -16,7 +16,7 @@ const { commandOf, lengthOf, spansOf } = await import("../../reports/templates/p
 const { unified } = await import("../../reports/templates/page/diff.js");
 const { checkOf, general } = await import("../../reports/templates/page/relations.js");
 const { rowOf, statementOf } = await import("../../reports/templates/page/row.js");
-const { digits, show } = await import("../../reports/templates/page/words.js");
+const { digits, refused, show, typed } = await import("../../reports/templates/page/words.js");
 
 const near = (found, wanted) => assert.ok(Math.abs(found - wanted) <= 1e-12 * Math.max(1, Math.abs(wanted)), `${found} for ${wanted}`);
 
@@ -46,6 +46,12 @@ test("numbers keep their digits and their sign", () => {
   assert.equal(digits(Infinity, 4), "unlimited");
   assert.equal(digits(NaN, 4), "–");
   assert.equal(show(1.5e8), "1.50×10⁸");
+});
+
+test("what is typed is a number with a decimal point, as on the command line", () => {
+  assert.deepEqual(["6.5", " −2 ", "1e3", "6,000", "6,5", ""].map(typed), [6.5, -2, 1000, NaN, NaN, NaN]);
+  assert.equal(refused("6,000", "a number above 0"), '"6,000": a decimal comma; use a decimal point');
+  assert.equal(refused("-1", "a number above 0"), '"-1": a number above 0');
 });
 
 test("statements are what they say", () => {

@@ -18,6 +18,7 @@ from reports.charts import style
 from reports.charts.axis import Axis, linear_ticks, log_ticks
 from reports.charts.chart import Band, Chart
 from reports.charts.labels import Room
+from reports.charts.style import phases
 from reports.charts.svg import page_svg, paper_svg
 from reports.sections.loop import step_figures
 from reports.sections.loop_charts import critical_points, nichols_regions
@@ -200,6 +201,22 @@ def test_the_rise_is_marked_where_it_begins_and_ends() -> None:
 @pytest.fixture(scope="module")
 def run() -> Trajectory:
     return simulate(load_design("ilr33-amber"), commands.step(0.35), 0.3)
+
+
+def test_a_limit_that_is_drawn_says_so(run: Trajectory) -> None:
+    """A step of 20 deg takes speed, current and voltage to their limits."""
+    drawn = chart_of(run).columns[0].panels
+    limits = {
+        item.words: item.at for panel in drawn for item in panel.items if item.kind == "rule" and item.words
+    }
+    expected = [run.limits[name].limit for name in ("speed", "current", "voltage")]
+    assert limits == {f"limit ±{each:.4g}": each for each in expected}
+
+
+def test_nothing_has_no_phase() -> None:
+    """It is followed over what does not move: j, nothing, -1, -j."""
+    values = np.array([1.0, 1.0j, 0.0, np.nan, -1.0, -1.0j])
+    assert phases(values) == pytest.approx([0.0, 90.0, np.nan, np.nan, 180.0, 270.0], nan_ok=True)
 
 
 @pytest.mark.parametrize("name", ["speed", "acceleration", "current", "voltage"])

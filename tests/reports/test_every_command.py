@@ -1,5 +1,6 @@
 """What holds of every command: --json, --set, help, the verdict first, no line wider than the terminal."""
 
+import json
 import re
 import shlex
 import subprocess
@@ -140,6 +141,22 @@ def test_headings_break_before_a_word_of_a_cell_is_cut(width: int, printed) -> N
     words = out.replace("\n", " ").lower().split()
     for word in " ".join([*labels[1:], *cells]).lower().split():  # stacked, the first column needs no name
         assert any(one.startswith(word) for one in words), word
+
+
+@pytest.mark.parametrize("width", [60, 80, 90, 100, 120])
+@pytest.mark.parametrize("word", ["notch", "integral"])
+def test_a_key_is_never_cut(word: str, width: int, monkeypatch, cli) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    said, rows = cli.text("keys", word), json.loads(cli.text("keys", word, "--json"))["keys"]
+    assert max(map(len, said.splitlines())) <= width
+    assert all(row["path"] in said for row in rows)
+    assert "…" not in said
+
+
+@pytest.mark.parametrize("command", ["identify", "tune", "compare", "margins"])
+def test_help_is_not_cut_at_80_columns(command: str, monkeypatch, cli) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    assert "…" not in cli.text(command, "--help")
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])

@@ -47,6 +47,15 @@ def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command,
     assert section(Motion(design, Asked(), run))["status"] == ("info" if wanted else "warn")
 
 
+def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
+    """The joint hunts in minutes after 3 deg: two periods at 0.00478 Hz are 418 s, the run is 0.3 s."""
+    said = cli.data("simulate", "joint", "--amplitude", "3 deg", "--duration", "0.3")["status_detail"]
+    beyond, hertz, periods = re.fullmatch(
+        r"followed for (\S+) s beyond the run; ±.* at (\S+) Hz \((\d+) periods seen\)", said
+    ).groups()
+    assert float(beyond) > int(periods) / float(hertz) > 100.0
+
+
 @pytest.mark.parametrize(("millionths", "verdict"), [(0.5, "at rest"), (2.0, "limit cycle")])
 def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, verdict: str) -> None:
     """The joint hunts by its counts; beside a full deflection of two or half a million such swings."""

@@ -85,7 +85,9 @@ def test_command_and_section(cli) -> None:
     assert limits == [[6.0], [45.0]]
     seen = [item.words for panel in panels for item in panel.items if item.kind == "note"]
     assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
-    assert "allowed: cold below hot" in cli.refused("corners", "fin", "--hot", "-60")
+    for asked in (("--hot", "-60"), ("--cold", "-300"), ("--hot", "1500")):
+        allowed = "allowed: cold below hot, both above -273.15 and below 1000 degC"
+        assert allowed in cli.refused("corners", "fin", *asked)
 
 
 def test_a_corner_that_contradicts_itself_fails_by_name_and_ends_nothing(cli) -> None:

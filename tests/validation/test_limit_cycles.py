@@ -2,7 +2,7 @@
 
 from functools import cache
 from itertools import pairwise
-from math import asin, pi
+from math import asin, degrees, pi
 
 import numpy as np
 import pytest
@@ -18,6 +18,7 @@ from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear
 from analyses.limit_cycles.describing import cycles_of_play, cycles_of_quantisation, without_nonlinearities
 from analyses.limit_cycles.run import confirm
 from nonlinear import commands, simulate
+from reports.certain import certain
 from reports.sections.beyond import counts as counts_section
 from reports.sections.cycles import section
 from tests.changed import changed
@@ -109,6 +110,17 @@ def test_the_report_says_it_in_a_sentence() -> None:
     made = counts_section([of_difference(1024)])
     assert "steps of 61.4 rad/s in the speed estimate" in made["result"]
     assert made["status"] == "info"
+
+
+def test_a_small_cycle_keeps_its_digits_in_a_document() -> None:
+    """The joint's motor counts move its output by 5.1e-9 deg."""
+    joint = load_design("joint")
+    found = counts_of(joint, assemble_loops(joint), 4000)
+    table = certain(counts_section(found))["blocks"][-1]
+    shown = [f"{row['output']:.3g} {table['columns'][2]['unit']}" for row in table["rows"]]
+    assert shown == [
+        f"{1e3 * degrees(one.cycle.output_rad):.3g} mdeg" for each in found for one in each.cycles
+    ]
 
 
 def test_a_drive_that_only_friction_holds_has_no_linear_amplitude() -> None:

@@ -72,7 +72,7 @@ def _half(low: float, high: float) -> arb:
 class Form:
     """A real function q = u |N|^2 + v Re(N conj D) + w |D|^2 of the loop, or with Im where it is turned.
 
-    (1, 0, -1) is |L| - 1; (0, 1, 0) the real part of L; (1, 2, 1 - m^2) is |1 + L| - m.
+    (1, 0, -g^2) is |L| - g; (0, 1, 0) the real part of L; (1, 2, 1 - m^2) is |1 + L| - m.
     """
 
     u: fmpq
@@ -97,7 +97,6 @@ class Form:
         return arb_poly([c.real for c in total.coeffs()])
 
 
-GAIN = Form(fmpq(1), fmpq(0), fmpq(-1))
 REAL, IMAGINARY = (Form(fmpq(0), fmpq(1), fmpq(0), turned) for turned in (False, True))
 
 

@@ -2,22 +2,24 @@
 
 import math
 
-from flint import acb, arb, ctx
+from flint import acb, arb, ctx, fmpq
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.assemble import Crossing, Figures, Place, assembled
-from actuator_lti.margins.delays.axis import GAIN, IMAGINARY, NOWHERE, Axis, smallest, turn, zeros
+from actuator_lti.margins.assemble import FARTHEST, Crossing, Figures, Place, assembled
+from actuator_lti.margins.delays.axis import IMAGINARY, NOWHERE, Axis, Form, smallest, turn, zeros
 from actuator_lti.margins.delays.exact import ExactDelayLoop
-from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.exact.decided import ACROSS, Lists, Shared, hidden_notes, shared
+from actuator_lti.margins.distances import DISK, MODULUS, Distance
+from actuator_lti.margins.exact.decided import ACROSS, Crossings, Shared, hidden_notes, shared
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
+from actuator_lti.margins.tail import listed, tail_note
 from actuator_lti.margins.trust import TOUCH
 
 _BITS = 128
 _UNDER_ONE = 0.9
-_FLOOR = 0.01  # gain below which no crossing of the real axis is listed: 40 dB
+_FLOOR = 0.01  # gain: margins are listed up to where L stays below
+_BELOW = 1.0 - 1e-12
 _AT_REST = 1e-3  # how far L has moved from its value at rest where a crossover is one of its own
 _METHOD = "zeros of real functions of the axis, parted by intervals in certified arithmetic"
 _REASON = f"certified intervals on the exact delays; {ULP} ulp of the entries change nothing"
@@ -38,23 +40,22 @@ def certified_delayed_margins(
         axes = [Axis(loop) for loop in loops]
         counts = [_unstable(axis) for axis in axes]
         found, figures = Shared((), (), problem=ACROSS), None
-        if len(set(counts)) == 1:
-            found = shared(*(_crossings(axis, band) for axis in axes))
+        lists = [_reals(axis, band) for axis in axes]
+        for merge in (False, True) if len(set(counts)) == 1 else ():
             if found.problem is not None:
-                found = shared(*(_crossings(axis, band, merge=True) for axis in axes))
+                found = _shared(axes, lists, merge)
         if found.problem is None:
-            near = zip((MODULUS, DISK), _known(start), strict=True)
-            figures = Figures(found.gains, found.reals, [smallest(axes[0], d, known) for d, known in near])
-    hidden, listed_to = loops[0].hidden, loops[0].beyond(_FLOOR)
+            near = [smallest(axes[0], d, _known(d, found.reals, start)) for d in (MODULUS, DISK)]
+            figures = Figures(found.gains, found.reals, near)
+    hidden, (_, listed_to, gain) = loops[0].hidden, lists[0]
     unstable = counts[0] + hidden.right  # proven by the turn of N + D; double precision's stands beside it
     second = None if start is None else start.agreement.unstable_nyquist
-    tail = (f"gain margins above 40 dB beyond {listed_to:.4g} rad/s are not listed",)
     return assembled(
         None,
         Agreement(unstable, second if second == unstable else None) if figures else Agreement(None, None),
         figures,
         method=_METHOD,
-        notes=(*hidden_notes(hidden), *found.notes, *(tail if band is None else ())),
+        notes=(*hidden_notes(hidden), *found.notes, *(tail_note(listed_to, gain) if band is None else ())),
         evidence="certified",
         reason=found.problem or _REASON,
         delay_s=delay_s,
@@ -64,33 +65,61 @@ def certified_delayed_margins(
     )
 
 
-def _known(start: StabilityMargins | None) -> list[Place]:
-    """Both distances as double precision has them, each with its frequency."""
-    if start is None or start.modulus_frequency_rad_s is None or start.disk_margin is None:
-        return [NOWHERE] * 2
-    disk, modulus = start.disk_margin, start.modulus_margin or 0.0
-    return [(modulus, start.modulus_frequency_rad_s), (disk.alpha, disk.frequency_rad_s)]
+def _known(distance: Distance, reals: Crossings, start: StabilityMargins | None) -> Place:
+    """A small value of a distance: at a crossing, or as double precision has it."""
+    places = [(distance.at(c.L), c.w) for c in reals]
+    if start is not None and start.modulus_frequency_rad_s is not None and start.disk_margin is not None:
+        modulus = start.modulus_margin or 0.0, start.modulus_frequency_rad_s
+        disk = start.disk_margin.alpha, start.disk_margin.frequency_rad_s
+        places.append(modulus if distance is MODULUS else disk)
+    return min(places, default=NOWHERE)
 
 
-def _crossings(axis: Axis, band: tuple[float, float] | None, merge: bool = False) -> Lists:
-    """Gain crossovers and crossings of the negative real axis, up to where they are listed.
+def _shared(axes: list[Axis], lists: list[tuple[Crossings, float, float]], merge: bool) -> Shared:
+    return shared(*((_gains(axis, merge), reals) for axis, (reals, *_) in zip(axes, lists, strict=True)))
+
+
+def _gains(axis: Axis, merge: bool) -> Crossings:
+    """Gain crossovers.
 
     With ``merge`` a gain of one at zero frequency, within `TOUCH`, is no crossover; that of the given doubles
     may lie at any frequency below the loop's own.
     """
-    loop = axis.loop
-    top = loop.beyond(_UNDER_ONE)
-    far = loop.beyond(_FLOOR) if band is None else max(band[1], top)
-    gains = [_crossing(axis, x) for x in zeros(axis, GAIN, axis.edges(loop.lowest, top))]
-    reals = [_crossing(axis, x) for x in zeros(axis, IMAGINARY, axis.edges(loop.lowest, far))]
-    reals = [c for c in reals if c.L.real < 0.0 and (band is not None or abs(c.L) >= _FLOOR)]
-    N0, D0 = (part[0] for part in loop.at_rest)
-    at_rest = float(arb(N0 / D0)) if D0 != 0 else math.inf
-    if at_rest < 0.0:
-        reals = [Crossing(0.0, complex(at_rest)), *reals]
+    gains, at_rest = [_crossing(axis, x) for x in _passages(axis, 1.0)], _at_rest(axis)
     if merge and abs(at_rest - 1.0) <= TOUCH:
         gains = [c for c in gains if abs(c.L - at_rest) > _AT_REST]
-    return tuple(gains), tuple(reals)
+    return tuple(gains)
+
+
+def _reals(axis: Axis, band: tuple[float, float] | None) -> tuple[Crossings, float, float]:
+    """Crossings of the negative real axis, up to where they are listed, and a gain that L is below beyond."""
+    loop = axis.loop
+    first = [Crossing(0.0, complex(at_rest))] if (at_rest := _at_rest(axis)) < 0.0 else []
+
+    def search(to: float) -> tuple[Crossings, float]:
+        found = [_crossing(axis, x) for x in zeros(axis, IMAGINARY, axis.edges(loop.lowest, to))]
+        reals = tuple(c for c in found if c.L.real < 0.0)
+        near = (min(abs(c.L), 1.0 / abs(c.L)) for c in reals if not c.out_of_sight)
+        return (*first, *reals), max(near, default=0.0)
+
+    def quiet(gain: float) -> float:
+        return max((float(x.mid()) for x in _passages(axis, gain * _BELOW)), default=0.0)
+
+    if band is not None:
+        return search(max(band[1], loop.lowest))[0], band[1], 0.0
+    return listed(search, quiet, loop.delay, _FLOOR, loop.beyond(1.0 / FARTHEST))
+
+
+def _passages(axis: Axis, gain: float) -> list[arb]:
+    """Where abs(L) passes a gain, in order; no delay of all of it changes that."""
+    early, square = axis.loop.early, fmpq(*gain.as_integer_ratio()) ** 2
+    edges = axis.edges(early.lowest, axis.loop.beyond(_UNDER_ONE * gain))
+    return zeros(Axis(early), Form(fmpq(1), fmpq(0), -square), edges)
+
+
+def _at_rest(axis: Axis) -> float:
+    N, D = (part[0] for part in axis.loop.at_rest)
+    return float(arb(N / D)) if D != 0 else math.inf
 
 
 def _crossing(axis: Axis, x: arb) -> Crossing:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,10 @@ from actuator_lti.margins.given import ULP, Given, moved
 
 _MOST_DELAYS = 8
 HIGHEST_ORDER = 16
+_FEED_THROUGH = (
+    "a direct feed-through with a delay that is fed back or beside another path: allowed are systems whose "
+    "gain falls off at high frequency, or one delay in series with all of the system"
+)
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,17 @@ class ExactDelayLoop:
         return self.N.series(HIGHEST_ORDER), self.D.series(HIGHEST_ORDER)
 
     @property
+    def delay(self) -> float:
+        """The longest delay of any term, s."""
+        return max(float(arb(tau).mid()) for _, tau in (*self.N.terms, *self.D.terms))
+
+    @cached_property
+    def early(self) -> ExactDelayLoop:
+        """Without the delay that all of N has, which does not change abs(L)."""
+        common = min((tau for _, tau in self.N.terms), default=fmpq(0))
+        return replace(self, N=self.N.late(-common))
+
+    @property
     def lead(self) -> arb:
         """The coefficient of the highest power of s in D."""
         return arb(self.D.terms[0][0][self.degree])
@@ -121,9 +136,7 @@ def exact_behind_delay(given: Given, delay_s: float) -> tuple[ExactDelayLoop, ..
     """A continuous rational loop behind a delay, common factors cancelled, and its neighbours 8 ulp away."""
     loop = exact_loop(given)
     if loop.N.degree() >= loop.D.degree():
-        raise InputError(
-            "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
-        )
+        raise InputError(_FEED_THROUGH)
     out = []
     for near, way in zip((loop, *neighbours(given, loop)), (0.0, 1.0, -1.0), strict=True):
         delay = rational(delay_s + way * ULP * float(np.spacing(delay_s)))
@@ -162,9 +175,7 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     fed_back = _determinants(whole - column * row, n)
     above = [(p + (through - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
     if any(p.degree() >= n for p, _ in below[1:]) or any(p.degree() >= n for p, _ in above):
-        raise InputError(
-            "direct feed-through: exact arithmetic with delays takes a loop whose gain falls off"
-        )
+        raise InputError(_FEED_THROUGH)
     N, D = ([(p, tau) for p, tau in terms if p.degree() >= 0] for terms in (above, below))
     while reduced and N and n and all(p[0] == 0 for p, _ in (*N, *D)):
         N, D = ([(p // fmpq_poly([0, 1]), tau) for p, tau in terms] for terms in (N, D))

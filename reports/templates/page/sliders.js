@@ -1,7 +1,7 @@
 // A slider for every key: its range, its tolerance, its value as written.
 import { data, find } from "./desk.js";
 import { allowed, changes, commit, inUnit, keys, past, preview } from "./history.js";
-import { digits, html, typed } from "./words.js";
+import { digits, html, refused, typed } from "./words.js";
 
 const share = (key, value) => (key.low > 0 ? Math.log(value / key.low) / Math.log(key.high / key.low) : (value - key.low) / (key.high - key.low));
 const along = (key, part) => (key.low > 0 ? key.low * (key.high / key.low) ** part : key.low + part * (key.high - key.low));
@@ -40,7 +40,7 @@ const makeSlider = (key, k) => {
   range.addEventListener("dblclick", () => set(k, key.value));
   field.addEventListener("change", () => {
     const value = typed(field.value), good = allowed(key, value * key.factor);
-    slider.wrong = good ? "" : `"${field.value}": allowed: ${key.whole ? "a whole number, " : ""}${key.allowed}`;
+    slider.wrong = good ? "" : refused(field.value, `allowed: ${key.whole ? "a whole number, " : ""}${key.allowed}`);
     slider.at = past.values[k];
     if (good) set(k, value === inUnit(key, key.value) ? key.value : value * key.factor);
     else show();
@@ -57,7 +57,7 @@ export const makePanel = () => {
     const own = rows.filter(({ key }) => titleOf(key.path) === title).sort((a, b) => Number(a.key.value === 0) - Number(b.key.value === 0)); // those in use first
     box.append(html("details", { className: "group", open: OPEN.includes(title) }, html("summary", {}, title), ...own.map(({ row }) => row)));
   }
-  const fixed = data.fixed.map((key) => html("li", {}, html("code", {}, key.path), ` ${key.whole ? key.value : digits(inUnit(key, key.value), 5)} ${key.unit}: ${key.why}.`));
+  const fixed = data.fixed.map((key) => html("li", {}, html("code", {}, key.path), ` ${key.whole ? key.value : digits(inUnit(key, key.value), 5)}${key.unit && ` ${key.unit}`}: ${key.why}.`));
   if (fixed.length) box.append(html("details", "group fixed", html("summary", {}, `${fixed.length} keys without a slider`), html("ul", {}, ...fixed)));
 };
 

@@ -5,7 +5,7 @@ import { thinned } from "./curves.js";
 import { PLACE, STABLE, colourOf, data, desk, find, outer, tell } from "./desk.js";
 import { start } from "./history.js";
 import { compute, run, view, x } from "./module.js";
-import { choice, digits, html, labelled, swatch, typed } from "./words.js";
+import { choice, digits, html, labelled, refused, swatch, typed } from "./words.js";
 
 const { size: usual, unit: unitIn, factor } = data.step;
 /** @type {any} */
@@ -162,7 +162,7 @@ export const runKeys = () => {
     const field = html("input", { className: "field", type: "text", inputMode: "decimal" }), wrong = html("span", "wrong"), label = labelled(words, field, " ", wrong);
     field.addEventListener("change", () => {
       const value = name === "chosen" && field.value.trim() === "" ? 0 : typed(field.value), good = Number.isFinite(value) && fits(value);
-      wrong.textContent = good ? "" : `"${field.value}": ${allowed}`;
+      wrong.textContent = good ? "" : refused(field.value, allowed);
       field.ariaInvalid = String(!good);
       if (!good) return;
       trial[name] = value * over;

@@ -22,7 +22,8 @@ export const choice = (words, options, value, change) => {
   return labelled(words, list);
 };
 // what is typed as a number; NaN where it is none
-export const typed = (text) => (text.trim() === "" ? NaN : Number(text.replace(",", ".").replace("−", "-")));
+export const typed = (text) => (text.trim() === "" ? NaN : Number(text.replace("−", "-")));
+export const refused = (text, allowed) => `"${text}": ${text.includes(",") ? "a decimal comma; use a decimal point" : allowed}`;
 export const heading = (words, side = "left", scope = "col") => html("th", { className: side, scope }, words);
 // fills a table anew: its headings, its rows
 export const fill = (box, headings, rows) => box.replaceChildren(box.querySelector("caption"), html("thead", {}, html("tr", {}, ...headings)), html("tbody", {}, ...rows));
