@@ -11,6 +11,7 @@ from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
 from analyses.specification.weakest import Spread, View, WeakPoint
+from analyses.tuning.problem import SPAN
 from reports import document as doc
 from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
 from reports.live.keys import named
@@ -23,7 +24,10 @@ from reports.verdict_summary import gathered, tally
 
 SHOWN = 3
 MOST_BARS = 12
-NO_MOVE = "No gain alone mends it without losing a requirement or another margin"
+NO_MOVE = (
+    f"No gain alone, up to {SPAN:g} times larger or smaller, mends it without losing a requirement or "
+    "another margin"
+)
 
 
 def section(
