@@ -47,7 +47,7 @@ def test_speed_against_a_spring_begins_at_90_deg_whatever_rounding_does_to_its_z
 
 
 def test_a_resonance_is_round_in_a_nichols_chart() -> None:
-    """1/(s^2 + 0.01 s + 1): most of half a turn within 1 rad/s +- 1 %, of which the coarse grid sees two points."""
+    """1/(s^2 + 0.01 s + 1): most of half a turn lies within 1 rad/s +- 1 %, two points of the coarse grid."""
     drawn = nichols_curve(control.tf([1.0], [1.0, 1e-2, 1.0]), np.geomspace(0.1, 10.0, 240), 60.0)
     assert np.abs(np.diff(drawn.phase_deg)).max() < 7.0
     assert np.abs(np.diff(drawn.magnitude_db)).max() < 1.01
