@@ -15,11 +15,10 @@ from analyses.corners.run import Corners
 from analyses.linear.loop_survey import LoopSurvey
 from analyses.monte_carlo.judging import by_loop, in_populations, judge, loop_columns
 from analyses.specification.weakest import View, WeakPoint, limit_of, views
-from analyses.tuning.problem import GAINS
+from analyses.tuning.problem import GAINS, SPAN
 from analyses.tuning.start import allowed_range
 
-FURTHEST = 4.0  # a gain goes to a quarter of what it is, or to four times it
-STEPS = 12  # on either side, and once more between the last that does not mend and the first that does
+STEPS = 36  # on either side, and once more between the last that does not mend and the first that does
 
 
 @dataclass(frozen=True)
@@ -40,7 +39,8 @@ def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None
     """Find the least move of one gain that brings every margin of the weakest view within its limit.
 
     No other view of a loop goes beyond its limits, or further beyond them, and no requirement on a loop that
-    is met is lost. ``None`` where no single gain does, or the view is no loop of `linear_figures`.
+    is met is lost. ``None`` where no single gain within the factor `SPAN` does, or the view is no loop of
+    `linear_figures`.
 
     Examples
     --------
@@ -64,7 +64,7 @@ def _moves(view: View, design: Design) -> Iterator[Move]:
         if path not in design.parameters or not (was := parameter_value(design, path)):
             continue
         low, high = allowed_range(design, path)
-        for end in (max(was / FURTHEST, low), min(was * FURTHEST, high)):
+        for end in (max(was / SPAN, low), min(was * SPAN, high)):
             steps = np.geomspace(was, end, STEPS + 1)
             first = _first(view, design, path, steps)
             if first is not None and first > 0:

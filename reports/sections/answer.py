@@ -11,6 +11,7 @@ from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.responses import frequency_grid
 from analyses.specification.mending import Move
 from analyses.specification.weakest import Spread, View, WeakPoint
+from analyses.tuning.problem import SPAN
 from reports import document as doc
 from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
 from reports.live.keys import named
@@ -23,7 +24,10 @@ from reports.verdict_summary import gathered, tally
 
 SHOWN = 3
 MOST_BARS = 12
-NO_MOVE = "No gain alone mends it without losing a requirement or another margin"
+NO_MOVE = (
+    f"No gain alone, up to {SPAN:g} times larger or smaller, mends it without losing a requirement or "
+    "another margin"
+)
 
 
 def section(
@@ -94,7 +98,9 @@ def power_above(value: float) -> str:
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
-    known = [item for item in items if item["value"] is not None and item["limit"] is not None]
+    known = [
+        item for item in items if item["limit"] is not None and (item["value"] is not None or _lost(item))
+    ]
     found: dict[tuple[str, str | None], list[float]] = {}
     for corner in bounds.corners if bounds else ():
         for one in corner.verdicts:
@@ -102,11 +108,16 @@ def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]
                 factor = shown_unit(one.requirement.unit)[1]
                 found.setdefault((one.id, one.loop), []).append(factor * one.value)
     bars = []
-    for item in sorted(known, key=_nearness):
+    for item in sorted(known, key=lambda item: -math.inf if _lost(item) else _nearness(item)):
         values = found.get((item["id"], item.get("loop")), [])
         kept = {name: value for name, value in item.items() if name in Bar.__annotations__}
         bars.append(cast(Bar, {**kept, "band": [min(values), max(values)] if values else None}))
     return bars
+
+
+def _lost(item: doc.VerdictItem) -> bool:
+    """Whether it is not met and has no figure, as of a loop that is not stable."""
+    return item["value"] is None and item["verdict"] == "not met"
 
 
 def move_words(design: Design, move: Move) -> str:
