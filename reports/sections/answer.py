@@ -98,7 +98,9 @@ def power_above(value: float) -> str:
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
-    known = [item for item in items if item["value"] is not None and item["limit"] is not None]
+    known = [
+        item for item in items if item["limit"] is not None and (item["value"] is not None or _lost(item))
+    ]
     found: dict[tuple[str, str | None], list[float]] = {}
     for corner in bounds.corners if bounds else ():
         for one in corner.verdicts:
@@ -106,11 +108,16 @@ def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]
                 factor = shown_unit(one.requirement.unit)[1]
                 found.setdefault((one.id, one.loop), []).append(factor * one.value)
     bars = []
-    for item in sorted(known, key=_nearness):
+    for item in sorted(known, key=lambda item: -math.inf if _lost(item) else _nearness(item)):
         values = found.get((item["id"], item.get("loop")), [])
         kept = {name: value for name, value in item.items() if name in Bar.__annotations__}
         bars.append(cast(Bar, {**kept, "band": [min(values), max(values)] if values else None}))
     return bars
+
+
+def _lost(item: doc.VerdictItem) -> bool:
+    """Whether it is not met and has no figure, as of a loop that is not stable."""
+    return item["value"] is None and item["verdict"] == "not met"
 
 
 def move_words(design: Design, move: Move) -> str:

@@ -19,6 +19,8 @@ from analyses.margins import margins
 from analyses.specification.mending import mending
 from analyses.specification.weakest import spread, views, weakest
 from reports.build import report
+from reports.document import verdict
+from reports.sections.answer import section as first_screen
 from reports.sections.answer import weakest as words_of
 from reports.sections.loop_charts import open_bode
 from reports.sections.margins import section as margins_section
@@ -147,6 +149,16 @@ def test_a_gain_that_is_far_from_stable_is_mended_as_well() -> None:
     assert 60.0 < move.value < 8.0 * 10.0 ** ((25.90 - 6.0) / 20.0)
     mended = assemble_loops(with_values(design, {move.path: move.value})).position
     assert stability_margins(mended.open_loop).modulus_margin >= CUSTOMARY["modulus_margin"]
+
+
+def test_a_requirement_that_is_not_met_without_a_figure_has_the_first_bar() -> None:
+    about = {"limit": 6.0, "comparison": ">=", "unit": "dB"}
+    near = verdict("a", "near", passed=False, value=5.0, **about)
+    lost, open_one = (
+        verdict(word, word, passed=passed, **about) for word, passed in (("b", False), ("c", None))
+    )
+    (glance,) = first_screen({}, [near, lost, open_one], [])["blocks"]
+    assert [bar["id"] for bar in glance["bars"]] == ["b", "a"]
 
 
 def test_no_move_that_costs_a_requirement(survey: LoopSurvey) -> None:

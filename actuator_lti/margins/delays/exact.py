@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from flint import acb, acb_poly, arb, arb_poly, fmpq, fmpq_mat, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.delays.form import DelayForm
-from actuator_lti.margins.exact.loop import exact_loop, exact_matrix, neighbours, rational
+from actuator_lti.margins.exact.loop import exact_loop, neighbours, rational
 from actuator_lti.margins.exact.roots import NOTHING_HIDDEN, HalfPlanes
 from actuator_lti.margins.given import ULP, Given, moved
 
@@ -169,8 +170,8 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     delays = [rational(tau) for tau in form.delays_s]
     late = [sum((tau for k, tau in enumerate(delays) if mask >> k & 1), fmpq(0)) for mask in range(1 << q)]
     m = n + q
-    whole, column = exact_matrix(form.whole[:m, :m]), exact_matrix(form.whole[:m, m:])
-    row, through = exact_matrix(form.whole[m:, :m]), rational(form.whole[m, m])
+    whole, column = _exact_matrix(form.whole[:m, :m]), _exact_matrix(form.whole[:m, m:])
+    row, through = _exact_matrix(form.whole[m:, :m]), rational(form.whole[m, m])
     below = list(zip(_determinants(whole, n), late, strict=True))
     fed_back = _determinants(whole - column * row, n)
     above = [(p + (through - 1) * d, tau) for p, (d, tau) in zip(fed_back, below, strict=True)]
@@ -192,7 +193,7 @@ def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
     for mask in range(1 << q):
         there = [n + k for k in range(q) if mask >> k & 1]
         A, B, C, D = (_part(whole, rows, columns) for rows in (states, there) for columns in (states, there))
-        K = exact_matrix(np.eye(len(there))) - D
+        K = _exact_matrix(np.eye(len(there))) - D
         if K.det() == 0:
             raise InputError("delays feed back on themselves at once: of neutral type, no margins are given")
         found.append((A + B * K.inv() * C).charpoly() * K.det() if there else A.charpoly())
@@ -205,3 +206,8 @@ def _determinants(whole: fmpq_mat, n: int) -> list[fmpq_poly]:
 
 def _part(M: fmpq_mat, rows: Sequence[int], columns: Sequence[int]) -> fmpq_mat:
     return fmpq_mat(len(rows), len(columns), [M[r, c] for r in rows for c in columns])
+
+
+def _exact_matrix(M: Any) -> fmpq_mat:
+    rows, columns = M.shape
+    return fmpq_mat(rows, columns, [rational(x) for x in M.ravel()])

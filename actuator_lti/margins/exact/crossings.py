@@ -2,19 +2,24 @@
 
 import math
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
+import numpy as np
 from flint import acb, arb, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.real_roots import FEW, positive_roots
+from actuator_lti.margins.exact.real_roots import EVERYWHERE, FEW, Spans, octaves, positive_roots
 from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96
 _TURN_BITS = 48
+_LARGE = 60  # of the degree of a slope: its roots are looked for where the distance is small alone
+_SAMPLES = 200
+_SAME = 40  # bits: values this close are one
 _ACCURATE = 56  # bits of a figure
 _NEAR = 1e-3  # relative: a pair this close may be a touch
 _ZERO = 1e-18  # of a distance
@@ -126,8 +131,10 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
     candidates = [(_ratio(above, below, lowest=True), 0.0), (_ratio(above, below, lowest=False), math.inf)]
     slope = above.derivative() * below - above * below.derivative()
 
+    spans = _deepest(above, below) if slope.degree() > _LARGE else EVERYWHERE
+
     def stationary() -> list[tuple[float, float]] | None:
-        values = [(above(v) / below(v), v) for v, _ in positive_roots(slope)]
+        values = [(above(v) / below(v), v) for v, _ in positive_roots(slope, spans)]
         if not all(_settled(value) for value, _ in values):
             return None
         return [
@@ -139,6 +146,36 @@ def smallest(N: fmpz_poly, D: fmpz_poly, distance: Distance) -> tuple[float, flo
     found = at_enough_bits(stationary, _FIRST_BITS + slope.degree(), "the smallest distance to -1")
     value, w = min([*candidates, *found])
     return (value, w) if value > _ZERO else (0.0, w)
+
+
+def _deepest(above: fmpz_poly, below: fmpz_poly) -> Spans:
+    """Where the square of a distance is below the lowest of some samples, and of one in each such span."""
+    spans, level = EVERYWHERE, arb("inf")
+    with ctx.workprec(_FIRST_BITS + 2 * above.degree()):
+        places = [arb(2) ** x for x in np.linspace(*octaves(above * below), _SAMPLES).tolist()]
+        for _ in range(2):
+            level = min([level, *((above(v) / below(v)).upper() for v in places if below(v) > 0)])
+            man, exp = (level * (1 + arb((1, -_SAME)))).upper().man_exp()
+            over = above * (1 << max(-int(exp), 0)) - below * (man << max(int(exp), 0))
+            with ctx.workprec(_FIRST_BITS):
+                edges = [v for v, _ in positive_roots(over)]
+            if not edges:
+                return EVERYWHERE
+            ends = pairwise([edges[0] / 2, *edges, 2 * edges[-1]])
+            inside = [(a, b) for a, b in ends if not over((a + b) / 2) > 0]
+            places = [((a + b) / 2).mid() for a, b in inside]
+            spans = tuple(
+                (
+                    -math.inf if a < edges[0] else _log2(a) - _NEAR,
+                    math.inf if b > edges[-1] else _log2(b) + _NEAR,
+                )
+                for a, b in inside
+            )
+    return spans
+
+
+def _log2(v: arb) -> float:
+    return float(v.log().mid()) / math.log(2.0)
 
 
 def _settled(value: arb) -> bool:

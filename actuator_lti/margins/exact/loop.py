@@ -5,7 +5,7 @@ from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
-from flint import fmpq, fmpq_mat, fmpz, fmpz_poly
+from flint import fmpq, fmpz, fmpz_mat, fmpz_poly
 
 from actuator_lti.margins.exact.roots import HalfPlanes, half_planes, warped
 from actuator_lti.margins.given import ULP, Given
@@ -111,23 +111,11 @@ def exact_loop(given: Given) -> ExactLoop:
 
 @lru_cache(maxsize=64)
 def exact_polynomials(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
-    """Numerator and denominator in s or z, hidden modes among them, but for one factor of both.
-
-    Of a state space det(sI - A) and, as det(sI - A + b c) is that and c adj(sI - A) b, what they differ by.
-    """
-    if given.A is None:
-        (num, den), _ = integers(given.numerator, given.denominator)
-        return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
-    A, b, c = (exact_matrix(each) for each in (given.A, given.b[:, None], given.c[None]))
-    D = A.charpoly()
-    N = (A - b * c).charpoly() - D + rational(given.d) * D
-    return (N * D.denom() * N.denom()).numer(), (D * D.denom() * N.denom()).numer()
-
-
-def exact_matrix(M: Any) -> fmpq_mat:
-    """Of doubles."""
-    rows, columns = M.shape
-    return fmpq_mat(rows, columns, [rational(x) for x in M.ravel()])
+    """Numerator and denominator in s or z, hidden modes among them, times one power of two."""
+    if given.A is not None:
+        return _by_matrices(given)
+    (num, den), _ = integers(given.numerator, given.denominator)
+    return fmpz_poly(num[::-1]), fmpz_poly(den[::-1])
 
 
 def rational(x: Any) -> fmpq:
@@ -140,3 +128,45 @@ def integers(*arrays: Any) -> tuple[list[list[int]], int]:
     ratios = [[float(x).as_integer_ratio() for x in np.ravel(array)] for array in arrays]
     shift = max((below.bit_length() - 1 for part in ratios for _, below in part), default=0)
     return [[above << (shift - below.bit_length() + 1) for above, below in part] for part in ratios], shift
+
+
+def _by_matrices(given: Given) -> tuple[fmpz_poly, fmpz_poly]:
+    """D = det(sI - A), N = c adj(sI - A) b + d D."""
+    n = given.b.size
+    (A, d), shift = integers(given.A, given.d)
+    (b,), shift_b = integers(given.b)
+    (c,), shift_c = integers(given.c)
+    if not n:
+        return fmpz_poly(d), fmpz_poly([1 << shift])
+    whole = [A[k * n : k * n + n] for k in range(n)]
+    below = fmpz_poly([1])
+    for block in _blocks(given.A):
+        below *= fmpz_mat([[whole[j][k] for k in block] for j in block]).charpoly()
+    above = _numerator(whole, b, c, below)
+    # of 2^shift A: below is 2^(shift n) det(sI - A) at s 2^-shift, above has one power less
+    D, N = (fmpz_poly([x * (1 << (shift * k)) for k, x in enumerate(p.coeffs())]) for p in (below, above))
+    power = shift_b + shift_c
+    return N * (1 << (2 * shift)) + D * (d[0] << power), D * (1 << (shift + power))
+
+
+def _blocks(A: Any) -> list[list[int]]:
+    """States that act upon each other, directly or not: those of a chain of delays act one way alone."""
+    acts = (A != 0.0) | np.eye(len(A), dtype=bool)
+    for _ in range(len(A).bit_length()):
+        acts = acts.astype(float) @ acts > 0.0
+    return [np.flatnonzero(one).tolist() for one in np.unique(acts & acts.T, axis=0)]
+
+
+def _numerator(rows: list[list[int]], b: list[int], c: list[int], below: fmpz_poly) -> fmpz_poly:
+    """c adj(z I - M) b, where ``below`` is det(z I - M).
+
+    It is the polynomial part of ``below`` times the sum of c M^k b z^(-1-k).
+    """
+    n = len(rows)
+    M, state, out = fmpz_mat(rows), fmpz_mat(n, 1, b), fmpz_mat(1, n, c)
+    answer = []
+    for _ in range(n):
+        answer.append((out * state)[0, 0])
+        state = M * state
+    product = below * fmpz_poly(answer[::-1])
+    return product.right_shift(n) if product.degree() >= n else fmpz_poly()

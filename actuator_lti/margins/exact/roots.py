@@ -2,7 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
+from itertools import pairwise, zip_longest
 from typing import Any, TypeVar
 
 from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
@@ -72,7 +73,12 @@ class HalfPlanes:
     right: int  # roots with a positive real part, multiplicities counted
     at_zero: int  # multiplicity of the root zero
     border: tuple[tuple[arb, int], ...]  # w > 0 of the roots +-j w, with their multiplicity
-    roots: tuple[acb, ...]  # all of them, each as often as it is repeated
+    find: Callable[[], tuple[acb, ...]]
+
+    @cached_property
+    def roots(self) -> tuple[acb, ...]:
+        """All of them, each as often as it is repeated."""
+        return self.find()
 
     @property
     def values(self) -> tuple[complex, ...]:
@@ -85,7 +91,7 @@ class HalfPlanes:
         return self.at_zero + 2 * sum(times for _, times in self.border)
 
 
-NOTHING_HIDDEN = HalfPlanes(0, 0, (), ())
+NOTHING_HIDDEN = HalfPlanes(0, 0, (), tuple)
 
 
 def half_planes(p: fmpz_poly) -> HalfPlanes:
@@ -109,15 +115,51 @@ def half_planes(p: fmpz_poly) -> HalfPlanes:
         border = sorted(real, key=lambda pair: float(pair[0].mid()))
         right = symmetric.degree() - sum(times for _, times in border)
         placed += [(side * _root_of(v), times) for v, times in squares for side in (1, -1)]
+    return HalfPlanes(right + _count_right(p), at_zero, tuple(border), partial(_repeated, p, placed))
 
-    def told() -> list[tuple[acb, int]] | None:
-        roots = all_roots(p)
-        return roots if all(root.real > 0 or root.real < 0 for root, _ in roots) else None
 
-    others = at_enough_bits(told, ctx.prec, "a closed-loop pole")
-    right += sum(times for root, times in others if root.real > 0)
-    every = tuple(root for root, times in (*placed, *others) for _ in range(times))
-    return HalfPlanes(right, at_zero, tuple(border), every)
+def _repeated(p: fmpz_poly, placed: list[tuple[acb, int]]) -> tuple[acb, ...]:
+    """Every root as often as it is repeated: those that are placed, and those of p, all off the axis."""
+    return tuple(root for root, times in (*placed, *_told_from_axis(p)) for _ in range(times))
+
+
+def _count_right(p: fmpz_poly) -> int:
+    """Roots to the right of the axis, of a polynomial that has none on it."""
+    right = right_of_axis(p)
+    return sum(times for root, times in _told_from_axis(p) if root.real > 0) if right is None else right
+
+
+def right_of_axis(p: fmpz_poly) -> int | None:
+    """Roots to the right of the axis, by the signs of Routh's first column; ``None`` where one is zero."""
+    for doubled in range(6):
+        with ctx.workprec((p.degree() + 64) << doubled):
+            column = _routh(p)
+        if all(x > 0 or x < 0 for x in column):
+            return sum((x > 0) is not (y > 0) for x, y in pairwise(column))
+    return None
+
+
+def _routh(p: fmpz_poly) -> list[arb]:
+    coefficients = [arb(c) for c in reversed(p.coeffs())]
+    above, row, column = coefficients[0::2], coefficients[1::2], coefficients[:1]
+    while row:
+        column.append(row[0])
+        ratio = above[0] / row[0]
+        pairs = zip_longest(above[1:], row[1:], fillvalue=arb(0))
+        above, row = row, [x - ratio * y for x, y in pairs]
+    return column
+
+
+def within(p: fmpz_poly, size: float) -> int | None:
+    """How many roots but zero are smaller than a size; ``None`` where one may be just as large."""
+    while p.degree() > 0 and p[0] == 0:
+        p = p.right_shift(1)
+    above, below = size.as_integer_ratio()
+    n = p.degree()
+    scaled = fmpz_poly([c * above**k * below ** (n - k) for k, c in enumerate(p.coeffs())])
+    moved = warped(scaled, n)
+    outside = right_of_axis(moved) if moved.degree() == n else None
+    return None if outside is None else n - outside
 
 
 def warped(p: Polynomial, degree: int) -> Polynomial:
@@ -131,6 +173,16 @@ def warped(p: Polynomial, degree: int) -> Polynomial:
 def _root_of(v: acb) -> acb:
     """s with v = -s^2, on the axis exactly where v is real and positive."""
     return acb(0, v.real.sqrt()) if v.imag.is_zero() and v.real > 0 else (-v).sqrt()
+
+
+def _told_from_axis(p: fmpz_poly) -> list[tuple[acb, int]]:
+    """All roots of a polynomial that has none on the axis, each known to lie left or right of it."""
+
+    def told() -> list[tuple[acb, int]] | None:
+        roots = all_roots(p)
+        return roots if all(root.real > 0 or root.real < 0 for root, _ in roots) else None
+
+    return at_enough_bits(told, ctx.prec, "a closed-loop pole")
 
 
 def at_enough_bits(find: Callable[[], Answer | None], bits: int, what: str) -> Answer:
