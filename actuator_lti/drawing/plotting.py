@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
+from actuator_lti.systems.resolvent import apart_about_minus_one, refined
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -164,15 +166,22 @@ def _mark_margins(
     magnitude: Axes, phase: Axes, margins: StabilityMargins, omega: np.ndarray, turned: np.ndarray
 ) -> None:
     magnitude.axhline(0.0, color=INK, linewidth=0.8)
-    for gain in margins.gain_margins:
+    words: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points", "fontsize": "small"}
+    words["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
+    gains, phases = (
+        np.arange(1, n + 1) / (n + 1) for n in map(len, (margins.gain_margins, margins.phase_margins))
+    )
+    for gain, part in zip(
+        margins.gain_margins, gains, strict=True
+    ):  # words of neighbours at different heights
         at = gain.frequency_rad_s / (2.0 * np.pi)
         magnitude.plot([at, at], [0.0, -gain.db], color=RED, linewidth=2.4)
-        magnitude.annotate(f"{gain.db:+.1f} dB", (at, -gain.db / 2.0), color=RED, fontsize="small")
-    for margin in margins.phase_margins:
+        magnitude.annotate(f"{gain.db:+.1f} dB", (at, -gain.db * part), color=RED, **words)
+    for margin, part in zip(margins.phase_margins, phases, strict=True):
         at = margin.frequency_rad_s / (2.0 * np.pi)
         here = float(np.interp(margin.frequency_rad_s, omega, turned))
         phase.plot([at, at], [here - margin.deg, here], color=GREEN, linewidth=2.4)
-        phase.annotate(f"{margin.deg:+.1f}°", (at, here - margin.deg / 2.0), color=GREEN, fontsize="small")
+        phase.annotate(f"{margin.deg:+.1f}°", (at, here - margin.deg * part), color=GREEN, **words)
         phase.axhline(here - margin.deg, color=INK, linewidth=0.8)
 
 
@@ -186,8 +195,12 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     >>> plot_nyquist(assemble_loops("ilr33-amber").position.open_loop).get_xlabel()
     'real part'
     """
+    from actuator_lti.systems.measured_response import is_measured
+
     (panel,) = _panels(axes, 1, figsize=(4.8, 4.8))
-    _, L = _curve(system)
+    omega, L = _curve(system)
+    if not is_measured(system):
+        L = refined(partial(response, system), omega, partial(apart_about_minus_one, frame=2.0))[1]
     turn = np.exp(1j * np.linspace(0.0, 2.0 * np.pi, 200))
     panel.plot(turn.real, turn.imag, color=MUTED, linewidth=0.8, linestyle="--")
     panel.plot(L.real, L.imag, label=label or None)

@@ -1,9 +1,11 @@
 """(p - A)^-1 B and C (p - A)^-1 B + D at many complex points p: s = jw, or z = exp(jwT)."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+HALVED, MOST = 7, 3000  # times that an interval too long on paper is halved, and points at which that ends
 _ENTRIES = 1 << 15  # of the matrices solved in one call: what the cache holds
 
 
@@ -56,3 +58,34 @@ def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
         solved = np.linalg.solve(regular, right)
         solved[singular] = np.nan
         return solved
+
+
+def refined(
+    respond: Callable[[np.ndarray], np.ndarray],
+    omega_rad_s: np.ndarray,
+    apart: Callable[[np.ndarray], np.ndarray],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies and response, halved between neighbours for as long as a figure has them ``apart``."""
+    omega, values = omega_rad_s, respond(omega_rad_s)
+    for _ in range(HALVED):
+        long = apart(values)
+        if not long.any() or len(omega) > MOST:
+            break
+        middle = np.sqrt(omega[1:] * omega[:-1])[long]
+        order = np.argsort(np.concatenate([omega, middle]))
+        values = np.concatenate([values, respond(middle)])[order]
+        omega = np.concatenate([omega, middle])[order]
+    return omega, values
+
+
+def apart_about_minus_one(values: np.ndarray, frame: float) -> np.ndarray:
+    """Which neighbours are apart in a Nyquist figure of that half width around -1."""
+    near = np.abs(values + 1.0) < 2.5 * frame
+    return (np.abs(np.diff(values)) > 0.04 * frame) & (near[1:] | near[:-1])
+
+
+def apart_in_decibels(values: np.ndarray, span_db: float) -> np.ndarray:
+    """Which neighbours are apart in a Nichols chart that goes so far up and down: by 1 dB, or by 7 deg."""
+    with np.errstate(all="ignore"):
+        shown = np.abs(20.0 * np.log10(np.abs(values))) <= span_db
+        return (np.abs(np.log(values[1:] / values[:-1])) > 0.115) & (shown[1:] | shown[:-1])

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -9,12 +10,11 @@ from scipy.linalg import schur
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.systems.phase import unwrapped_phase_deg
-from actuator_lti.systems.resolvent import responses
+from actuator_lti.systems.resolvent import apart_about_minus_one, apart_in_decibels, refined, responses
 from analyses.linear.loop_figures import LoopFigures
 
 DECADES_BELOW = 2.0
 DECADES_ABOVE = 1.3
-HALVED = 7  # times that an interval too long on paper is halved
 LARGE = 60  # states: a triangular form pays from here on
 
 
@@ -127,16 +127,9 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
 
     Gives the frequencies, rad/s, and the values.
     """
-    omega, values = omega_rad_s, response_at(system, omega_rad_s)
-    for _ in range(HALVED):
-        near = np.abs(values + 1.0) < 2.5 * frame
-        long = (np.abs(np.diff(values)) > 0.04 * frame) & (near[1:] | near[:-1])
-        if not long.any() or len(omega) > 3000:
-            break
-        middle = np.sqrt(omega[1:] * omega[:-1])[long]
-        order = np.argsort(np.concatenate([omega, middle]))
-        values = np.concatenate([values, response_at(system, middle)])[order]
-        omega = np.concatenate([omega, middle])[order]
+    omega, values = refined(
+        partial(response_at, system), omega_rad_s, partial(apart_about_minus_one, frame=frame)
+    )
     shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
     kept = [0]  # points that a figure needs: one outside the frame as a gap, none too near to be told apart
     for k, value in enumerate(shown[1:], 1):
@@ -144,3 +137,11 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
         if np.isnan(value) != np.isnan(last) or abs(value - last) > 0.006 * frame:
             kept.append(k)
     return omega[kept], shown[kept]
+
+
+def nichols_curve(system: Any, omega_rad_s: np.ndarray, span_db: float) -> Curve:
+    """Sample L(jw) closely enough for a Nichols chart that goes so far up and down."""
+    return curve(
+        system,
+        refined(partial(response_at, system), omega_rad_s, partial(apart_in_decibels, span_db=span_db))[0],
+    )

@@ -170,10 +170,11 @@ class Sketch:
         return [float(value) for value in values[np.searchsorted(ends, list(ranks), side="right")]]
 
     def histogram(self) -> tuple[tuple[float, ...], tuple[int, ...]]:
-        """Edges and counts of bins of equal width, for drawing."""
+        """Edges and counts of bins of equal width, twice the cube root of the values, for drawing."""
         if not self.maximum > self.minimum:
             return ((self.minimum, self.maximum), (self.finite,)) if self.finite else ((), ())
-        edges = np.linspace(self.minimum, self.maximum, SHOWN_BINS + 1)
+        bins = min(SHOWN_BINS, math.ceil(2.0 * self.finite ** (1.0 / 3.0)))
+        edges = np.linspace(self.minimum, self.maximum, bins + 1)
         counts, _ = np.histogram(self.values, edges, weights=self.counts)
         return tuple(edges.tolist()), tuple(counts.tolist())
 

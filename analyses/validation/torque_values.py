@@ -71,7 +71,7 @@ def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: 
 
 def torque_unit(design: Design) -> str:
     """Of a torque, or of a force."""
-    return "N" if design.axis == "linear" else "N*m"
+    return "N" if design.axis == "linear" else "N m"
 
 
 def loads_of(design: Design) -> tuple[float, ...]:

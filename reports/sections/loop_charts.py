@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_lti.margins.results import StabilityMargins
 from analyses.linear.loop_figures import LoopFigures
-from analyses.linear.responses import Curve, answer_curve, curve, nyquist_curve, response_at
+from analyses.linear.responses import Curve, answer_curve, curve, nichols_curve, nyquist_curve, response_at
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin
@@ -201,7 +201,7 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
 
 def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
     """Draw gain over phase, and about each critical point in reach where S or T exceeds 6 dB."""
-    one = curve(figures.loop.plain_open, grid)
+    one = nichols_curve(figures.loop.plain_open, grid, NICHOLS_SPAN_DB)
     chart = style.Chart(width=style.WIDE, height=360.0, legend=True)
     panel = chart.panel("phase, deg", "magnitude, dB", by_point=True)
     shown = np.abs(one.magnitude_db) <= NICHOLS_SPAN_DB

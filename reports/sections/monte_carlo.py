@@ -18,6 +18,7 @@ from analyses.monte_carlo.result import (
 )
 from reports import document as doc
 from reports.charts import style
+from reports.charts.axis import linear_ticks
 from reports.numbers import capital, or_none
 from reports.sections.margins import finite
 from reports.sections.names import in_shown, unit_words
@@ -233,6 +234,7 @@ def _histogram(panel: style.Panel, result: MonteCarloResult, odds: Odds, column:
         elif value is not None:
             panel.note(f"{name} {value:g} {unit}: off scale", corner="top left", colour=style.MUTED)
     panel.x.label, panel.y.label, panel.x.grid = unit, "samples", False
+    panel.y.ticks = [tick for tick in linear_ticks(0.0, 1.35 * max(counts)) if tick[0].is_integer()]
 
 
 def _driver_table(result: MonteCarloResult) -> doc.Block:

@@ -6,7 +6,7 @@ import pytest
 
 from actuator_lti import assemble_loops, unwrapped_phase_deg
 from actuator_lti.systems.plain_system import PlainSystem
-from analyses.linear.responses import LARGE, curve, response_at
+from analyses.linear.responses import LARGE, curve, nichols_curve, response_at
 
 PERIOD_S = 1e-3
 SIGNED = [(1, [1, 1]), (-1, [1, 1]), (1, [1, 0]), (-1, [1, 1, 0]), (1, [1, 1, 0, 0]), (1, [1, 1, 0, 0, 0])]
@@ -44,6 +44,14 @@ def test_speed_against_a_spring_begins_at_90_deg_whatever_rounding_does_to_its_z
     phase = curve(loop, OMEGA).phase_deg
     assert phase[0] == pytest.approx(90.0, abs=1.0)
     assert (np.abs(np.diff(phase)) < 180.0).all()
+
+
+def test_a_resonance_is_round_in_a_nichols_chart() -> None:
+    """1/(s^2 + 0.01 s + 1): most of half a turn lies within 1 rad/s +- 1 %, two points of the coarse grid."""
+    drawn = nichols_curve(control.tf([1.0], [1.0, 1e-2, 1.0]), np.geomspace(0.1, 10.0, 240), 60.0)
+    assert np.abs(np.diff(drawn.phase_deg)).max() < 7.0
+    assert np.abs(np.diff(drawn.magnitude_db)).max() < 1.01
+    assert drawn.magnitude_db.max() == pytest.approx(40.0, abs=0.1)
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-15, -1e-15, 1e-12, -1e-12])

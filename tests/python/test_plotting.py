@@ -41,6 +41,16 @@ def test_a_bode_figure_shows_the_loop_and_its_margins(form: str) -> None:
             assert x.max() <= 0.5 / loop.period_s
 
 
+def test_a_resonance_is_round_and_its_margins_stand_apart() -> None:
+    """The fin's two margins near Nyquist lie within a tenth of a decade."""
+    loops = assemble_loops("fin")
+    x, y = loops.velocity.plot_nyquist().lines[1].get_data()
+    seen = (np.abs(x) < 2.0) & (np.abs(y) < 2.0)
+    assert np.abs(np.diff(x + 1j * y))[seen[1:] & seen[:-1]].max() < 0.081
+    heights = [text.xy[1] for text in loops.position.plot_bode()[0].texts]
+    assert np.abs(np.diff(heights)).min() > 20.0
+
+
 def test_all_loops_in_one_figure_axes_of_ones_own_and_steps_that_end_at_one() -> None:
     loops = assemble_loops("ilr33-amber")
     both = loops.plot_bode()

@@ -172,6 +172,18 @@ def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp
     assert steps[-1] == ((600, 600) if damage is None else (1000, 1000))
 
 
+@pytest.mark.parametrize(("count", "bins"), [(8, 4), (30, 7), (1000, 20), (64_000, 60)])
+def test_few_samples_are_shown_in_few_bins(count, bins, design):
+    """Twice the cube root of the count, and at most 60."""
+    task = SampleTask(design, sampler_of(design), time_figures=False)
+    values = np.random.default_rng(0).normal(10.0, 1.0, count)
+    block = dict.fromkeys(task((0, 1)), values)
+    sketch = next(iter(reduced(task, {**block, "sample": np.arange(count)}).columns.values()))
+    edges, counts = sketch.histogram()
+    assert (len(counts), sum(counts)) == (bins, count)
+    assert (edges[0], edges[-1]) == pytest.approx((values.min(), values.max()))
+
+
 @pytest.mark.parametrize("count", [20_000, 100_000])
 def test_what_many_samples_come_to_does_not_grow(count, design):
     """At most so many bins a column, in memory and in the file, with all counts right."""

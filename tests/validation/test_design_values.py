@@ -109,7 +109,7 @@ def test_thirds_of_a_map_and_directions_are_told_apart() -> None:
 def test_closed_forms_of_the_rows() -> None:
     """By hand from the equations: what the simulator shows, not what the code predicts."""
     by_load = 1.34e-3 * 8.0
-    breakaway = found(AMBER, "breakaway_torque", "under 8 N*m, forward")
+    breakaway = found(AMBER, "breakaway_torque", "under 8 N m, forward")
     assert breakaway == pytest.approx(2.25e-3 + by_load, rel=1e-9)
     steady = -(2.25e-3 + by_load + 5.25e-6 * 377.0)
     assert found(AMBER, "steady_torque", "at -377 rad/s under 8") == pytest.approx(steady, rel=1e-9)
@@ -122,7 +122,7 @@ def test_closed_forms_of_the_rows() -> None:
     assert found(fin, "steady_torque", "at 240 rad/s under -8") == pytest.approx(steady, rel=1e-9)
     assert found(fin, "half_play", "forward") == pytest.approx(0.75e-3, rel=1e-9)
     joint = load_design("joint")
-    assert found(joint, "breakaway_torque", "under 0 N*m, forward") == pytest.approx(1.2 * 0.06, rel=1e-9)
+    assert found(joint, "breakaway_torque", "under 0 N m, forward") == pytest.approx(1.2 * 0.06, rel=1e-9)
     assert found(joint, "output_count") == pytest.approx(2.0 * pi / 524288, rel=1e-12)
     held = changed(AMBER, limits={"peak_time_s": 1.0})  # model.md section 6: r = 3, 1 s
     assert found(held, "overload_time") == pytest.approx(8.490187, abs=1e-6)
