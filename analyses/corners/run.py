@@ -91,10 +91,10 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     made = []
     for name, words, there in _made(design, asked):
+        refused = {key: f"{key} = {value}: {why}" for key, value, why in contradictions(there)}
         there = replace(there, requirements=kept)
         figures = all_loop_figures(assemble_loops(there))
         verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, _not_here))
-        refused = {key: f"{key} = {value}: {why}" for key, value, why in contradictions(there)}
         made.append(Corner(name, words, there, figures, verdicts, refused))
     return Corners(design, asked, tuple(made), left_out)
 
