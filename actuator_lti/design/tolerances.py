@@ -1,6 +1,6 @@
 """Tolerances: read from the design file, made absolute, checked against the allowed range."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any, get_args, get_type_hints
 
@@ -12,6 +12,7 @@ from actuator_lti.files.tree import Tree
 
 Parse = Callable[[Any], float]
 _KEYS = ("kind", "half_width", "std", "lower", "upper")
+_TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"  # one constant, moved by one factor
 _KINDS: tuple[str, ...] = get_args(get_type_hints(Tolerance)["kind"])
 
 
@@ -89,3 +90,26 @@ def tolerances(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
     return tuple(
         (p.path, p.value, p.tolerance) for p in design.parameters.values() if p.tolerance is not None
     )
+
+
+def drawn(design: Design) -> tuple[tuple[str, float, Tolerance], ...]:
+    """Those of `tolerances` that vary on their own.
+
+    Of torque and back-EMF constant the former leads, unless a correlation says how the latter goes.
+    """
+    every = tolerances(design)
+    stated = any(_BACK_EMF in (pair.first, pair.second) for pair in design.correlations)
+    led = not stated and any(path == _TORQUE for path, *_ in every)
+    return tuple(each for each in every if not (led and each[0] == _BACK_EMF))
+
+
+def together(design: Design, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values (SI, or arrays of them) with the other one of torque and back-EMF constant, by the same factor.
+
+    ``design`` is the nominal one; where both have a value in ``values`` both stay.
+    """
+    for path, other in ((_TORQUE, _BACK_EMF), (_BACK_EMF, _TORQUE)):
+        if path in values and other not in values and {path, other} <= design.parameters.keys():
+            now, then = (float(design.parameters[one].value) for one in (path, other))
+            return {**values, other: values[path] * (then / now)}
+    return dict(values)

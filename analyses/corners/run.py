@@ -10,7 +10,7 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.access import with_values
 from actuator_lti.design.checks import contradictions
 from actuator_lti.design.model import Design, Temperature, Tolerance
-from actuator_lti.design.tolerances import tolerances
+from actuator_lti.design.tolerances import drawn, together
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.corners.asked import Asked
@@ -63,9 +63,6 @@ class Corners:
     def passed(self) -> bool:
         """Whether every corner passes, and nothing is left out that is not waived."""
         return self.verdict.passes()
-
-
-_TORQUE, _BACK_EMF = "motor.torque_constant", "motor.back_emf_constant"
 
 
 def corners(design: Design, asked: Asked | None = None) -> Corners:
@@ -153,7 +150,7 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
     One at a time, the worst over the loops counts; a number that worsens it at neither end stays. Torque
     and back-EMF constant are one constant and go together.
     """
-    ends = [end for each in tolerances(design) for end in _ends(design, *each)]
+    ends = [end for each in drawn(design) for end in _ends(design, *each)]
     base = {path: float(design.parameters[path].value) for end in ends for path in end}
     try:
         figures = population_figures(moved(design, base, ends), design)
@@ -171,12 +168,5 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
 
 
 def _ends(design: Design, path: str, nominal: float, tolerance: Tolerance) -> list[dict[str, float]]:
-    """Both ends of a range, each with what goes with it; none for what goes with another."""
-    has_both = _TORQUE in design.parameters and _BACK_EMF in design.parameters
-    if path == _BACK_EMF and has_both and design.parameters[_TORQUE].tolerance is not None:
-        return []
-    ends = [{path: float(end)} for end in Factor(path, nominal, tolerance).box]
-    if path == _TORQUE and has_both:
-        back = float(design.parameters[_BACK_EMF].value)
-        return [{**end, _BACK_EMF: back * end[path] / nominal} for end in ends]
-    return ends
+    """Both ends of a range, each with what goes with it."""
+    return [together(design, {path: float(end)}) for end in Factor(path, nominal, tolerance).box]

@@ -20,6 +20,7 @@ from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.tolerances import together
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
@@ -207,7 +208,7 @@ def _worst_cases(
         case = worst_case(quick, requirement, np.array([sample for _, sample, _ in tally.worst]))
         name = f"worst-{place:02d}-{slug(requirement.id)}"
         title = f"{design.title or design.name}: worst case for {requirement.id}"
-        changed = with_values(design, case.parameters, check=False)
+        changed = with_values(design, together(design, case.parameters), check=False)
         titled = replace(changed, name=f"{slug(design.name)}-{name}", title=title)
         path = folder / f"{name}.toml"
         write_bytes(path, write_design(titled).encode())

@@ -22,6 +22,7 @@ from actuator_lti.batch import Population, drive_figures, linear_figures, variab
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.design.model import Design
+from actuator_lti.design.tolerances import together
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree
@@ -202,7 +203,7 @@ class SampleTask:
 
     def figures(self, draws: np.ndarray) -> Arrays:
         """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""
-        population = Population(self.design, as_values(self.sampler.paths, draws), len(draws))
+        population = Population(self.design, as_values(self.design, self.sampler.paths, draws), len(draws))
         linear = linear_figures(
             population,
             operating_point=self.operating_point,
@@ -256,4 +257,4 @@ def replay(design: Design, sampler: Sampler, number: int) -> Design:
     """The design of one sample, by its number."""
     values = sampler.draw(number, 1)[0]
     changes = {path: float(v) for path, v in zip(sampler.paths, values, strict=True)}
-    return with_values(design, changes, check=False)
+    return with_values(design, together(design, changes), check=False)

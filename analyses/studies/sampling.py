@@ -18,9 +18,9 @@ from scipy.special import ndtr, ndtri
 
 from actuator_lti.asked.quantities import with_unit
 from actuator_lti.bounds import CSV_COLUMNS, TABLE_BYTES, TABLE_ROWS
-from actuator_lti.design import tolerances
 from actuator_lti.design.fields import Structure, field_of
 from actuator_lti.design.model import Design, Tolerance
+from actuator_lti.design.tolerances import drawn, together
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import read_bytes, shown, shown_path
 from actuator_lti.start.extras import need
@@ -205,7 +205,7 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     (1, 4)
     """
     taken, where = set(table.paths) if table else set(), design.origin or None
-    factors = tuple(Factor(p, value, t) for p, value, t in tolerances(design) if p not in taken)
+    factors = tuple(Factor(p, value, t) for p, value, t in drawn(design) if p not in taken)
     for factor in factors:
         allowed, ends = field_of(factor.path), factor.quantile(np.array([_HALF_STEP, 1.0 - _HALF_STEP]))
         if allowed is not None and not all(allowed.accepts(float(end)) for end in ends):
@@ -258,6 +258,6 @@ def _parquet(data: bytes, where: str) -> pd.DataFrame:
     return file.read().to_pandas()
 
 
-def as_values(paths: Sequence[str], draws: np.ndarray) -> Mapping[str, np.ndarray]:
-    """Columns of draws by dotted key, as `actuator_lti.batch.Population` takes them."""
-    return {path: np.ascontiguousarray(draws[:, k]) for k, path in enumerate(paths)}
+def as_values(design: Design, paths: Sequence[str], draws: np.ndarray) -> Mapping[str, np.ndarray]:
+    """Columns of draws by dotted key, as `actuator_lti.batch.Population` takes them, and what they move."""
+    return together(design, {path: np.ascontiguousarray(draws[:, k]) for k, path in enumerate(paths)})

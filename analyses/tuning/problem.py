@@ -11,13 +11,14 @@ import numpy as np
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
-from actuator_lti.design import parameter_value, paths_of, tolerances
+from actuator_lti.design import parameter_value, paths_of
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.tolerances import drawn
 from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
-from analyses.studies.sampling import Factor, correlation_of, semidefinite_root
+from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
 GAINS = (
@@ -86,7 +87,7 @@ class Problem:
     def toleranced(self) -> tuple[Factor, ...]:
         """All toleranced parameters that are no gain."""
         known = set(variable_paths(self.design)) - set(self.paths)
-        return tuple(Factor(p, v, t) for p, v, t in tolerances(self.design) if p in known)
+        return tuple(Factor(p, v, t) for p, v, t in drawn(self.design) if p in known)
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -157,7 +158,7 @@ class Problem:
         """Linear figures of every candidate at every corner, and the search's account of them."""
         count, many = len(gains), len(corners)
         values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
-        values |= {f.path: np.tile(corners[:, k], count) for k, f in enumerate(factors)}
+        values |= as_values(self.design, [f.path for f in factors], np.tile(corners, (count, 1)))
         self.evaluations += count * many
         population = Population(self.design, values, count * many)
         return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)

@@ -10,6 +10,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.tolerances import together
 from actuator_lti.loops import assemble_loops
 from analyses.comparison.found import LargeSignal
 from analyses.finite import finite
@@ -17,6 +18,7 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
 from analyses.specification.requirements import RequirementVerdict, judged
+from analyses.studies.sampling import as_values
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
 
@@ -130,7 +132,7 @@ def confirm(
             rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
     verdicts: list[RequirementVerdict] = []
     for corner, asked in rows.items():
-        design = with_values(tuned, dict(corner), check=False)
+        design = with_values(tuned, together(tuned, dict(corner)), check=False)
         figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
         for requirement in asked:
             found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
@@ -150,8 +152,8 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tup
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
-    points = problem.all_corners[[0, worst][: len(names)]].T
-    values = {f.path: column for f, column in zip(problem.factors, points, strict=True)}
+    points = problem.all_corners[[0, worst][: len(names)]]
+    values = as_values(tuned, [f.path for f in problem.factors], points)
     population, made = Population(tuned, values, len(names)), []
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)

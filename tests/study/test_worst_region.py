@@ -7,12 +7,14 @@ import pytest
 from scipy.stats import chi2, norm
 from toleranced import normal, uniform
 
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import load_design, read_design_text, write_design
 from actuator_lti.design.model import Correlation, Design, Tolerance
 from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.to_design import design_with_fit
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+from analyses.monte_carlo.task import replay
 from analyses.monte_carlo.worst import Region
 from analyses.studies.sampling import Sampler, Table, correlation_of, sampler_of, semidefinite_root
 from analyses.tuning.problem import loop_requirements, problem_of
@@ -108,6 +110,30 @@ def _tied(coefficient: float = 1.0) -> Design:
     pair = Correlation(first=KM, second=KE, coefficient=coefficient)
     tied = replace(design, parameters=parameters, correlations=(pair,))
     return read_design_text(write_design(tied))
+
+
+@pytest.mark.parametrize("toleranced", [(KM,), (KE,), (KM, KE)])
+def test_torque_and_back_emf_constant_move_by_one_factor(tmp_path, toleranced) -> None:
+    """Without a word on how they go together: samples, worst cases and corners of the tuning."""
+    base = read_design_text(write_design(load_design("ilr33-amber"))).with_values({KE: 6.1e-3})
+    wide = {path: Tolerance(kind="uniform", text="20 %", half_width=0.2 * base.parameters[path].value)
+            for path in toleranced}  # fmt: skip
+    kept = {path: replace(one, tolerance=wide.get(path)) for path, one in base.parameters.items()}
+    design = read_design_text(write_design(replace(base, parameters=kept)))
+    study = monte_carlo(design, tmp_path, MonteCarloSettings(samples=64))
+    made = [replay(design, sampler_of(design), k) for k in range(8)]
+    made += [load_design(case.file) for case in study.worst]
+    ratios = [one.motor.torque_constant_Nm_A / one.motor.back_emf_constant_Vs_rad for one in made]
+    assert ratios == pytest.approx(len(made) * [5.9 / 6.1], rel=1e-9)
+    assert np.ptp([one.motor.torque_constant_Nm_A for one in made]) > 1e-3
+    problem = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    assert len(problem.all_corners) == 3
+    factor = np.array([1.0, 0.8, 1.2])
+    gains = {path: np.full(3, value) for path, value in zip(problem.paths, problem.start, strict=True)}
+    values = {**gains, KM: 5.9e-3 * factor, KE: 6.1e-3 * factor}
+    moved = linear_figures(Population(design, values, 3), held=True)
+    found = problem.figure("bandwidth", "position", problem.start[None], problem.all_corners)[0]
+    assert found == pytest.approx(moved.quantity("bandwidth", "position"), rel=1e-9)
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
