@@ -10,7 +10,7 @@ from reports import document as doc
 from reports import scripts
 from reports.glossary import TERMS, glossary, meaning
 from reports.html import environment, script
-from reports.live.keys import SLIDER_FACTOR, followed
+from reports.live.keys import SLIDER_FACTOR, UNUSED, ZERO, followed
 from reports.scripts import asset
 
 TEXT, GRAPHICS = 4.5, 3.0
@@ -104,3 +104,9 @@ def test_a_heading_of_a_table_says_its_line() -> None:
     assert found["Disk margin"] == TERMS["Disk margin"]
     assert found["Gain margin"] == QUANTITIES["gain_margin"].description
     assert found["No term"] == ""
+
+
+def test_a_key_that_is_zero_has_that_for_its_reason() -> None:
+    why = {one["path"]: one["why"] for one in followed(load_design("joint")).fixed}
+    assert why["command.filter_time"] == why["motor.cogging"] == ZERO
+    assert why["load.moment_max"] == UNUSED
