@@ -15,6 +15,7 @@ from ._response import (
     RESONANCE,
     SENSITIVITY,
     closed_loop,
+    evaluate,
     quantity,
     quantity_at,
     response_at,
@@ -180,9 +181,23 @@ def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, stat
             continue
         f1 = quantity_at(SENSITIVITY, k, xs, rs, ss, 1.0, 0.0)
         f2 = quantity_at(SENSITIVITY, k + 1, xs, rs, ss, 1.0, 0.0)
-        if f1 < 0.0 and f2 >= 0.0:
-            x, rr, ri = zero_in(k, SENSITIVITY, xs, rs, ss, 1.0, 0.0, n, h, b, c, work, state, exchanged)
-            _keep_modulus(math.hypot(1.0 + rr, ri), x, row)
+        steep, width = math.hypot(f1 * before, f2 * after), xs[k + 1] - xs[k]
+        # steeper at its ends than a cubic that only rises or only falls (Fritsch, Carlson 1980)
+        parts = 8 if f1 * f2 > 0.0 and steep * width > 3.0 * abs(after - before) else 1
+        for i in range(1, parts + 1):
+            x1, x2 = xs[k] + width * (i - 1) / parts, xs[k] + width * i / parts
+            f = f2 if i == parts else _rise(x2, n, h, b, c, work, state, exchanged)
+            if f1 < 0.0 and f >= 0.0:
+                x, rr, ri = root(SENSITIVITY, 1.0, 0.0, x1, f1, x2, f, n, h, b, c, work, state, exchanged)
+                _keep_modulus(math.hypot(1.0 + rr, ri), x, row)
+            f1 = f
+
+
+@kernel
+def _rise(x, n, h, b, c, work, state, exchanged):
+    """How |1 + L| rises at an angle, by its sign."""
+    rr, ri, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
+    return quantity(SENSITIVITY, rr, ri, slope_r, slope_i, 1.0, x, 0.0)
 
 
 @kernel

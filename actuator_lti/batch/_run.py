@@ -30,7 +30,7 @@ def _around_poles(n, poles, low, points, first):
             real, imaginary = poles[2 * which * n + i], poles[(2 * which + 1) * n + i]
             angle = abs(math.atan2(imaginary, real))
             width = abs(1.0 - math.hypot(real, imaginary))
-            if imaginary <= 0.0 or width > 0.3 * angle or angle > 0.99 * math.pi:
+            if imaginary <= 0.0 or width > 0.3 * angle:
                 continue
             for side in range(3):
                 x = angle + (side - 1.0) * width

@@ -44,7 +44,9 @@ def each(population: Population, figures):
 
 LOUD = with_values(load_design("ilr33-amber"), {"control.position.gain": 4800.0})  # its S has no peak
 SURE = (*(scattered(name, 12, seed=5) for name in NAMES), Population(LOUD, {}, 1))
-RANDOM = tuple(Population(one, {}, 1) for one in drives(90_209, 8))  # some of which rounding decides
+# of the random ones rounding decides some; 90010 dips beside a mode that hardly shows, 90107 beside Nyquist
+SEEDS = (90_010, 90_107, *range(90_209, 90_217))
+RANDOM = tuple(Population(one, {}, 1) for seed in SEEDS for one in drives(seed, 1))
 
 
 @pytest.mark.parametrize("population", [*SURE, *RANDOM], ids=lambda each: each.design.name)
