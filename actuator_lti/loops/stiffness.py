@@ -29,7 +29,8 @@ POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
 BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
 LOST_MOTION_SHARE = 0.03  # of the rated moment
-_SLOW_HZ = 1e-5  # where the limit at zero frequency is read
+_REST_HZ, _SLOW_HZ = 1e-12, 1e-5  # where the limit at zero frequency is read; its slope
+_AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-7 by one free integration
 
 
 @dataclass(frozen=True)
@@ -80,9 +81,10 @@ def stiffness_at(response: Compliance, frequency_hz: npt.ArrayLike) -> npt.NDArr
 
 def static_stiffness(response: Compliance) -> Any:
     """|K| at zero frequency, by its slope near there: 0 of a drive that runs away, inf with an integral."""
-    low, high = np.moveaxis(np.abs(stiffness_at(response, [_SLOW_HZ, 10.0 * _SLOW_HZ])), -1, 0)
+    hertz = [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]
+    rest, low, high = np.moveaxis(np.abs(stiffness_at(response, hertz)), -1, 0)
     gone = ~np.isfinite(low) | (high < 0.5 * low)
-    return _plain(np.where(gone, np.inf, np.where(high > 2.0 * low, 0.0, low)))
+    return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, rest)))
 
 
 def lost_motion_rad(design: Design) -> Any:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_lti import assemble_loops, load_design
+from actuator_lti import assemble_loops, load_design, read_design_text
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
@@ -16,6 +16,33 @@ from nonlinear import commands, simulate
 from tests.changed import changed
 from tests.loops.two_mass import drive_e
 
+SLOW = """
+[design]
+name = "slow"
+[motor]
+rotor_inertia = "1e-3 kg*m^2"
+resistance = "0.6 ohm"
+inductance = "5 mH"
+torque_constant = "0.75 N*m/A"
+back_emf_constant = "0.75 V*s/rad"
+[[gear]]
+name = "g"
+ratio = 1.0
+[load]
+inertia = "1e-4 kg*m^2"
+path = "back-drivable"
+[friction]
+law = "coulomb"
+[encoder]
+speed = "ideal"
+[limits]
+voltage = "24 V"
+[control]
+period = "1 ms"
+computing_delay = "0 s"
+[control.position]
+gain = "1e-5 V/rad"
+"""
 AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
 
 
@@ -60,6 +87,15 @@ def test_static_stiffness_by_hand() -> None:
     ]
     verdicts = evaluate_requirements(replace(drive_e(), requirements=tuple(stiff)))
     assert [one.verdict for one in verdicts] == ["met", "not met"]
+
+
+def test_a_drive_that_creeps_for_hours_has_a_stiffness_and_one_without_position_loop_none() -> None:
+    """P on voltage: Kp kM N^2/R, here with a time constant kE kM/R over that of a day."""
+    slow = read_design_text(SLOW)
+    assert drive_figure(slow, "static_stiffness") == pytest.approx(1e-5 * 0.75 / 0.6, rel=1e-6)
+    velocity = SLOW.replace("[control.position]", "[control.velocity]").replace("1e-5 V/", "1e-2 V*s/")
+    free = read_design_text(velocity)
+    assert drive_figure(free, "static_stiffness") == 0.0
 
 
 def test_lost_motion_is_a_requirement() -> None:
