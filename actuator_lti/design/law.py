@@ -74,7 +74,7 @@ class Law(StateSpace):
 
     inputs: Annotated[tuple[LawInput, ...], names("the signals that it takes, a column of B and D each "
         "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, the others of "
-        "the motor")]
+        "the motor; the speed is held between updates of a velocity stage")]
     file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
         "their place")] = ""
     L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "
