@@ -161,6 +161,6 @@ def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]
     [('12 V', 12.0), (14.0, 14.0)]
     """
     base = load_design(design)
-    if not isinstance(values, Iterable):
+    if isinstance(values, str) or not isinstance(values, Iterable):
         raise InputError(f"values = {shown(values)}: allowed: several, such as [12.0, 14.0]")
     return tuple(SweepPoint(value, base.with_values({path: value})) for value in values)

@@ -25,7 +25,10 @@ def _columns(system: Any) -> tuple[Any, ...]:
 
     if len(system.num) != 1:
         raise InputError(f"system: {len(system.num)} outputs; allowed: one, that of the stage")
-    A, B, C, D = zip(*map(tf2ss, system.num[0], system.den[0]), strict=True)
+    try:
+        A, B, C, D = zip(*map(tf2ss, system.num[0], system.den[0]), strict=True)
+    except ValueError as error:
+        raise InputError("system: improper; allowed: no more zeros than poles") from error
     return block_diag(*A), block_diag(*B), np.hstack(C), np.hstack(D)
 
 

@@ -13,14 +13,16 @@ phase of the exact sampled loop:
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from os import PathLike
 
 import numpy as np
 
+from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.drive.blocks import centre_rad_s
 from actuator_lti.drive.operating import Operating, OperatingPoint, RotorState
 from actuator_lti.drive.wiring import Drive, wire
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number
 from actuator_lti.loops.continuous import open_loop
 from actuator_lti.loops.flow import ALL
 from actuator_lti.loops.sampled import loop
@@ -64,7 +66,7 @@ class DelayBudget:
 
 
 def delay_budget(
-    design: Design,
+    design: Design | str | PathLike[str],
     loop_name: str,
     frequency_rad_s: float,
     operating_point: OperatingPoint = "sliding",
@@ -89,6 +91,7 @@ def delay_budget(
     InputError
         For a loop that the design does not have, or a frequency out of range.
     """
+    design = as_design(design)
     wired = wire(
         design, Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor, torques_held=torques_held)
     )
@@ -100,7 +103,7 @@ def delay_budget(
             f"control.{stage}.law: a delay budget is of gains and filters; allowed: without a law"
         )
     nyquist = np.pi / wired.period_s(loop_name)
-    if not 0 < frequency_rad_s < nyquist:
+    if not 0 < finite_number("frequency_rad_s", frequency_rad_s) < nyquist:
         raise InputError(f"frequency_rad_s = {frequency_rad_s}: between 0 and Nyquist, {nyquist:g} rad/s")
     omega = np.geomspace(frequency_rad_s * _LOW, frequency_rad_s, _GRID)
     bare, steps = _built_up(wired, loop_name, omega)

@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean, profile_onset_rad
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.drive.wiring import Drive
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, shown
 from actuator_lti.loops.result import Loops
 
 Response = Callable[[np.ndarray], np.ndarray]
@@ -93,14 +93,28 @@ class Onset:
     each_rad: Mapping[str, np.ndarray]  # A_k of every limiter
 
 
+def _frequencies(omega_rad_s: Any) -> np.ndarray:
+    try:
+        omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
+    except (TypeError, ValueError):
+        omega = np.array([np.nan])
+    if not np.isfinite(omega).all():
+        raise InputError(f"omega_rad_s = {shown(omega_rad_s)}: allowed: finite numbers, in rad/s")
+    return omega
+
+
 def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = None) -> Onset:
     """Border of linear validity of a drive over frequency (see `LimiterPath.onset_amplitude_rad`).
 
     Of the command as the user gives it: its rate and acceleration limit (``"profile"``) and the mean of a
     limited jerk come before all other limiters.
     """
-    omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
-    used = bias or {}
+    if not isinstance(loops, Loops):
+        raise InputError(f"loops = {shown(loops)}: allowed: what assemble_loops gives")
+    used, known = {} if bias is None else bias, ", ".join(loops.limiters) or "none"
+    if not isinstance(used, Mapping) or not used.keys() <= loops.limiters.keys():
+        raise InputError(f"bias = {shown(bias)}: allowed: numbers by the name of a limiter ({known})")
+    omega = _frequencies(omega_rad_s)
     mean = command_mean(loops.design)
     before = np.ones(omega.shape) if mean is None else np.abs(mean.response(omega))
     with np.errstate(divide="ignore"):

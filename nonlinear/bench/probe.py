@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, finite_number
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import Command
@@ -46,9 +46,8 @@ class Probe:
     def __post_init__(self) -> None:
         if self.point not in at.POINTS:
             raise InputError(f"probe point = {self.point!r}: must be one of {', '.join(at.POINTS)}")
-        if not np.isfinite(self.gain):
-            raise InputError(f"probe gain = {self.gain}: must be finite")
-        if not (np.isfinite(self.delay_samples) and self.delay_samples >= 0.0):
+        finite_number("probe gain", self.gain, "finite, a plain factor")
+        if finite_number("probe delay_samples", self.delay_samples, "zero or more, finite") < 0.0:
             raise InputError(f"probe delay_samples = {self.delay_samples}: must be zero or more")
         if isinstance(self.injection, np.ndarray) and not np.isfinite(self.injection).all():
             raise InputError(f"probe at {self.point}: injection holds values that are not finite")

@@ -126,6 +126,8 @@ class Run:
 
 def _design_row(design: Design, *switches: bool) -> Floats:
     """The row of a design alone."""
+    if not all(switch in (True, False) for switch in switches):
+        raise InputError(f"friction_on, limits_on = {shown(switches)}: allowed: True or False each")
     try:
         return _kept_row(design, *switches)
     except TypeError:  # a list in place of a tuple

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
-from actuator_lti.errors import NumericalError, finite_number, whole_number
+from actuator_lti.errors import InputError, NumericalError, finite_number, shown, whole_number
 from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
@@ -131,6 +131,9 @@ def simulate(
     ).row(tables)  # fmt: skip
     row[at.WITH_ENERGY] = energy
     row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
+    if not tanh_tolerance > 0.0 or not (progress is None or callable(progress)):
+        said = f"tanh_tolerance = {tanh_tolerance}, progress = {shown(progress)}"
+        raise InputError(f"{said}: allowed: a tolerance above 0, a function of (done, total) or None")
     row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
     record_every = min(whole_number("record_every", record_every), 2**53)
     row[at.RECORD_EVERY] = record_every
