@@ -45,7 +45,8 @@ class Encoder:
     """
 
     counts_per_rev: Annotated[int | None, integer("counts per motor revolution after quadrature (linear "
-        "axis without a screw: per metre)", 2**32)] = None
+        "axis without a screw: per metre): of the measured speed unless it is ideal, and of a law's angle; "
+        "the position controller sees the motor's angle uncounted", 2**32)] = None
     speed: Annotated[SpeedSource, choice("the speed itself, a difference of angles, or a tracking loop "
         "(observer)")] = "ideal"
     difference_samples: Annotated[int, integer("velocity periods that the difference spans", 64, "m")] = 1

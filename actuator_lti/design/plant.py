@@ -50,7 +50,7 @@ class Motor:
         "axis: rad per m)", "Z", unit="rad/{angle}",
         most=lambda design: _most_order(design, design.motor.cogging_Nm, 1.0), example="84")] = 1.0
     cogging_phase_rad: Annotated[float, quantity("phase of the cogging at motor angle zero; 180 deg: it "
-        "holds there", unit="rad", low=-7.0, high=7.0, example="180 deg")] = 0.0
+        "holds there, 0: it pushes the motor away", unit="rad", low=-7.0, high=7.0, example="180 deg")] = 0.0
     constants: Annotated[MotorConstants, choice("how the data sheet gives kM, kE, R and L: dc (phase-phase; "
         "a stepper per phase), rms-line (N m/A rms, V rms line-line, R and L line-line), peak-phase (dq: A "
         "and V peak of a phase, R and L per phase)")] = "dc"
