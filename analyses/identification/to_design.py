@@ -3,6 +3,7 @@
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
+from math import pi
 
 import numpy as np
 
@@ -23,6 +24,7 @@ TRUNCATION_STD = 6.5
 
 REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")
 PLAIN_KEYS = ("friction.viscous", "friction.dry_torque", *REVERSE)
+GRAVITY = ("gravity_sin", "gravity_cos")  # m g l cos(offset) and m g l sin(offset)
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
@@ -40,22 +42,37 @@ def joint_values(design: Design, model: Fit, *, inertia_to: str = INERTIAS[0]) -
             slopes[inertia_to] = {name: scale}
         elif parameter(name).key:
             slopes[parameter(name).key] = {name: 1.0}
-    if {"gravity_sin", "gravity_cos"} <= set(model.names):
+    found = [name for name in GRAVITY if name in model.names]
+    arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
+    per_mass = float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
+    if len(found) == 2:
         a, b = model["gravity_sin"], model["gravity_cos"]
-        arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
-        peak, per_mass = float(np.hypot(a, b)), float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
+        peak = float(np.hypot(a, b))
         size, turn = {"gravity_sin": a / peak, "gravity_cos": b / peak}, {"gravity_sin": -b, "gravity_cos": a}
         slopes["load.gravity.mass"] = {name: slope / per_mass for name, slope in size.items()}
         slopes["load.gravity.offset"] = {name: slope / peak**2 for name, slope in turn.items()}
         values |= {"load.gravity.mass": peak / per_mass, "load.gravity.offset": float(np.arctan2(b, a))}
+    for name in found if len(found) == 1 else ():
+        share = _share(design, name)
+        if model[name] * share > 0.0:
+            slopes["load.gravity.mass"] = {name: 1.0 / (share * per_mass)}
+            values["load.gravity.mass"] = model[name] / (share * per_mass)
     return model.mapped(slopes, values)
 
 
-def with_structure(design: Design, model: JointModel) -> Design:
+def _share(design: Design, name: str) -> float:
+    """The part of m g l in the one term of a pendulum that was found, at the design's own offset."""
+    offset = 0.0 if design.load.gravity is None else design.load.gravity.offset_rad
+    if name == "gravity_sin":
+        return float(np.cos(offset))
+    return 1.0 if design.load.gravity is None else float(np.sin(offset))
+
+
+def with_structure(design: Design, model: Fit) -> Design:
     """The design with the parts that a model's values need: a friction map, a pendulum."""
     friction, load = design.friction, design.load
     gone = [path for path in design.parameters if path.startswith("friction.point.")]
-    if model.knots_rad_s is not None:
+    if isinstance(model, JointModel) and model.knots_rad_s is not None:
         points = tuple(
             FrictionPoint(speed_rad_s=_short(speed), torque_Nm=max(model[f"map_{k}"], 0.0))
             for k, speed in enumerate(model.knots_rad_s)
@@ -65,8 +82,9 @@ def with_structure(design: Design, model: JointModel) -> Design:
         gone += [path for path in design.parameters if path in PLAIN_KEYS]
     elif friction.points and "dry" in model.names:
         friction = replace(friction, points=())
-    if "gravity_sin" in model.names and load.gravity is None:
-        load = replace(load, gravity=Gravity(mass_kg=1.0, arm_m=1.0))
+    if set(GRAVITY) & set(model.names) and load.gravity is None:
+        upright = "gravity_sin" in model.names
+        load = replace(load, gravity=Gravity(mass_kg=1.0, arm_m=1.0, offset_rad=0.0 if upright else pi / 2))
     if friction is design.friction and load is design.load:
         return design
     return _without(replace(design, friction=friction, load=load), gone)
@@ -103,6 +121,7 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     Margins and Monte Carlo then inherit them. Correlations below 0.005 are left out; old ones between the
     same keys are replaced.
     """
+    fit = _possible(fit)
     values = {p: _short(float(v)) for p, v in zip(fit.names, fit.values, strict=True)}
     if "friction.viscous_reverse" in fit.names and design.friction.offset_torque_Nm:
         values["friction.offset_torque"] = 0.0
@@ -123,6 +142,16 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))
         parameters[path] = replace(parameters[path], source=source, grade="D", tolerance=tolerance)
     return with_correlations(replace(changed, parameters=FrozenMap(parameters)), fit)
+
+
+def _possible(fit: Fit) -> Fit:
+    """Without what came out below zero within its error and cannot be: there the design keeps its own."""
+    kept = []
+    for path in fit.names:
+        allowed, nothing = field_of(path), fit[path] < 0.0 <= fit[path] + 2.0 * fit.std(path)
+        if not nothing or allowed is None or allowed.accepts(fit[path]):
+            kept.append(path)
+    return fit.mapped({path: {path: 1.0} for path in kept}, {path: fit[path] for path in kept})
 
 
 def with_correlations(design: Design, fit: Fit) -> Design:

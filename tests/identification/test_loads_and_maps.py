@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Gravity
 from actuator_lti.errors import InputError
 from analyses.correlation.closed_loop import correlate_record
+from analyses.estimation.fit import Fit
 from analyses.identification.asked import Settings
 from analyses.identification.bench import identify_bench
 from analyses.identification.electrical import electrical_values, fit_electrical
@@ -75,6 +76,37 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
     assert gravity is not None
     assert gravity.peak_Nm == pytest.approx(9.80665 * 0.3, rel=2e-3)
     assert gravity.offset_rad == pytest.approx(0.2, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("term", "given", "mass_kg", "offset_rad"),
+    [
+        ("gravity_sin", None, 2.0, 0.0),
+        ("gravity_cos", None, 2.0, 0.5 * np.pi),
+        ("gravity_sin", 1.1, 2.0 / np.cos(1.1), 1.1),
+        ("gravity_cos", 1.1, 2.0 / np.sin(1.1), 1.1),
+        ("gravity_sin", 3.0, 0.5, 3.0),  # of the other sign than the design's: the design keeps its own
+    ],
+)
+def test_one_term_of_a_pendulum_is_written_at_the_offset_of_the_design(
+    term, given, mass_kg, offset_rad
+) -> None:
+    design = _joint()
+    if given is not None:
+        design = replace(
+            design, load=replace(design.load, gravity=Gravity(mass_kg=0.5, arm_m=1.0, offset_rad=given))
+        )
+    fit = Fit(names=(term,), values=np.array([2.0 * 9.80665]), covariance=np.array([[1e-4]]))
+    made = design_with_fit(with_structure(design, fit), joint_values(design, fit), "record").load.gravity
+    assert made is not None
+    assert (made.mass_kg, made.arm_m, made.offset_rad) == pytest.approx((mass_kg, 1.0, offset_rad), rel=1e-6)
+
+
+def test_a_value_below_zero_within_its_error_is_the_design_s_own() -> None:
+    names, covariance = ("friction.load_coefficient", "friction.viscous"), np.diag([1e-10, 1e-14])
+    fit = Fit(names=names, values=np.array([-8e-6, 2e-6]), covariance=covariance)
+    made, own = design_with_fit(_joint(), fit, "record").friction, _joint().friction
+    assert (made.load_coefficient, made.viscous_Nms_rad) == (own.load_coefficient, 2e-6)
 
 
 def test_gravity_left_out_shows_in_the_residual_and_what_cannot_be_is_refused() -> None:
