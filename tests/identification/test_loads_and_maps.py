@@ -88,15 +88,13 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
         ("gravity_sin", 3.0, 0.5, 3.0),  # of the other sign than the design's: the design keeps its own
     ],
 )
-def test_one_term_of_a_pendulum_is_written_at_the_offset_of_the_design(
-    term, given, mass_kg, offset_rad
-) -> None:
+def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(term, given, mass_kg, offset_rad) -> None:
     design = _joint()
     if given is not None:
-        design = replace(
-            design, load=replace(design.load, gravity=Gravity(mass_kg=0.5, arm_m=1.0, offset_rad=given))
-        )
-    fit = Fit(names=(term,), values=np.array([2.0 * 9.80665]), covariance=np.array([[1e-4]]))
+        gravity = Gravity(mass_kg=0.5, arm_m=1.0, offset_rad=given)
+        design = replace(design, load=replace(design.load, gravity=gravity))
+    found = np.array([2.0 * 9.80665, 2e-5])
+    fit = Fit(names=(term, "viscous"), values=found, covariance=np.diag([1e-4, 1e-14]))
     made = design_with_fit(with_structure(design, fit), joint_values(design, fit), "record").load.gravity
     assert made is not None
     assert (made.mass_kg, made.arm_m, made.offset_rad) == pytest.approx((mass_kg, 1.0, offset_rad), rel=1e-6)
