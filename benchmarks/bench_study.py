@@ -154,7 +154,8 @@ def _steps(count: int, share: float) -> Row:
     step = StepCheck(0.00873)
 
     def part(first: int) -> None:
-        step_columns(step, Population(design, as_values(design, sampler.paths, sampler.draw(first, 250)), 250))
+        values = as_values(design, sampler.paths, sampler.draw(first, 250))
+        step_columns(step, Population(design, values, 250))
 
     with ThreadPoolExecutor(2) as pool:
         seconds, _ = _timed(lambda: list(pool.map(part, range(0, count, 250))))
