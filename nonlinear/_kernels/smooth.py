@@ -175,32 +175,32 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):
 
 
 @kernel
-def tanh_torque(p, w, Tcp, Tcm):
-    """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion."""
-    x = w * p[layout.TANH_PER_SPEED]
+def torque_at(p, w, T, Tcp, Tcm):
+    """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion.
+
+    ``T`` is the tanh at that speed.
+    """
     if w >= 0.0:
-        return -Tcp * tanh(x)
-    return -Tcm * tanh(x) - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
+        return -Tcp * T
+    return -Tcm * T - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
 
 
 @kernel
-def bent(p, w):
-    """What bounds the derivatives of the friction torque at a speed, beside those at rest."""
-    if p[layout.VISCOUS_REVERSE] != p[layout.VISCOUS]:
-        return 1.0
-    T = tanh(w * p[layout.TANH_PER_SPEED])
-    return 1.0 - T * T
+def tanh_torque(p, w, Tcp, Tcm):
+    """The same from the speed alone."""
+    return torque_at(p, w, tanh(w * p[layout.TANH_PER_SPEED]), Tcp, Tcm)
 
 
 @kernel
-def level_for(p, part, i, w, u, Tb, Tc, n0):
-    """Number of halvings of a segment that the tolerance asks for under the friction torque n0."""
+def level_for(p, part, i, w, u, Tb, Tc, T, n0):
+    """Number of halvings of a segment that the tolerance asks for at the tanh T, the friction torque n0."""
     if p[layout.TANH_LEVEL] >= 0.0:
         return int(p[layout.TANH_LEVEL])
     per = 1.0 / (p[layout.INERTIA] * p[layout.SMOOTHING])
     drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb + n0 - p[layout.VISCOUS] * w
-    change, h, bend, fastest = abs(drive) * per, p[layout.LENGTH + part], bent(p, w), p[layout.TANH_FASTEST]
+    change, h, fastest = abs(drive) * per, p[layout.LENGTH + part], p[layout.TANH_FASTEST]
     viscous = abs(p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) / p[layout.INERTIA]
+    bent = 1.0 if viscous > 0.0 else 1.0 - T * T
     rate = Tc * per + viscous + change
     shaken = change * p[layout.TANH_SHAKEN]
     if p[layout.SOURCE] <= 0.0:
@@ -210,8 +210,8 @@ def level_for(p, part, i, w, u, Tb, Tc, n0):
         rate += jump * p[layout.TANH_SHARE + part]
         shaken += jump * p[layout.RESISTANCE] / (p[layout.INDUCTANCE] * fastest)
     x = fastest * h
-    lost = (Tc * per * bend + viscous) * shaken * h * h / (max(x, 1e-300) * p[layout.TANH_TOLERANCE])
-    wanted = rate * h * max(math.sqrt(math.sqrt(bend)) / p[layout.TANH_RATE], 1.0 / LONGEST)
+    lost = (Tc * per * bent + viscous) * shaken * h * h / (max(x, 1e-300) * p[layout.TANH_TOLERANCE])
+    wanted = rate * h * max(math.sqrt(math.sqrt(bent)) / p[layout.TANH_RATE], 1.0 / LONGEST)
     level = 0
     while level < layout.LEVELS - 1 and (wanted > 1.0 or lost * min(1.0, x * x * x * x / 480.0) > 1.0):
         wanted, lost, x = 0.5 * wanted, 0.5 * lost, 0.5 * x
@@ -273,8 +273,9 @@ def tanh_segment(p, s, part, u):
     allowed = p[layout.TANH_TOLERANCE] * p[layout.SMOOTHING]
     kink = bend / p[layout.INERTIA] * whole / steps / allowed if p[layout.TANH_LEVEL] < 0.0 else 0.0
     while done < steps:
-        n0 = tanh_torque(p, w, Tcp, Tcm)
-        level = level_for(p, part, i, w, u, Tb, max(Tcp, Tcm), n0)
+        T = tanh(w * p[layout.TANH_PER_SPEED])
+        n0 = torque_at(p, w, T, Tcp, Tcm)
+        level = level_for(p, part, i, w, u, Tb, max(Tcp, Tcm), T, n0)
         unit = steps >> level
         while (done & (unit - 1)) != 0:
             unit >>= 1
