@@ -1,9 +1,8 @@
 """Identified values into a design, with their tolerances and correlations."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
-from math import pi
 
 import numpy as np
 
@@ -42,30 +41,36 @@ def joint_values(design: Design, model: Fit, *, inertia_to: str = INERTIAS[0]) -
             slopes[inertia_to] = {name: scale}
         elif parameter(name).key:
             slopes[parameter(name).key] = {name: 1.0}
-    found = [name for name in GRAVITY if name in model.names]
-    arm = 1.0 if design.load.gravity is None else design.load.gravity.arm_m
-    per_mass = float(Gravity(mass_kg=1.0, arm_m=arm).peak_Nm)
-    if len(found) == 2:
-        a, b = model["gravity_sin"], model["gravity_cos"]
-        peak = float(np.hypot(a, b))
-        size, turn = {"gravity_sin": a / peak, "gravity_cos": b / peak}, {"gravity_sin": -b, "gravity_cos": a}
-        slopes["load.gravity.mass"] = {name: slope / per_mass for name, slope in size.items()}
-        slopes["load.gravity.offset"] = {name: slope / peak**2 for name, slope in turn.items()}
-        values |= {"load.gravity.mass": peak / per_mass, "load.gravity.offset": float(np.arctan2(b, a))}
-    for name in found if len(found) == 1 else ():
-        share = _share(design, name)
-        if model[name] * share > 0.0:
-            slopes["load.gravity.mass"] = {name: 1.0 / (share * per_mass)}
-            values["load.gravity.mass"] = model[name] / (share * per_mass)
+    for key, value, slope in _pendulum_values(design, model):
+        values[key], slopes[key] = value, slope
     return model.mapped(slopes, values)
 
 
-def _share(design: Design, name: str) -> float:
-    """The part of m g l in the one term of a pendulum that was found, at the design's own offset."""
-    offset = 0.0 if design.load.gravity is None else design.load.gravity.offset_rad
-    if name == "gravity_sin":
-        return float(np.cos(offset))
-    return 1.0 if design.load.gravity is None else float(np.sin(offset))
+def _pendulum(design: Design, model: Fit) -> Gravity | None:
+    """The design's pendulum, or 1 kg at 1 m where its found terms have it; None where there is neither."""
+    if design.load.gravity is not None or not set(GRAVITY) & set(model.names):
+        return design.load.gravity
+    a, b = (model.get(name, 0.0) for name in GRAVITY)
+    return Gravity(mass_kg=1.0, arm_m=1.0, offset_rad=float(np.arctan2(b, a)))
+
+
+def _pendulum_values(design: Design, model: Fit) -> Iterator[tuple[str, float, dict[str, float]]]:
+    """Mass and offset from both terms of a pendulum, the mass alone from one; each with its slopes."""
+    found = [name for name in GRAVITY if name in model.names]
+    if not found or (gravity := _pendulum(design, model)) is None:
+        return
+    per_mass = gravity.peak_Nm / gravity.mass_kg
+    if len(found) == 2:
+        a, b = (model[name] for name in GRAVITY)
+        peak = float(np.hypot(a, b))
+        size, turn = (dict(zip(GRAVITY, slopes, strict=True)) for slopes in ((a, b), (-b, a)))
+        yield "load.gravity.mass", peak / per_mass, {n: one / peak / per_mass for n, one in size.items()}
+        yield "load.gravity.offset", float(np.arctan2(b, a)), {n: one / peak**2 for n, one in turn.items()}
+        return
+    (name,), offset = found, gravity.offset_rad
+    share = per_mass * float(np.cos(offset) if name == GRAVITY[0] else np.sin(offset))
+    if model[name] * share > 0.0:
+        yield "load.gravity.mass", model[name] / share, {name: 1.0 / share}
 
 
 def with_structure(design: Design, model: Fit) -> Design:
@@ -82,12 +87,10 @@ def with_structure(design: Design, model: Fit) -> Design:
         gone += [path for path in design.parameters if path in PLAIN_KEYS]
     elif friction.points and "dry" in model.names:
         friction = replace(friction, points=())
-    if set(GRAVITY) & set(model.names) and load.gravity is None:
-        upright = "gravity_sin" in model.names
-        load = replace(load, gravity=Gravity(mass_kg=1.0, arm_m=1.0, offset_rad=0.0 if upright else pi / 2))
-    if friction is design.friction and load is design.load:
+    gravity = _pendulum(design, model)
+    if friction is design.friction and gravity is load.gravity:
         return design
-    return _without(replace(design, friction=friction, load=load), gone)
+    return _without(replace(design, friction=friction, load=replace(load, gravity=gravity)), gone)
 
 
 def _without(design: Design, gone: Collection[str]) -> Design:
@@ -173,6 +176,8 @@ def _tolerance(path: str, value: float, std: float) -> Tolerance | None:
 
 
 def _correlations(paths: Sequence[str], correlation: Floats) -> list[Correlation]:
+    if not paths:
+        return []
     matrix = np.clip(correlation, -1.0, 1.0)
     matrix = np.where(np.abs(matrix) < LEAST_CORRELATION, 0.0, np.round(matrix, 6))
     np.fill_diagonal(matrix, 1.0)

@@ -79,21 +79,25 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("term", "given", "mass_kg", "offset_rad"),
+    ("term", "found_kg", "given", "mass_kg", "offset_rad"),
     [
-        ("gravity_sin", None, 2.0, 0.0),
-        ("gravity_cos", None, 2.0, 0.5 * np.pi),
-        ("gravity_sin", 1.1, 2.0 / np.cos(1.1), 1.1),
-        ("gravity_cos", 1.1, 2.0 / np.sin(1.1), 1.1),
-        ("gravity_sin", 3.0, 0.5, 3.0),  # of the other sign than the design's: the design keeps its own
+        ("gravity_sin", 2.0, None, 2.0, 0.0),
+        ("gravity_cos", 2.0, None, 2.0, 0.5 * np.pi),
+        ("gravity_sin", -2.0, None, 2.0, np.pi),  # it hangs
+        ("gravity_cos", -2.0, None, 2.0, -0.5 * np.pi),
+        ("gravity_sin", 2.0, 1.1, 2.0 / np.cos(1.1), 1.1),
+        ("gravity_cos", 2.0, 1.1, 2.0 / np.sin(1.1), 1.1),
+        ("gravity_sin", 2.0, 3.0, 0.5, 3.0),  # of the other sign than the design's: the design keeps its own
     ],
 )
-def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(term, given, mass_kg, offset_rad) -> None:
+def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(
+    term, found_kg, given, mass_kg, offset_rad
+) -> None:
     design = _joint()
     if given is not None:
         gravity = Gravity(mass_kg=0.5, arm_m=1.0, offset_rad=given)
         design = replace(design, load=replace(design.load, gravity=gravity))
-    found = np.array([2.0 * 9.80665, 2e-5])
+    found = np.array([found_kg * 9.80665, 2e-5])
     fit = Fit(names=(term, "viscous"), values=found, covariance=np.diag([1e-4, 1e-14]))
     made = design_with_fit(with_structure(design, fit), joint_values(design, fit), "record").load.gravity
     assert made is not None
@@ -105,6 +109,8 @@ def test_a_value_below_zero_within_its_error_is_the_design_s_own() -> None:
     fit = Fit(names=names, values=np.array([-8e-6, 2e-6]), covariance=covariance)
     made, own = design_with_fit(_joint(), fit, "record").friction, _joint().friction
     assert (made.load_coefficient, made.viscous_Nms_rad) == (own.load_coefficient, 2e-6)
+    alone = fit.mapped({names[0]: {names[0]: 1.0}})
+    assert design_with_fit(_joint(), alone, "record").friction == own
 
 
 def test_gravity_left_out_shows_in_the_residual_and_what_cannot_be_is_refused() -> None:
