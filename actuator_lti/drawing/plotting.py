@@ -168,21 +168,21 @@ def _mark_margins(
     magnitude.axhline(0.0, color=INK, linewidth=0.8)
     words: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points", "fontsize": "small"}
     words["bbox"] = {"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 0.5}
-    gains, phases = (
-        np.arange(1, n + 1) / (n + 1) for n in map(len, (margins.gain_margins, margins.phase_margins))
-    )
-    for gain, part in zip(
-        margins.gain_margins, gains, strict=True
-    ):  # words of neighbours at different heights
+    for gain, part in _at_heights(margins.gain_margins):
         at = gain.frequency_rad_s / (2.0 * np.pi)
         magnitude.plot([at, at], [0.0, -gain.db], color=RED, linewidth=2.4)
         magnitude.annotate(f"{gain.db:+.1f} dB", (at, -gain.db * part), color=RED, **words)
-    for margin, part in zip(margins.phase_margins, phases, strict=True):
+    for margin, part in _at_heights(margins.phase_margins):
         at = margin.frequency_rad_s / (2.0 * np.pi)
         here = float(np.interp(margin.frequency_rad_s, omega, turned))
         phase.plot([at, at], [here - margin.deg, here], color=GREEN, linewidth=2.4)
         phase.annotate(f"{margin.deg:+.1f}°", (at, here - margin.deg * part), color=GREEN, **words)
         phase.axhline(here - margin.deg, color=INK, linewidth=0.8)
+
+
+def _at_heights(margins: Sequence[Any]) -> Iterator[tuple[Any, float]]:
+    """Each margin, and at which part of its bar its words stand: those of neighbours at different heights."""
+    return ((one, (k + 1) / (len(margins) + 1)) for k, one in enumerate(margins))
 
 
 def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:

@@ -124,14 +124,15 @@ class Run:
         return row
 
 
-def _design_row(design: Design, *switches: bool) -> Floats:
+def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
     """The row of a design alone."""
-    if not all(switch in (True, False) for switch in switches):
-        raise InputError(f"friction_on, limits_on = {shown(switches)}: allowed: True or False each")
+    for name, switch in (("friction_on", friction_on), ("limits_on", limits_on)):
+        if switch not in (True, False):
+            raise InputError(f"{name} = {shown(switch)}: allowed: True or False")
     try:
-        return _kept_row(design, *switches)
+        return _kept_row(design, friction_on, limits_on)
     except TypeError:  # a list in place of a tuple
-        return _kept_row.__wrapped__(design, *switches)
+        return design_row(design, friction_on=friction_on, limits_on=limits_on)
 
 
 @lru_cache(maxsize=16)

@@ -131,9 +131,10 @@ def simulate(
     ).row(tables)  # fmt: skip
     row[at.WITH_ENERGY] = energy
     row[at.TANH_TOLERANCE] = finite_number("tanh_tolerance", tanh_tolerance)
-    if not tanh_tolerance > 0.0 or not (progress is None or callable(progress)):
-        said = f"tanh_tolerance = {tanh_tolerance}, progress = {shown(progress)}"
-        raise InputError(f"{said}: allowed: a tolerance above 0, a function of (done, total) or None")
+    if not tanh_tolerance > 0.0:
+        raise InputError(f"tanh_tolerance = {tanh_tolerance}: allowed: above 0")
+    if not (progress is None or callable(progress)):
+        raise InputError(f"progress = {shown(progress)}: allowed: a function of (done, total), or None")
     row[at.MAX_EVENTS] = min(whole_number("max_events", max_events), 2**53)
     record_every = min(whole_number("record_every", record_every), 2**53)
     row[at.RECORD_EVERY] = record_every
