@@ -22,7 +22,7 @@ def main(names: list[str]) -> int:
     modules = [m.name for m in pkgutil.iter_modules(benchmarks.__path__) if m.name.startswith("bench_")]
     missed, start = 0, time.perf_counter()
     for name in (m for m in modules if not names or m.removeprefix("bench_") in names):
-        sys.stdout.write(f"{name.removeprefix('bench_')}\n")
+        sys.stdout.write(f"{name.removeprefix('bench_')}, begun after {time.perf_counter() - start:.0f} s\n")
         for row in importlib.import_module(f"benchmarks.{name}").rows():
             missed += row.met is False
             sys.stdout.write(f"{line(row)}\n")
