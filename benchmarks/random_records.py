@@ -14,7 +14,7 @@ KINDS = (
     "without a command",
     "1024 counts a turn",
     "current 1 ms late",
-    "200 s",
+    "60 s",
     "several records",
 )
 VALUES = ("inertia", "viscous", "dry", "offset")
@@ -42,7 +42,7 @@ def random_records(kind: str, seed: int) -> tuple[Design, dict[str, float], tupl
         },
     )
     count = len(SECONDS) if kind == "several records" else 1
-    seconds = (200.0,) if kind == "200 s" else SECONDS
+    seconds = (60.0,) if kind == "60 s" else SECONDS
     truth = {
         "inertia": drive.inertia_kgm2,
         "viscous": drive.friction.viscous_Nms_rad,
