@@ -48,8 +48,7 @@ def write_report(
 
 def page(made: Mapping[str, Any], *, progress: Progress | None = None) -> str:
     """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all)."""
-    blocks = figures(made)
-    drawings = dict(zip(map(id, blocks), draw_all(blocks, progress), strict=True))
+    drawings = draw_all(figures(made), progress)
 
     def drawn(block: Mapping[str, Any]) -> Markup:
         return Markup(drawings[id(block)])

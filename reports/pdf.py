@@ -103,8 +103,7 @@ def summary(made: Mapping[str, Any]) -> Tree:
 
 def printable(made: Mapping[str, Any]) -> Tree:
     """Turn a document into what ``report.typ`` reads; nothing in it is markup any more."""
-    blocks = figures(made)
-    drawings = dict(zip(map(id, blocks), draw_all(blocks, page=False), strict=True))
+    drawings = draw_all(figures(made), page=False)
     design, origin = made.get("design") or {}, made.get("provenance") or {}
     every = (block for part in made["sections"] for block in walk(part))
     own = (block for block in every if block.get("what", "requirements") == "requirements")
