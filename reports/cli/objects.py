@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, SetOption, load_drive, write_new
+from reports.cli.output import print_json, print_line, print_note
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import ControllerObject
@@ -52,11 +54,8 @@ def export(
 
     Try: actuator-lti objects export ilr33-amber --velocity-gain-per rad/s --out settings.toml
     """
-    from dataclasses import replace
-
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import settings_xml, write_settings_toml
-    from reports.cli.output import print_json, print_line, print_note
 
     drive = load_drive(design, changes)
     if per is not None:
@@ -103,7 +102,6 @@ def import_settings(
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
     from actuator_lti.files.reading import shown_path
-    from reports.cli.output import print_json, print_line, print_note
 
     factor = None if per is None else calibration(per)
     drive = load_design(base)

@@ -7,6 +7,7 @@ import typer
 
 from actuator_lti.errors import InputError
 from reports.cli.options import JsonOption
+from reports.cli.output import print_json, print_line
 
 ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
 FileOption = Annotated[
@@ -29,7 +30,6 @@ def pdf(
     Try: actuator-lti pdf out/report.json --summary --out joint.pdf
     """
     from analyses.isolation import drain
-    from reports.cli.output import print_json, print_line
     from reports.document import load
     from reports.pdf import write_pdf
 

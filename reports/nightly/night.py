@@ -37,6 +37,7 @@ def _nobody(*_said: object) -> None:
 
 def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     """Build a night, or approve the last one, and publish the site."""
+
     def say(line: str) -> None:
         print_note(f"actuator-lti: {line}")
 
