@@ -133,10 +133,10 @@ def script(*, live: bool = False) -> str:
     return bundled("folds", "figures", "hands") if live else bundled("folds", "figures")
 
 
-def security_policy(*scripts: str, wasm: bool = False) -> str:
-    """Give the page's content security policy: no request at all, and only these scripts run."""
-    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
-    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) + " 'wasm-unsafe-eval'" * wasm
+def security_policy(script: str, *, wasm: bool) -> str:
+    """Give the page's content security policy: no request at all, and only this script runs."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    allowed = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
     return (
         f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}; base-uri 'none'"
     )

@@ -9,10 +9,6 @@ from actuator_lti.errors import InputError
 from reports.cli.options import JsonOption
 from reports.cli.output import print_json, print_line
 
-ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
-FileOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
-]
 SummaryOption = Annotated[
     bool,
     typer.Option("--summary", help="In the PDF the first screen and one line a section: about four pages."),
@@ -20,8 +16,10 @@ SummaryOption = Annotated[
 
 
 def pdf(
-    report: ReportArgument,
-    out: FileOption = None,
+    report: Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
+    ] = None,
     summary: SummaryOption = False,
     as_json: JsonOption = False,
 ) -> None:
