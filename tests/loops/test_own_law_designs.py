@@ -155,6 +155,14 @@ def test_many_designs_have_the_gain_of_the_law() -> None:
             assert many.quantity("gain_margin", loop)[k] == pytest.approx(wanted, rel=1e-12)
 
 
+def test_a_law_without_its_command_leaves_no_loop_around_it() -> None:
+    """Fed with the speed alone: the loops outside have no state, and their figures are withheld."""
+    design = load_design("ilr33-amber")
+    damped = design.with_law("current", ([], [], [], [[0.02]], period_s(design, "current")), ["speed"])
+    many = linear_figures(Population(damped, {}, 2))
+    assert [bool(many.withheld(loop).all()) for loop in STAGES] == [False, True, True]
+
+
 def test_torque_at_rest() -> None:
     """Of a static law the product of the gains; a law that integrates has no end of it."""
     base = controlled(load_design("ilr33-amber"), velocity={"integral_time_s": None})
