@@ -13,7 +13,7 @@ from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch._figures import DC_GAIN
-from actuator_lti.design import load_design, parameter_value, with_overrides
+from actuator_lti.design import load_design, parameter_value
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, PositionLoop
 from actuator_lti.drive.operating import Operating
@@ -22,6 +22,7 @@ from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
 from tests.validation.random_drives import drives
+from tests.validation.rich_drives import rich_drive
 
 FILTERS = (
     Filter(kind="lowpass", frequency_rad_s=2000.0, order=2),
@@ -47,30 +48,8 @@ def everything() -> Design:
     return replace(filled, encoder=encoder, command=command, load=load)
 
 
-def bent() -> Design:
-    """A spring of three pieces, on whose second the load lies."""
-    base = drive_e()
-    k = base.coupling.stiffness_Nm_rad
-    bends = {"torque_1_Nm": 1.0, "stiffness_2_Nm_rad": 2 * k, "torque_2_Nm": 4.0, "stiffness_3_Nm_rad": 3 * k}
-    return replace(base, coupling=replace(base.coupling, **bends))
-
-
-def rich() -> Design:
-    """The joint, with everything that a joint may have besides."""
-    return with_overrides(load_design("joint"), {
-        "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
-        "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
-        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
-        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
-        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
-        "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
-        "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
-        "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",
-        "friction.offset_torque": "1 mN*m",
-    })  # fmt: skip
-
-
-KINDS = (everything(), replace(bent(), name="bent"), rich(), *drives(90_310, 10))
+RICH = (7, 9, 13, 18, 20, 23, 29, 51, 54)  # each with at least five of what is rare
+KINDS = (everything(), *(rich_drive(seed, own_law=False) for seed in RICH), *drives(90_310, 10))
 DRIVES = {one.name: one for one in KINDS}
 
 
