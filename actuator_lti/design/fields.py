@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.design import model
-from actuator_lti.design.field import Field, Structure, named_after
+from actuator_lti.design.field import Field, Structure, named_after  # noqa: F401 - a unit asks for one
 
 Many = Literal["", "named", "numbered", "listed"]
 
