@@ -234,7 +234,7 @@ def _with_steps(
     early = np.zeros(len(steps_at(driven.values)))
     made = run(early)
     series = _series(driven.design, made, time)
-    name = next((name for name in ANSWERS if name in measured), None)
+    name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if len(early) and name else 0):
         more = earlier_s(driven, time, measured[name], series[name])
         moved = tick * np.clip(np.round((early + more) / tick), -1.0, np.floor(row / tick * (1.0 + 1e-9)))

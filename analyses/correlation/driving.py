@@ -102,9 +102,7 @@ def needed_command(design: Design, record: Record, signal: str | None = None) ->
     return driven
 
 
-def at_ticks(
-    driven: Driven, time_s: Floats, duration_s: float, early_s: Floats
-) -> tuple[Floats, Floats]:
+def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats) -> tuple[Floats, Floats]:
     """Times and values of the command at the drive's ticks.
 
     Through the samples goes a smooth curve, as a feed-forward takes the slope: straight lines would give it
