@@ -25,11 +25,10 @@ from operator import mul
 from pathlib import Path
 from typing import Any, Literal
 
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.fields import FIELDS, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.sections import parts_of
 from actuator_lti.design.settings_file import parsed_xml, placed
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides

@@ -9,8 +9,7 @@ from xml.etree.ElementTree import Element, ParseError, SubElement, indent, regis
 
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily, ObjectPlace
-from actuator_lti.design.object_dictionary import OBJECTS
-from actuator_lti.design.objects import checked_objects
+from actuator_lti.design.objects import OBJECTS, checked_objects
 from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import parse_toml, read_text, shown, shown_path
 

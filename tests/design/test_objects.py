@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from actuator_lti.design import load_design, read_design_text, with_values, write_design
 from actuator_lti.design.model import ControllerObject, ControllerObjects
-from actuator_lti.design.object_dictionary import OBJECTS
-from actuator_lti.design.objects import PER_RPM, calibration, export_objects, import_objects
+from actuator_lti.design.objects import OBJECTS, PER_RPM, calibration, export_objects, import_objects
 from actuator_lti.design.settings_file import (
     parse_label,
     read_settings,
