@@ -138,6 +138,9 @@ def test_terminal_page_json_and_status_say_not_proven_alike(tmp_path, cli) -> No
     assert (told["verdict"], told["passed"]) == ("not proven", True)
     assert shown.startswith("PASS, 2 not proven ilr33-amber: ")
     assert "Not proven, which alone does not fail: Load friction; Torque constant kM." in shown
+    (against,) = (one for one in page["sections"][0]["blocks"] if "numbers" in one.get("caption", ""))
+    kept = {row["name"]: row["design"] for row in against["rows"] if row["agrees"] == "kept"}
+    assert kept == {"Load friction": 1.34e-3, "Torque constant kM": 5.9e-3}
     written = design_hash(load_design(tmp_path / "ilr33-amber-identified.toml"))
     assert told["design"]["hash"] == written
     assert f"Design found, SHA-256 {written}" in shown
