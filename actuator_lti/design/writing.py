@@ -10,15 +10,16 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any, cast
 
+import tomli_w
+
 from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
-from actuator_lti.design.fields import field_of, fields_in
+from actuator_lti.design.fields import RECORDS, SECTIONS, Section, field_of, fields_in, parts_of
 from actuator_lti.design.loader import as_design, design_from_tree, design_text, read_design_text
 from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
-from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import ampere_unit, si_text
@@ -34,8 +35,6 @@ def write_design(design: Design) -> str:
 
     Values stay as they were written, with source, grade and tolerance; comments are not kept.
     """
-    import tomli_w
-
     return tomli_w.dumps(design_tree(as_design(design)))
 
 
@@ -44,8 +43,6 @@ def write_changed(before: Design, after: Design) -> str:
 
     Where that does not read as the same design, or the file is gone: as `write_design` has it.
     """
-    import tomli_w
-
     with suppress(InputError):
         raw = parse_toml(design_text(before.origin), before.origin)
         text = tomli_w.dumps(_changed(raw, design_tree(as_design(before.origin)), design_tree(after)))
@@ -173,8 +170,6 @@ def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
     """The design file with one key changed as `with_overrides` does, without a look at the value."""
-    import tomli_w
-
     tree = design_tree(design)
     _override(tree, path, value, design)
     return tomli_w.dumps(tree)
