@@ -51,7 +51,7 @@ def responses(system: Any, points: np.ndarray) -> np.ndarray:
 def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve stacked equations; NaN where a matrix is singular.
 
-    What is left of them is solved for once more: each is right to rounding of its own terms then, no longer of
+    What is left of them is solved for once more: each is right to rounding of its own terms then, not of
     the largest (Skeel, Math. Comp. 35, 1980), and a small sum of large states keeps its digits.
     """
     found = _solved(matrices, right)

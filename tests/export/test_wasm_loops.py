@@ -197,7 +197,7 @@ def random_elastic_drives() -> list[Design]:
 def once_different() -> list[Design]:
     """52004, 52023: margins of 0.01 deg and 70 dB; 52080, 329: responses of 1e-4 beside states of 1e3.
 
-    The first two differ by rounding of the entries, which is shown; in the others the linear form lost digits.
+    The first two differ by rounding of the entries, which is shown; the linear form lost digits of the others.
     """
     return [smooth(design) for design in made(random_elastic_drive, (52004, 52023, 52080, 329))]
 
