@@ -21,6 +21,7 @@ from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, shown, whole_number
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
+from nonlinear.native import fill
 
 __all__ = [
     "Command",
@@ -125,8 +126,6 @@ class Command:
 
     def values(self, period_s: float, ticks: int) -> Floats:
         """Value at each of the first ``ticks`` ticks, as the simulator sees it."""
-        from nonlinear.native import fill
-
         _positive("values", period_s=period_s)
         SIGNAL_ROWS.check(whole_number("ticks", ticks, 0))
         row, table = np.zeros(at.SIGNAL_SIZE), self.table(period_s, ticks)

@@ -27,6 +27,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
+from nonlinear.native import parameters
 from nonlinear.row.parameters import design_rows
 from nonlinear.runs.batch import Progress, run_rows
 from nonlinear.runs.reduced import COLUMNS, BatchResult
@@ -171,8 +172,6 @@ class Rows:
 
     def running(self, k: int = 0) -> Running:
         """One row at its start, to go on from piece by piece."""
-        from nonlinear.native import parameters
-
         return Running(*parameters(self.values[k].copy()), self.tables.joined())
 
     def trajectory(self, k: int = 0) -> Trajectory:

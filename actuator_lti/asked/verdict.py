@@ -7,7 +7,7 @@ drive lacks. It is neither good nor bad, and does not let a command end with 0, 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import StrEnum
 from typing import Literal
 
@@ -65,22 +65,15 @@ class Tally:
     def of(cls, verdicts: Iterable[Verdict], waived: Iterable[bool] | None = None) -> Tally:
         """Count verdicts, each with whether it is waived (none is, where left out)."""
         every = list(verdicts)
-        excused = [False] * len(every) if waived is None else list(waived)
-        pairs = list(zip(every, excused, strict=True))
-        return cls(
-            met=every.count(Verdict.MET),
-            not_met=every.count(Verdict.NOT_MET),
-            not_proven=pairs.count((Verdict.NOT_PROVEN, False)),
-            waived=pairs.count((Verdict.NOT_PROVEN, True)),
-        )
+        excused = [False] * len(every) if waived is None else waived
+        open_ = [own for one, own in zip(every, excused, strict=True) if one is Verdict.NOT_PROVEN]
+        met, not_met = every.count(Verdict.MET), every.count(Verdict.NOT_MET)
+        return cls(met=met, not_met=not_met, not_proven=open_.count(False), waived=open_.count(True))
 
     def __add__(self, other: Tally) -> Tally:
         """Count both."""
         return Tally(
-            met=self.met + other.met,
-            not_met=self.not_met + other.not_met,
-            not_proven=self.not_proven + other.not_proven,
-            waived=self.waived + other.waived,
+            **{each.name: getattr(self, each.name) + getattr(other, each.name) for each in fields(self)}
         )
 
     @property

@@ -7,10 +7,9 @@ from typing import Any
 
 from actuator_lti.design.asked import FrozenMap, Parameter
 from actuator_lti.design.checks import check_relations
-from actuator_lti.design.fields import Field, Structure, field_of, fields_in
+from actuator_lti.design.fields import Field, Structure, field_of, fields_in, part_at, parts_of, with_part
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
-from actuator_lti.design.sections import part_at, parts_of, with_part
 from actuator_lti.design.tolerances import rescaled
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError

@@ -16,10 +16,18 @@ from actuator_lti.design.checks_plant import (
     check_temperature,
     with_stand_ins,
 )
-from actuator_lti.design.fields import ALL_FIELDS, FIELDS, Field, Structure, fields_in
+from actuator_lti.design.fields import (
+    ALL_FIELDS,
+    FIELDS,
+    Field,
+    Structure,
+    fields_in,
+    part_at,
+    parts_of,
+    template_of,
+)
 from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
 from actuator_lti.design.model import Correlation, Design, Requirement
-from actuator_lti.design.sections import part_at, parts_of, template_of
 from actuator_lti.files.reading import shown
 
 _NUMBER = re.compile(r"[-+]?[0-9.]+(e[-+]?[0-9]+)?\Z")

@@ -5,11 +5,10 @@ from math import inf, pi
 from typing import Any, get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
-from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in
+from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in, part_at
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
-from actuator_lti.design.sections import part_at
 
 MAX_FILTERS = 8  # of each place; the running drive has room for so many second-order sections
 _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")

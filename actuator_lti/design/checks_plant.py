@@ -7,11 +7,10 @@ from math import inf, isclose, log, pi
 from typing import Any
 
 from actuator_lti.design.field import Structure
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.fields import FIELDS, part_at
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants, no_load_speed
-from actuator_lti.design.sections import part_at
 from actuator_lti.design.spellings import split_quantity
 
 MAX_MAP_POINTS = 16  # of each direction

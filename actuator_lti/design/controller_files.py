@@ -25,11 +25,10 @@ from operator import mul
 from pathlib import Path
 from typing import Any, Literal
 
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.fields import FIELDS, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.sections import parts_of
 from actuator_lti.design.settings_file import parsed_xml, placed
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
@@ -131,9 +130,8 @@ def _torque_mode(given: Tree, design: Design) -> str:
     by_current = str(given.get("torque_controller")).endswith(("foc_current", "dc_current"))
     if by_current == (design.controller.current is not None):
         return ""
-    return f"its torque control is by {'current' if by_current else 'voltage'}; allowed: a design " + (
-        "with [control.current]" if by_current else "without [control.current]"
-    )
+    kind, there = ("current", "with") if by_current else ("voltage", "without")
+    return f"its torque control is by {kind}; allowed: a design {there} [control.current]"
 
 
 def _motor_type(given: Tree, design: Design) -> str:

@@ -1,13 +1,179 @@
-"""One registry of every key of a design file: unit, symbol, allowed range, what it means."""
+"""The one registry of a design file: each table, which part of a `Design` it becomes, and its keys.
+
+Reading, writing, access by dotted key, the schema and the hash are loops over it.
+"""
 
 from collections.abc import Iterator
-from dataclasses import MISSING, fields, replace
-from typing import Any, get_args
+from dataclasses import MISSING, dataclass, fields, replace
+from typing import Any, Literal, get_args
 
-from actuator_lti.design.field import Field, Structure, named_after
-from actuator_lti.design.sections import HEAD, RECORDS, SECTIONS, template_of
+from actuator_lti.asked.quantities import LOOPS
+from actuator_lti.design import model
+from actuator_lti.design.field import Field, Structure, named_after  # noqa: F401 - a unit asks for one
 
-__all__ = ["ALL_FIELDS", "FIELDS", "Field", "Structure", "field_of", "fields_in"]
+Many = Literal["", "named", "numbered", "listed"]
+
+
+@dataclass(frozen=True)
+class Section:
+    """One table of the file.
+
+    ``path``: table name, such as ``"control.velocity"``; of repeated tables without the name or number.
+    ``place``: where the part lies in a `Design`, such as ``"controller.velocity"``.
+    ``kind``: dataclass of the part.
+    ``required``: whether a file must have it.
+    ``many``: repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
+    ``rare``: whether lists of values pass over it while all its values are the defaults.
+    ``label``: the key that a listed table is known by; its number from 1 where empty.
+    ``asked``: whether it says what is asked of the drive, not what it is: the hash knows it where it stands.
+    """
+
+    path: str
+    place: str
+    kind: type
+    required: bool = False
+    many: Many = ""
+    rare: bool = False
+    asked: bool = False
+    label: str = ""
+
+    @property
+    def template(self) -> str:
+        """The path under which the fields of this section are registered, such as ``"gear.*"``."""
+        return f"{self.path}.*" if self.many in ("named", "numbered") else self.path
+
+    @property
+    def parent(self) -> str:
+        """The table that this one lies in; empty at the top."""
+        return self.path.rpartition(".")[0]
+
+    @property
+    def key(self) -> str:
+        """Last part of the table name."""
+        return self.path.rpartition(".")[2]
+
+    @property
+    def attribute(self) -> str:
+        """Last part of the place."""
+        return self.place.rpartition(".")[2]
+
+    @property
+    def optional(self) -> bool:
+        """Whether a design may be without it: its attribute is None then."""
+        owner = BY_PATH[self.parent].kind if self.parent else model.Design
+        return any(item.name == self.attribute and item.default is None for item in fields(owner))
+
+    def items(self, design: model.Design) -> Iterator[tuple[str, Any]]:
+        """Its repeated tables in a design, by their dotted paths: ``gear.worm``, ``friction.point.2``."""
+        for number, item in enumerate(at_place(design, self.place) or (), 1):
+            yield f"{self.path}.{item.name if self.many == 'named' else number}", item
+
+
+HEAD = Section("design", "", model.Design, required=True)
+"""What stands at the beginning of a file: keys of the design itself."""
+
+SECTIONS: tuple[Section, ...] = (
+    Section("motor", "motor", model.Motor, required=True),
+    Section("screw", "screw", model.Screw),
+    Section("gear", "gears", model.Gear, many="named"),
+    Section("coupling", "coupling", model.Coupling),
+    Section("load", "load", model.Load),
+    Section("load.friction", "load.friction", model.LoadFriction),
+    Section("load.gravity", "load.gravity", model.Gravity),
+    Section("friction", "friction", model.Friction),
+    Section("friction.point", "friction.points", model.FrictionPoint, many="numbered"),
+    Section("encoder", "encoder", model.Encoder),
+    Section("output_encoder", "output_encoder", model.OutputEncoder, rare=True),
+    Section("instruments", "instruments", model.Instruments, rare=True),
+    Section("limits", "limits", model.Limits, required=True),
+    Section("supply", "supply", model.Supply),
+    Section("temperature", "temperature", model.Temperature),
+    Section("command", "command", model.Command, rare=True),
+    Section("control", "controller", model.Controller, required=True),
+    Section("control.current", "controller.current", model.CurrentLoop),
+    Section("control.velocity", "controller.velocity", model.VelocityLoop),
+    Section("control.velocity.filter", "controller.velocity.filters", model.Filter, many="numbered"),
+    Section("control.position", "controller.position", model.PositionLoop),
+    *(
+        Section(f"control.{stage}.law{part}", f"controller.{stage}.law{part}", kind)
+        for stage in LOOPS
+        for part, kind in (("", model.Law), (".continuous", model.StateSpace))
+    ),
+    Section("validation", "validation", model.Validation),
+    Section("failure", "failure", model.Failure, asked=True),
+    Section("duty", "duty", model.DutyCycle, asked=True),
+)
+"""Every section, in the order of a design file."""
+
+RECORDS: tuple[Section, ...] = (
+    Section("requirement", "requirements", model.Requirement, many="listed", label="id"),
+    Section("waiver", "waivers", model.Waiver, many="listed", label="requirement"),
+    Section("correlation", "correlations", model.Correlation, many="listed"),
+    Section("fact", "facts", model.Fact, many="listed"),
+)
+"""What is asked and known of a drive, at the end of its file: lists without numeric keys of the drive."""
+
+BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
+
+
+def children(path: str) -> tuple[Section, ...]:
+    """The sections directly inside a table (``""``: at the top)."""
+    return tuple(section for section in SECTIONS if section.parent == path)
+
+
+def template_of(path: str) -> str:
+    """The registered form of a dotted path: names and numbers of repeated tables become ``*``.
+
+    Examples
+    --------
+    >>> template_of("gear.worm.ratio"), template_of("control.velocity.filter.1.depth")
+    ('gear.*.ratio', 'control.velocity.filter.*.depth')
+    """
+    for section in SECTIONS:
+        if section.many and path.startswith(f"{section.path}."):
+            _, *rest = path.removeprefix(f"{section.path}.").split(".")
+            return ".".join([section.path, "*", *rest])
+    return path
+
+
+def parts_of(design: model.Design) -> Iterator[tuple[Section, str, Any]]:
+    """Each section that a design has: section, dotted path, part; repeated ones one by one."""
+    for section in SECTIONS:
+        if section.many:
+            yield from ((section, path, item) for path, item in section.items(design))
+        elif (part := at_place(design, section.place)) is not None:
+            yield section, section.path, part
+
+
+def at_place(design: model.Design, place: str) -> Any:
+    """The part of a design at a place such as ``"controller.velocity"``; None where a stage is absent."""
+    here: Any = design
+    for name in place.split("."):
+        here = None if here is None else getattr(here, name)
+    return here
+
+
+def part_at(design: model.Design, path: str) -> Any:
+    """The part that a table's dotted path names; None if the design has none, KeyError if no table can."""
+    if path in BY_PATH and not BY_PATH[path].many:
+        return at_place(design, BY_PATH[path].place)
+    section = BY_PATH[path.rpartition(".")[0]]
+    if not section.many:
+        raise KeyError(path)
+    return next((item for one, item in section.items(design) if one == path), None)
+
+
+def with_part(design: model.Design, path: str, part: Any) -> model.Design:
+    """A copy of a design in which the part at a table's dotted path is another."""
+    section = BY_PATH.get(path)
+    if section is None:
+        section = BY_PATH[path.rpartition(".")[0]]
+        part = tuple(part if one == path else item for one, item in section.items(design))
+    outer, _, name = section.place.rpartition(".")
+    while outer:
+        part = replace(at_place(design, outer), **{name: part})
+        outer, _, name = outer.rpartition(".")
+    return replace(design, **{name: part})
 
 
 def _declared(kind: type, template: str) -> Iterator[Field]:
@@ -42,13 +208,7 @@ FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
 
 
 def field_of(path: str) -> Field | None:
-    """The field of a dotted path such as ``"gear.planetary.ratio"``; None if there is none.
-
-    Examples
-    --------
-    >>> field_of("gear.worm.ratio").path
-    'gear.*.ratio'
-    """
+    """The field of a dotted path such as ``"gear.planetary.ratio"``; None if there is none."""
     return None if "*" in path else FIELDS.get(template_of(path))
 
 

@@ -6,9 +6,8 @@ from typing import Annotated
 
 from actuator_lti.design.data_sheet import SHEET
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.fields import ALL_FIELDS, field_of, fields_in
+from actuator_lti.design.fields import ALL_FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
-from actuator_lti.design.sections import RECORDS
 from actuator_lti.files.tree import Tree
 
 

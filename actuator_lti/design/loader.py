@@ -1,7 +1,7 @@
 """Read a design by name or path, or from a text."""
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from os import PathLike, fspath
@@ -105,19 +105,13 @@ def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -
     if not isinstance(text, str):
         raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
     if tree := parse_toml(text, origin):
-        return design_from_tree(tree, origin, lines_of(text, tree), folder)
+        return design_from_tree(tree, origin, Findings(origin, lines_of(text, tree), folder))
     raise InputError("is empty; allowed: a design file (actuator-lti init writes one)", where=origin)
 
 
-def design_from_tree(
-    tree: Tree, origin: str, lines: Mapping[str, int] | None = None, folder: Path = Path()
-) -> Design:
-    """Build and check a design from a parsed TOML tree, whose keys stand on these lines of a text."""
-    return found_design(tree, origin, Findings(origin, lines, folder))
-
-
-def found_design(tree: Tree, origin: str, findings: Findings) -> Design:
-    """The design of a tree, refused with all that is found wrong in it."""
+def design_from_tree(tree: Tree, origin: str, findings: Findings | None = None) -> Design:
+    """Build and check a design from a parsed TOML tree; refused with all that is found wrong in it."""
+    findings = Findings(origin) if findings is None else findings
     design = read_tree(tree, origin, findings)
     findings.extend(contradictions(design))
     findings.refuse()

@@ -184,9 +184,9 @@ class Design:
         >>> mine.controller.position.law.D
         (60.0,)
         """
-        from actuator_lti.design.with_law import with_settings
+        from actuator_lti.design.with_law import with_law
 
-        return with_settings(self, stage, system, inputs, settings)
+        return with_law(self, stage, system, inputs, settings)
 
     def _repr_html_(self) -> str:
         """What a notebook shows."""

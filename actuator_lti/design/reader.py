@@ -18,21 +18,22 @@ from actuator_lti.design.asked import FrozenMap, default_deflection
 from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
-from actuator_lti.design.fields import FIELDS, fields_in
-from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
-from actuator_lti.design.law_sources import PARTS, read_law
-from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
-from actuator_lti.design.plant import torque_per_command
-from actuator_lti.design.sections import (
+from actuator_lti.design.fields import (
     BY_PATH,
+    FIELDS,
     HEAD,
     RECORDS,
     Section,
     children,
+    fields_in,
     part_at,
     template_of,
     with_part,
 )
+from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
+from actuator_lti.design.law_sources import PARTS, read_law
+from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.design.settings_file import objects_from
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.stated import Frame

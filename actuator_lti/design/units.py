@@ -165,18 +165,14 @@ def _product(text: str, units: Units) -> Exact:
 @lru_cache(maxsize=1)
 def _units() -> Units:
     """Every name without a prefix."""
-    units: Units = {"1": (Fraction(1), Counter())}
+    units: Units = {one: (Fraction(one), Counter()) for one in ("1", "1000")}
     for names, dimension in _BASE.items():
         units |= dict.fromkeys(names.split(), (Fraction(1), Counter({dimension: 1})))
     for names, (number, definition) in _DERIVED.items():
         factor, powers = _product(definition, units)
         units |= dict.fromkeys(names.split(), (Fraction(number) * factor, powers))
     minute = units["min"][1] + Counter({_MINUTE: 1})
-    return (
-        units
-        | dict.fromkeys(("min", "minute"), (Fraction(60), minute))
-        | {"1000": (Fraction(1000), Counter())}
-    )
+    return units | dict.fromkeys(("min", "minute"), (Fraction(60), minute))
 
 
 def _named(name: str, units: Units) -> Exact:
@@ -307,13 +303,8 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         return f"; {said.format(size=size, fall=fall, **here)}"
     if "[count]" in dict(value.dimension) and wanted.angle:
         return "; write rad or rev for the counts: one is 2 pi/counts_per_rev rad"
-    if (
-        value.dimension
-        and value.angle == 0 < wanted.angle
-        and value.without_angle() == wanted.without_angle()
-    ):
-        return "; write rev or rad into it, whichever is meant"
-    return ""
+    lacks = value.angle == 0 < wanted.angle and value.dimension == wanted.without_angle() != ()
+    return "; write rev or rad into it, whichever is meant" if lacks else ""
 
 
 def compatible(value: UnitValue, wanted: UnitValue) -> bool:

@@ -16,6 +16,8 @@ from actuator_lti.files.reading import shown
 
 METHODS = {"tustin": "bilinear", "zoh": "zoh"}
 """How a continuous system may be sampled, and scipy's word for it."""
+SETTINGS: dict[str, Any] = {"L": (), "gain": 1.0, "every": None, "method": None, "continuous": None}
+"""What may be said of a law besides, and what holds where it is not."""
 
 
 def _columns(system: Any) -> tuple[Any, ...]:
@@ -61,18 +63,14 @@ def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
 
 
 def with_law(
-    design: Design,
-    stage: str,
-    system: Any,
-    inputs: Sequence[str] | None = None,
-    *,
-    L: Any = (),
-    gain: float = 1.0,
-    every: int | None = None,
-    method: str | None = None,
-    continuous: Any = None,
+    design: Design, stage: str, system: Any, inputs: Sequence[str] | None, settings: Mapping[str, Any]
 ) -> Design:
     """A copy of a design with a law of one's own at a stage, see `Design.with_law`."""
+    for name, value in settings.items():
+        if name not in SETTINGS:
+            allowed = f"unknown{nearest(name, SETTINGS)}; allowed: {', '.join(SETTINGS)}"
+            raise InputError(f"{name} = {shown(value)}: {allowed}")
+    L, gain, every, method, continuous = {**SETTINGS, **settings}.values()
     if stage not in LOOPS:
         raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(LOOPS)}")
     there: Mapping[str, Any] = design_tree(design)["control"].get(stage, {})
@@ -96,18 +94,6 @@ def with_law(
             raise InputError(f"continuous: sampled, dt = {step}; allowed: a continuous system")
         law["continuous"] = law_tree(*parts)
     return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
-
-
-def with_settings(
-    design: Design, stage: str, system: Any, inputs: Any, settings: Mapping[str, Any]
-) -> Design:
-    """As `with_law`; a setting that it does not take is refused with those that it does."""
-    known = tuple(with_law.__kwdefaults__ or ())
-    for name, value in settings.items():
-        if name not in known:
-            allowed = f"unknown{nearest(name, known)}; allowed: {', '.join(known)}"
-            raise InputError(f"{name} = {shown(value)}: {allowed}")
-    return with_law(design, stage, system, inputs, **settings)
 
 
 def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> tuple[Any, ...]:

@@ -13,12 +13,11 @@ from typing import Any, cast
 from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
-from actuator_lti.design.fields import field_of, fields_in
+from actuator_lti.design.fields import RECORDS, SECTIONS, Section, field_of, fields_in, parts_of
 from actuator_lti.design.loader import as_design, design_from_tree, design_text, read_design_text
 from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import Reader
-from actuator_lti.design.sections import RECORDS, SECTIONS, Section, parts_of
 from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import ampere_unit, si_text

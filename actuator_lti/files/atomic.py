@@ -13,7 +13,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from functools import partial
+from operator import methodcaller
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -52,11 +52,7 @@ def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -
     An InputError if a folder cannot be made or written; nothing is left behind then.
     """
     pairs = files.items() if isinstance(files, Mapping) else files
-    _write_all((path, partial(_put, data)) for path, data in pairs)
-
-
-def _put(data: bytes, file: BinaryIO) -> None:
-    file.write(data)
+    _write_all((path, methodcaller("write", data)) for path, data in pairs)
 
 
 def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO], object]]]) -> None:

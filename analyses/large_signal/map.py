@@ -223,7 +223,7 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     with np.errstate(divide="ignore"):  # the mean of a limited jerk has zeros
         start, *curve = 20.0 * np.log10(np.abs(whole))
     level, fine_db = MINUS_3DB + start, np.array(curve)
-    fine_deg = np.degrees(np.unwrap(np.angle(linear_steady_state(loops, 2.0 * math.pi * fine).output)))
+    fine_deg = np.degrees(np.unwrap(np.angle(whole[1:])))
 
     def between(values: np.ndarray, linear: np.ndarray) -> np.ndarray:
         with np.errstate(invalid="ignore"):

@@ -12,11 +12,13 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive.facts import speed_torque_Nm
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loops
+from actuator_lti.loops.tick import compose, mean_response
 from actuator_lti.systems.resolvent import states_at
 from analyses.large_signal.classify import FULL_TRIANGLE, STEADY
 from analyses.linear.responses import response_at
@@ -72,29 +74,20 @@ def linear_steady_state(loops: Loops, omega_rad_s: np.ndarray) -> LinearSteadySt
     """Solve the sampled loop for its periodic state at each frequency."""
     system = loops.tick_system
     assert system is not None
-    Ts, M, n = loops.design.controller.period_s, system.ticks, len(system.states)
-    phases = [system.matrices(j) for j in range(M)]
-    A, B = np.eye(n), np.zeros(n)
-    before = []
-    for A_j, B_j, _, _ in phases:
-        before.append((A, B))
-        A, B = A_j @ A, A_j @ B + B_j[:, 0]
-    z = np.exp(1j * omega_rad_s * M * Ts)
-    x = states_at(A, B[:, None], z)[..., 0]
-    angle = system.outputs.index("output_angle")
-    output = np.zeros(len(z), dtype=complex)
-    for j, ((A_b, B_b), (_, _, C, D)) in enumerate(zip(before, phases, strict=True)):
-        seen = (x @ A_b.T + B_b) @ C[angle] + D[angle, 0]
-        output += seen * np.exp(-1j * omega_rad_s * j * Ts) / M
-    unknown = without_value(system.states, PLACES.keys(), LEFT_AT_REST)
-    if unknown:
+    if unknown := without_value(system.states, PLACES.keys(), LEFT_AT_REST):
         raise NumericalError(f"state {unknown[0]} of the linear drive: no start of a run knows it")
+    M, turned = system.ticks, 1j * omega_rad_s * loops.design.controller.period_s  # in a tick
+    A, B = compose([system.program.tick(j) for j in range(M)])
+    z = np.exp(M * turned)
+    x = states_at(A, B[:, :1], z)[..., 0]
+    angle = [system.outputs.index("output_angle")]
+    steps = [(A, B[:, :1], C[angle], D[angle, :1]) for A, B, C, D in map(system.matrices, range(M))]
+    output = mean_response(steps, np.exp(turned)[:, None, None])[:, 0, 0]
     coupling = loops.design.coupling
     places = {**PLACES, **ELASTIC} if coupling is not None and coupling.play_rad == 0.0 else PLACES
     states = {places[name]: x[:, k] for k, name in enumerate(system.states) if name in places}
     if "w_ref" in system.outputs:
-        row = system.outputs.index("w_ref")
-        C, D = phases[0][2], phases[0][3]
+        row, (_, _, C, D) = system.outputs.index("w_ref"), system.matrices(0)
         states["speed_command_start"] = (x @ C[row] + D[row, 0]) / z
     radius = float(np.max(np.abs(np.linalg.eigvals(A))))
     periods = 1 if radius < 1.0 else 500
@@ -283,9 +276,8 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: in
 def full_range(design: Design) -> dict[str, float]:
     """Full deflection (output), motor speed and motor current that a drive can reach."""
     limits, motor = design.limits, design.effective_motor
-    speed, current = limits.speed_rad_s, limits.peak_current_A
-    if motor.resistance_ohm is not None and motor.back_emf_constant_Vs_rad is not None:
-        speed = min(speed, limits.voltage_V / motor.back_emf_constant_Vs_rad)
+    speed, current = min(limits.speed_rad_s, no_load_speed(design)), limits.peak_current_A
+    if motor.resistance_ohm is not None:
         current = min(current, limits.voltage_V / motor.resistance_ohm)
     elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:
         speed = min(speed, limits.voltage_V * motor.source_gain_Nm_V / design.friction.viscous())

@@ -51,7 +51,7 @@ import numpy as np
 from actuator_lti.bounds import AXIS_POINTS, GRID_AXES, SAMPLES, STUDY_VARIANTS
 from actuator_lti.design import design_tree, load_design, shipped_designs, with_overrides
 from actuator_lti.design.fields import Structure, field_of
-from actuator_lti.design.loader import found_design
+from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.mistakes import Findings, lines_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, as_one
@@ -202,7 +202,7 @@ class _Asked:
         replaced = [item.get("id") for item in self.requirements]
         kept = [item for item in tree.get("requirement", []) if item.get("id") not in replaced]
         tree["requirement"] = [*self.requirements, *kept]  # numbered as in the study
-        return found_design(tree, design.origin or design.name, Findings(self.where, self.lines))
+        return design_from_tree(tree, design.origin or design.name, Findings(self.where, self.lines))
 
 
 def _study(root: Table, asked: _Asked, folder: Path, *, keep_going: bool) -> Study:

@@ -15,7 +15,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from actuator_lti.design.model import Design, Filter
-from actuator_lti.design.object_dictionary import OBJECTS, KnownObject, step_of
+from actuator_lti.design.objects import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
 from actuator_lti.errors import InputError

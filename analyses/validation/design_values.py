@@ -12,10 +12,9 @@ from math import ceil, inf, isfinite
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.wiring import wire
-from analyses.validation.limit_values import FAR, limit_rows
+from analyses.validation.limit_values import FAR, Pair, limit_rows
 from analyses.validation.row import Row
 from analyses.validation.torque_values import torque_rows
-from analyses.validation.value_pair import Pair
 from nonlinear.rows import Rows
 
 
@@ -65,14 +64,10 @@ def _profile(pair: Pair) -> Iterator[Row]:
         drive = alone.running()
         drive.command(FAR * min(limit, there) * T)
         drive.begin()
-        read = {
-            0: drive.value("PROFILE"),
-            1: drive.value("PROFILE_SPEED"),
-            2: drive.value("PROFILE_SPEED") / T,
-        }
+        found = drive.value("PROFILE_SPEED" if n + first else "PROFILE") / (T if n + first == 2 else 1.0)
         unit = f"{angle}/s" + ("", "^2", "^3")[n]
         name = f"command_{key.split('_')[0]}"
-        yield pair.judged(name, limit, read[n + first], unit, "first update of a large command")
+        yield pair.judged(name, limit, found, unit, "first update of a large command")
     if outermost == "position" and isfinite(min(model.jerk_rad_s3, own.jerk_rad_s3)):
         yield _jerk(pair, rows, T)
 
@@ -114,7 +109,9 @@ def _counts(pair: Pair) -> Iterator[Row]:
     position, velocity = design.controller.position, design.controller.velocity
     quantum, own = model.output_quantum_rad, design.output_quantum_rad
     if position is not None and position.sensor == "output" and quantum is not None and own is not None:
-        drive = _turned(pair.rows(), 1.5 * quantum * N).running()
+        rows = pair.rows()
+        rows["angle_start"] = 1.5 * quantum * N
+        drive = rows.running()
         drive.begin()
         yield pair.judged("output_count", quantum, -drive.value("ERROR") / N, unit, "position loop")
     if velocity is None or design.encoder.speed == "ideal":
@@ -124,14 +121,15 @@ def _counts(pair: Pair) -> Iterator[Row]:
     scale = N if behind else 1.0
     if quantum is None or own is None:
         return
-    rows = _turned(pair.rows(), 1.5 * quantum * scale)
-    drive = rows.running()
-    name = "output_count" if behind else "count"
+    rows, name = pair.rows(), "output_count" if behind else "count"
     if design.encoder.speed == "tracking":
+        rows["angle_start"] = 1.5 * quantum * scale
+        drive = rows.running()
         drive.begin()
         yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
         return
-    drive = _turned(rows, 0.5 * quantum * scale).running()
+    rows["angle_start"] = 0.5 * quantum * scale
+    drive = rows.running()
     if behind and rows.value("elastic_drive"):
         drive.begin(OUTPUT=1.5 * quantum)
     else:
@@ -139,9 +137,3 @@ def _counts(pair: Pair) -> Iterator[Row]:
     span = design.encoder.difference_samples * velocity.every * design.controller.period_s
     seen = drive.value("FILTERED_SPEED") / rows.value("filter_coefficient") * span / scale
     yield pair.judged(name, quantum, seen, unit, "measured speed")
-
-
-def _turned(rows: Rows, angle_rad: float) -> Rows:
-    """The same from another angle of the motor, the coupling without twist."""
-    rows["angle_start"] = angle_rad
-    return rows

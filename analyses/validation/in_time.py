@@ -21,8 +21,8 @@ from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.types import Complexes, Floats
 from analyses.validation.places import Bench
-from analyses.validation.row import Row, judged
-from analyses.validation.small_signal import RESOLVED, SURE, WITHIN, Place, nearest_pole
+from analyses.validation.row import WITHIN, Row, judged
+from analyses.validation.small_signal import RESOLVED, SURE, Place, nearest_pole
 from nonlinear import Rows
 from nonlinear.bench.injection import RETURNED
 from nonlinear.bench.loop_setup import LoopSetup

@@ -4,13 +4,14 @@ A limit is asked for with the others lifted, by a command far beyond it: the sta
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from math import inf, isfinite
+from typing import Any
 
-from actuator_lti.design.model import CurrentLoop, Design, Instruments, VelocityLoop
+from actuator_lti.design.model import Command, CurrentLoop, Design, Instruments, Limits
 from actuator_lti.drive.wiring import wire
-from analyses.validation.row import Row, judged
+from analyses.validation.row import WITHIN, Row, judged
 from analyses.validation.torque_values import edge
-from analyses.validation.value_pair import WITHIN, Pair, only
 from nonlinear.rows import Rows
 from nonlinear.runs.running import Running
 
@@ -27,6 +28,38 @@ LIMITED: dict[str, tuple[str, Limit, Limit | None]] = {
     "w_ref": ("SPEED_COMMAND", ("speed_limit", "speed_rad_s", "{speed}"),
               ("acceleration_limit", "acceleration_rad_s2", "{speed}^2")),
 }  # fmt: skip
+LIFTED = Limits(voltage_V=inf)
+
+
+def only(**limits: Any) -> Limits:
+    """These limits, the others lifted."""
+    return replace(LIFTED, **limits)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A design and the model of it, with what a row of either needs."""
+
+    design: Design
+    model: Design
+
+    def rows(self, limits: Limits = LIFTED, **changes: object) -> Rows:
+        """A row of the design on the bench, at rest, with these limits alone."""
+        bare = replace(self.design, limits=limits, supply=None, command=Command(), instruments=Instruments())
+        rows = Rows.of(replace(bare, **changes))  # type: ignore[arg-type]
+        rows["torque_filters"] = 0.0  # their gain at once is that of small signals
+        return rows
+
+    @property
+    def speed_unit(self) -> str:
+        return "m/s" if self.design.axis == "linear" else "rad/s"
+
+    def judged(self, name: str, predicted: float, found: float | None, unit: str, condition: str) -> Row:
+        """A row that is exact but for rounding; an absent limit is predicted as none."""
+        wanted = predicted if isfinite(predicted) else None
+        seen = None if found is None or not isfinite(found) else found
+        return judged(name, "drive", wanted, seen, WITHIN * abs(predicted) if wanted else 0.0, unit=unit,
+                      condition=condition)  # fmt: skip
 
 
 def limit_rows(pair: Pair) -> Iterator[Row]:
@@ -52,15 +85,16 @@ def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
     return drive
 
 
-def _ask(pair: Pair, stage: str, limit: float) -> float:
-    """A command to a stage that drives its output far beyond a limit."""
-    control = pair.design.controller
-    gains = {"velocity": control.velocity and control.velocity.gain,
-             "current": control.current and control.current.gain_V_A,
-             "position": control.position and control.position.gain * pair.design.total_ratio}  # fmt: skip
-    own = control.own_law
-    direct = own[1].direct if own is not None and own[0] == stage else gains.get(stage)
-    return FAR * limit / (direct or 1.0)
+def _gain(design: Design, stage: str) -> float:
+    """What a stage makes of a command at once; 1 without a stage."""
+    loop, own = getattr(design.controller, stage, None), design.controller.own_law
+    if own is not None and own[0] == stage:
+        return own[1].direct or 1.0
+    if loop is None:
+        return 1.0
+    if stage == "current":
+        return float(loop.gain_V_A)
+    return float(loop.gain * (design.total_ratio if stage == "position" else 1.0)) or 1.0
 
 
 def _driven(pair: Pair) -> list[tuple[str, str]]:
@@ -85,30 +119,21 @@ def _limited(pair: Pair, *, rate: bool) -> Iterator[Row]:
             continue
         updated = stage or (pair.design.controller.outermost if signal == "w_ref" else "")
         period = wire(pair.design).interval.get(updated, 1) * pair.design.controller.period_s if rate else 1.0
-        size = _ask(pair, stage, min(limit, own) * period)
+        size = FAR * (min(limit, own) * period) / _gain(pair.design, stage)
         found = _pushed(pair.rows(only(**{attribute: own})), pair, stage, size).value(place) / period
         words = "over one update" if rate else f"a {stage or 'direct'} command far beyond it"
         unit = unit.format(speed=pair.speed_unit)
         yield pair.judged(name, limit, None if found > 1e3 * limit else found, unit, words)
 
 
-def _loop(design: Design, stage: str) -> tuple[VelocityLoop | CurrentLoop | None, float]:
-    """Controller of a stage and its gain."""
-    control = design.controller
-    if stage == "velocity":
-        return control.velocity, control.velocity.gain if control.velocity else 0.0
-    return control.current, control.current.gain_V_A if control.current else 0.0
-
-
 def _windup(pair: Pair, stage: str) -> Iterator[Row]:
     """What the integral does at the limit, over one update from zero (model.md sections 2 and 7)."""
-    model, own = (one[0] for one in (_loop(pair.model, stage), _loop(pair.design, stage)))
-    attribute = "peak_current_A" if wire(pair.design).target[stage] == "i_ref" else "voltage_V"
-    limit = float(getattr(pair.model.limits, attribute))
-    ours = float(getattr(pair.design.limits, attribute))
+    model, own = (getattr(one.controller, stage) for one in (pair.model, pair.design))
+    _, attribute, unit = LIMITED[wire(pair.design).target[stage]][1]
+    limit, ours = (float(getattr(one.limits, attribute)) for one in (pair.model, pair.design))
     if model is None or own is None or model.integral_time_s is None or not isfinite(min(limit, ours)):
         return
-    gain = _loop(pair.model, stage)[1]
+    gain = _gain(pair.model, stage)
     T = wire(pair.model).interval.get(stage, 1) * pair.model.controller.period_s
     asked = OVER * limit / gain
     rows = pair.rows(only(**{attribute: ours}))
@@ -125,8 +150,7 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
             limit - gain * asked - integral - extra
         )
     yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
-                 unit="A" if attribute == "peak_current_A" else "V",
-                 condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
+                 unit=unit, condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
 
 
 def _overload(pair: Pair) -> Iterator[Row]:

@@ -5,6 +5,8 @@ from math import inf, isfinite
 
 from actuator_lti.asked.verdict import Verdict
 
+WITHIN = 1e-6  # of a value, a response, a margin
+
 
 @dataclass(frozen=True, kw_only=True)
 class Row:

@@ -25,11 +25,10 @@ from actuator_lti.loops import ExactMargins
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.types import Complexes, Floats
 from analyses.linear.loop_figures import LoopFigures
-from analyses.validation.row import Row, judged
+from analyses.validation.row import WITHIN, Row, judged
 from nonlinear import Tangent
 from nonlinear.bench.lifted import GRID, eigenvalues, relative, sized
 
-WITHIN = 1e-6  # of a response, of a margin
 SURE = 10.0  # times the stated error
 RESOLVED = 1e-4  # of a response: a tangent that is worse proves nothing
 BESIDE = 1e-6  # of a margin: where the pole has to lie on either side of the circle

@@ -79,7 +79,7 @@ class OperatingMotion:
         return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
 
 
-def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
+def operating_motion(design: Design) -> OperatingMotion:
     """Choose a constant speed that leaves room to every limit and stays far from reversal.
 
     The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
@@ -99,12 +99,12 @@ def operating_motion(design: Design, load_Nm: float = 0.0) -> OperatingMotion:
     """
     if follows_angle(design):
         return standing(design)
-    loads = [load_Nm]
+    loads = [0.0]
     if needs_press(design):
         passed = 1.0 if design.load.path == "back-drivable" else 0.0
         felt = max(passed + design.friction.load_coefficient * design.total_ratio, 1e-12)
         whole = full_torque_Nm(design) * design.total_ratio / felt  # by the motor torque that it costs
-        loads = [load_Nm - part * whole for part in PRESSED]
+        loads = [-part * whole for part in PRESSED]
     for share in (SHARE, MOST):
         for moment in loads:
             motion = _fastest(design, moment, share)

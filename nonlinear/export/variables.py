@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from actuator_lti.design.field import BIG
-from actuator_lti.design.fields import fields_in
+from actuator_lti.design.fields import fields_in, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
-from actuator_lti.design.sections import parts_of
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import stage_words
 from nonlinear.export.trace import Key, KeyTrace

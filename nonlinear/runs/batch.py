@@ -18,6 +18,7 @@ from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.errors import InputError, TooManyTicks, shown, whole_number
 from actuator_lti.types import Floats, Progress
 from nonlinear._kernels import layout as at
+from nonlinear.native import parameters, resume
 from nonlinear.runs.reduced import BatchResult
 from nonlinear.runs.running import Running
 from nonlinear.runs.setup import Run, Tables
@@ -118,8 +119,6 @@ def _run_span(
     statuses: np.ndarray, shared: Floats,
 ) -> None:  # fmt: skip
     """Run rows start to stop in this thread; the kernel runs without the GIL."""
-    from nonlinear.native import parameters, resume
-
     history, flags = np.empty((0, 0)), np.empty(0, np.uint16)
     for r in range(start, stop):
         drive = drives[r]

@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout
 from nonlinear._kernels import layout as at
+from nonlinear.native import resume, resumed
 from nonlinear.runs.reduced import COLUMNS
 from nonlinear.runs.trajectory import STATUS, Status
 
@@ -123,8 +124,6 @@ class Running:
 
     @cached_property
     def _tick(self) -> Callable[[], int]:
-        from nonlinear.native import resumed
-
         self._buffers = (  # kept: what is compiled has their places only
             np.zeros(at.IO_SIZE), np.zeros(at.BLOCK_SIZE), self.tables, np.zeros(0),
             np.zeros(0, np.uint16), np.zeros(at.OUT_SIZE), np.zeros(2),
@@ -157,8 +156,6 @@ class Running:
 
     def advance(self, ticks: int, every: int = 1) -> Piece:
         """Go on by some ticks from tick 0, and be at tick 0 again."""
-        from nonlinear.native import resume
-
         p = self.p
         p[at.TICKS], p[at.RECORD_EVERY], p[at.WINDOW], p[at.STEP_TARGET] = ticks, every, 0.0, 0.0
         history, flags, out = self.history()

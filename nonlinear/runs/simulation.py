@@ -20,6 +20,7 @@ from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe
 from nonlinear.commands import Command
 from nonlinear.loads import LoadMoment
+from nonlinear.native import parameters, resume
 from nonlinear.row.parameters import MAX_EVENTS_PER_TICK, TANH_TOLERANCE
 from nonlinear.runs.running import Running
 from nonlinear.runs.setup import STATE_PLACES, Run, Tables, check_command, put_supply, put_torque
@@ -151,8 +152,6 @@ def simulate(
 
 def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | None = None) -> Trajectory:
     """Run one row of parameters with its history."""
-    from nonlinear.native import parameters
-
     drive = Running(*parameters(row), tables)
     history, flags, out = drive.history()
     begun = drive.copy()
@@ -174,8 +173,6 @@ def _named_limits(run: Trajectory) -> Trajectory:
 
 def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None) -> int:
     """Call the kernel; with ``progress``, in a thread that is looked at and can be interrupted."""
-    from nonlinear.native import resume
-
     shared, total = np.zeros(2), int(drive.p[at.TICKS])
     given = (drive.p, drive.s, drive.tables, history, flags, out, shared)
     if progress is None:

@@ -15,20 +15,17 @@ def told_if_slow(text: str, patience_s: float = PATIENCE_S) -> Iterator[None]:
 
     Nothing is written where standard error is no terminal, so that logs stay clean.
     """
-    if text in _told or not sys.stderr.isatty():
-        yield
-        return
-    timer = threading.Timer(patience_s, _tell, [text])
+
+    def tell() -> None:
+        _told.add(text)
+        sys.stderr.write(f"{text}\n")
+        sys.stderr.flush()
+
+    timer = threading.Timer(patience_s, tell)
     timer.daemon = True
-    timer.start()
+    if text not in _told and sys.stderr.isatty():
+        timer.start()
     try:
         yield
     finally:
         timer.cancel()
-
-
-def _tell(text: str) -> None:
-    if text not in _told:
-        _told.add(text)
-        sys.stderr.write(f"{text}\n")
-        sys.stderr.flush()

@@ -7,7 +7,7 @@ import re
 from functools import cache
 from math import pi, sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from actuator_lti.design import read_design_text
 from actuator_lti.design.mistakes import nearest
@@ -87,11 +87,8 @@ def with_parts(text: str, motor: str | None, gear: str | None) -> str:
 
 def _suited(text: str, design: Design) -> str:
     ratio, spring, current = design.total_ratio, design.coupling, design.limits.continuous_current_A
-    motor = design.effective_motor
+    motor: Any = design.effective_motor  # of the catalogue: with R, L and kM
     k, resistance, inductance = motor.torque_constant_Nm_A, motor.resistance_ohm, motor.inductance_H
-    assert k is not None
-    assert resistance is not None
-    assert inductance is not None
     ampere = "A" if design.motor.constants == "dc" else "A dc"
     turning = design.motor_side_inertia_kgm2
     integral = max(inductance / resistance, design.controller.period_s)

@@ -131,14 +131,13 @@ class Between:
 
     def last_night(self, result: Result, past: list[Result]) -> Comparison:
         """What changed since the last night that has a result."""
-        earlier = [r for r in past if r.run < result.run]
-        good = [r for r in earlier if r.home is not None]
-        if not good:
-            first = "no earlier night has a result" if earlier else "first night of this design"
-            return Comparison(note=first)
-        skipped = sum(good[-1].run < night < result.run for night in self._runs)
+        before = self.history.first(result.name, (r for r in self.history.runs[::-1] if r.id < result.run))
+        if before is None:
+            alone = all(r.run >= result.run for r in past)
+            return Comparison(note="first night of this design" if alone else "no earlier night has a result")
+        skipped = sum(before.run < night < result.run for night in self._runs)
         note = f"{skipped} night(s) without a result before; compared with the last that has one"
-        found = self._compare(good[-1], result, note * bool(skipped))
+        found = self._compare(before, result, note * bool(skipped))
         shown = found.changes[:SHOWN_CHANGES]  # only what a page shows is looked at for going to and fro
         courses = self.history.matrix(past[-WINDOW:], [c.figure for c in shown]).T
         marked = [replace(c, flapping=flaps(x, c.tolerance)) for c, x in zip(shown, courses, strict=True)]

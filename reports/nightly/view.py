@@ -169,7 +169,7 @@ def overview(history: History, cache: Cache, study: Study, site: Path, *, built:
 
 def _design(result: Result, between: Between, cache: Cache) -> DesignView:
     history = between.history
-    past = history.results(result.name, last=2 * STRIP)
+    past = history.results(result.name, last=STRIP + 1)  # the first only to tell whether the next regressed
     runs, known = {run.id: run for run in history.runs}, outcomes(past)
     own = (
         one for one in history.index.baselines[::-1] if one.name in (None, result.name) and one.run in runs

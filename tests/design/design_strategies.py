@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 from actuator_lti.design import Design, design_tree, load_design, shipped_designs
 from actuator_lti.design.access import unit_in_file
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.fields import FIELDS, field_of
+from actuator_lti.design.fields import FIELDS, field_of, template_of
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.sections import template_of
 from actuator_lti.design.writing import _override
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive

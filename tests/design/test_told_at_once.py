@@ -9,9 +9,8 @@ from control import tf
 
 from actuator_lti import assemble_loops, sweep
 from actuator_lti.design import design_tree, load_design, read_design_text
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.fields import FIELDS, template_of
 from actuator_lti.design.loader import design_from_tree, design_text
-from actuator_lti.design.sections import template_of
 from actuator_lti.design.writing import _override
 from actuator_lti.errors import InputError, Mistakes
 from actuator_lti.loops.delay_budget import delay_budget

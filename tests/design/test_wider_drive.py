@@ -10,9 +10,8 @@ import pytest
 from actuator_lti.design import check_design, design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.access import stacked
 from actuator_lti.design.checks_control import TRACKING_LIMIT
-from actuator_lti.design.fields import FIELDS
+from actuator_lti.design.fields import FIELDS, part_at, template_of, with_part
 from actuator_lti.design.loader import design_from_tree
-from actuator_lti.design.sections import part_at, template_of, with_part
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
 from tests.validation.random_drives import full_drive

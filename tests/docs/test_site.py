@@ -9,7 +9,7 @@ import pytest
 import typer
 
 from actuator_lti.design import FIELDS, QUANTITIES
-from actuator_lti.design.sections import SECTIONS
+from actuator_lti.design.fields import SECTIONS
 from reports.cli.app import PANELS, build
 
 ROOT = Path(__file__).parents[2]
