@@ -43,7 +43,7 @@ RESOLVED = 1e-5
 """Share of a slope that is its own: below it two values do the same."""
 STEP = 1e-5
 """Share of a value for its differences: those of a sharp resonance curve at 1e-3 already."""
-STARTS = 1.0, 0.25, 4.0
+STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0
 """Factor of a value that a rough fit may move it by."""
