@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, get_args
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, register_namespace, tostring
 
+import tomli_w
+
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily, ObjectPlace
 from actuator_lti.design.objects import OBJECTS, checked_objects
@@ -94,8 +96,6 @@ def objects_from(raw: Any, factor: float | None = None, values: str = "values") 
 
 def write_settings_toml(objects: ControllerObjects) -> str:
     """Settings as TOML, each known object with its meaning and unit beside it."""
-    import tomli_w
-
     lines = [
         "# Settings of the motion controller, in the units of its own objects.",
         f"velocity_gain_factor = {objects.velocity_gain_factor!r}  # 1: 0x2344.01 per rad/s; 9.549: per rpm",

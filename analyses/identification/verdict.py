@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
@@ -40,6 +41,11 @@ class Item:
     limit: float | None = None
     reason: str = ""
 
+    @property
+    def verdict(self) -> Verdict:
+        """In the word of every page."""
+        return Verdict.of(self.passed)
+
     @classmethod
     def of(cls, id: str, label: str, wrong: str, **share: float) -> Item:
         """What holds but for ``wrong``; empty: it holds."""
@@ -60,9 +66,14 @@ class Identified:
         return write_design(self.design)
 
     @property
+    def verdict(self) -> Verdict:
+        """The worst of all items."""
+        return Tally.of(item.verdict for item in self.items).verdict
+
+    @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all(item.passed is not False for item in self.items)
+        """Whether nothing failed; what records do not tell is not proven, and lets it pass."""
+        return self.verdict is not Verdict.NOT_MET
 
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:

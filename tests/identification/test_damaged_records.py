@@ -12,8 +12,10 @@ from scipy.signal import lfilter
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from analyses.estimation.fit import Fit
 from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
+from analyses.identification.design_values import DesignValue, cause, kept_constant
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES
 from analyses.records.open_record import open_record
@@ -428,3 +430,27 @@ def test_intervals_hold_what_they_say(kind: str) -> None:
         model = identify_bench(design, records).model
         errors += [(model[name] - truth[name]) / model.std(name) for name in VALUES]
     assert 0.7 < np.sqrt(np.mean(np.square(errors))) < 1.4
+
+
+def _off(**found: tuple[float, float]) -> list[DesignValue]:
+    """Ratios to a design that states 5 %, each with its standard error."""
+    given = {"design": 1.0, "allowed": 0.05}
+    return [DesignValue(name=n, found=r, ratio=r, error=e, **given) for n, (r, e) in found.items()]
+
+
+def test_one_value_that_is_off_names_no_cause() -> None:
+    """Of an inertia alone any scale could be the cause; a second value that is as far off tells."""
+    rough = {"dry": (1.1, 0.6), "viscous": (1.1, 0.6)}
+    assert cause(_off(inertia=(1.5, 1e-3), **rough)) is None
+    assert cause(_off(inertia=(4.0, 1e-3), viscous=(1.9, 1.2), dry=(1.0, 0.01))) is None
+    words, factor, _ = cause(_off(inertia=(1.5, 1e-3), **rough | {"dry": (1.5, 0.01)}))
+    assert words.startswith("the scale of the current")
+    assert factor == pytest.approx(1.5, rel=1e-3)
+
+
+def test_what_the_constant_moves_by_more_than_the_value_is_said_in_its_unit() -> None:
+    """10 % of kM moves a load friction of nearly nothing by 0.11 mN m/(N m): -1 100 % of it tells nothing."""
+    names, values = ("dry", "load_coefficient"), np.array([3e-3, -1e-5])
+    fit = Fit(names=names, values=values, covariance=np.diag([1e-12, 1e-10]))
+    reason = kept_constant(BASE, "torque_constant", fit, np.array([1.0, -110.0]))["torque_constant"].reason
+    assert reason.endswith("+10 % of it is +10 % of dry and +0.00011 N m/(N m) of load_coefficient")
