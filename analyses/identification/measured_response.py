@@ -20,7 +20,7 @@ from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.asked import Of
 from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
 from analyses.identification.output_error import Moved, box_of, fit_output
@@ -153,7 +153,7 @@ def identify_response(
     _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(start, names, seen, known, progress)
     given = _given(start, fit, seen) if CONSTANT_KEYS.isdisjoint(held) else {}
-    fit = replace(fit, fixed={**held, **fit.fixed, **given})
+    fit = replace(fit, covariance=_widened(start, fit, given), fixed={**held, **fit.fixed, **given})
     made = design_with_fit(start, fit, f"frequency response {measured.name}{at_constant(fit)}")
     modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
@@ -197,6 +197,16 @@ def _given(start: Design, fit: ResponseFit, seen: _Seen) -> dict[str, Fixed]:
         moved = scaled_lstsq(fit.slopes, seen.of(more) - seen.of(found))
         given |= kept_constant(start, one, fit, moved / fit.values / STEP, told)
     return given
+
+
+def _widened(start: Design, fit: ResponseFit, given: Mapping[str, Fixed]) -> Floats:
+    """The covariance with what the design's tolerances of the values that are not determined make of it."""
+    covariance = fit.covariance
+    for key in fit.fixed.keys() & given.keys():
+        moves = np.array([given[key].moves[name] for name in fit.names])
+        std = own_share(start, key, given[key].value) * given[key].value
+        covariance = covariance + std**2 * np.outer(moves, moves)
+    return np.asarray(covariance)
 
 
 def _model(

@@ -22,6 +22,8 @@ from analyses.records.record import Record
 STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
+AT_END = 1e-9
+"""Part of the start within which a value is at the end of what its key allows."""
 LEAST_STEPPED = 0.1
 """Part of the start below which a value's own size is no measure of its step: it may go to zero."""
 MOST_TICKS = 2_000_000
@@ -111,17 +113,14 @@ def fit_output(
 
     options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": iterations}
     found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
-    dead = np.flatnonzero(np.linalg.norm(found.jac, axis=0) <= 1e-12 * np.linalg.norm(found.fun))
-    if len(dead):
-        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
-    at_end = np.where(found.active_mask < 0, ends[0], ends[1])
+    at_end = np.abs(found.x - box) <= AT_END
     return Moved(
-        values=np.where(found.active_mask, at_end, values_at(found.x)),
+        values=np.select(list(at_end), list(ends), values_at(found.x)),
         slopes=found.jac / scale,
         rest=found.fun,
         first=first,
         iterations=int(found.njev),
-        at_bound=tuple(path for path, side in zip(paths, found.active_mask, strict=True) if side),
+        at_bound=tuple(path for path, there in zip(paths, at_end.any(axis=0), strict=True) if there),
     )
 
 
@@ -188,6 +187,9 @@ def refine_records(
         return np.concatenate(parts)
 
     found = fit_output(design, paths, output, wanted, progress)
+    dead = np.flatnonzero(np.linalg.norm(found.slopes, axis=0) == 0.0)
+    if len(dead):
+        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
     norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
     values = dict(zip(paths, found.values.tolist(), strict=True))
     return OutputErrorResult(
