@@ -292,8 +292,9 @@ def _least(
 
 
 def _from(start: Design, values: Mapping[str, float], left: Collection[str]) -> Design:
-    """A design with the values of a fit, but for those that are its own."""
-    return with_values(start, {key: one for key, one in values.items() if key not in left}, check=False)
+    """A design with the values of a fit, but for those that are its own; a small one may come back."""
+    kept = {key: max(one, parameter_value(start, key) / REACH) for key, one in values.items()}
+    return with_values(start, {key: one for key, one in kept.items() if key not in left}, check=False)
 
 
 def _determined(
