@@ -59,7 +59,6 @@ class Analysis:
     # Whether the function takes ``out`` as well, the folder, and keeps there what it finds
     keeps: bool = False
     written: str = ""  # a flag of the request that is set where the answer is written as a page or as JSON
-    warns: bool = False  # whether what is suspicious about the design is said first
     stem: str = ""  # name of the page's files; that of the command where empty
     # Folder of the page where none is given; without it, a page is made only where ``--out`` says so
     out: str = ""
@@ -70,6 +69,11 @@ class Analysis:
     def help(self) -> str:
         """What the command says of itself."""
         return cleandoc(self.words or (self.request.__doc__ if self.request else "") or "")
+
+    @property
+    def warns(self) -> bool:
+        """Whether what is suspicious about the design is said first: where loops or runs are made of it."""
+        return self.group in (LINEAR, NONLINEAR)
 
     def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
@@ -121,7 +125,7 @@ ANALYSES = (
     ),
     Analysis("init", DESIGNS, StartAsked, alone=True, function="reports.design_files.start.start"),
     Analysis("keys", DESIGNS, KeysAsked, alone=True, function="reports.design_files.keys.keys"),
-    Analysis("margins", LINEAR, MarginsAsked, warns=True),
+    Analysis("margins", LINEAR, MarginsAsked),
     Analysis(
         "stiffness",
         LINEAR,
@@ -135,9 +139,7 @@ ANALYSES = (
         """,
     ),
     Analysis("corners", LINEAR, CornersAsked, also=True),
-    Analysis(
-        "simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating", warns=True
-    ),
+    Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),
     Analysis(

@@ -207,6 +207,8 @@ def refine_records(
 def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
+    Rows that no fit is to use, as their signal is clipped, are not compared either.
+
     A record without a command is held against the torque that the design's own inertia and friction need for
     its motion, by the record's own recipe, whatever cut-off the fit had.
     """
@@ -214,7 +216,10 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
     if command_of(design, record) is not None:
         try:
             name, part = output_name(design, record), simulated_part(design, record)
-            error = correlate_record(design, part)[name].relative_error
+            signal = correlate_record(design, part)[name]
+            kept = np.full(len(part), True) if part.left_out is None else ~part.left_out
+            off = np.linalg.norm((signal.modelled - signal.measured)[kept])
+            error = float(off / np.linalg.norm(signal.measured[kept]))
             first = "" if len(part) == len(record) else f"its first {len(part)} rows "
             how = f"{name}, {first}simulated"
             return Resimulated(record=record.name, signal=name, relative_error=error, how=how)

@@ -58,6 +58,16 @@ def connected(address: str, tls: Path | None) -> Client:
 
     import distributed
 
+    class Client(distributed.Client):
+        """Closed at once where it cannot connect: collected while another starts, it would wait for ever."""
+
+        def start(self, **settings: Any) -> None:
+            try:
+                super().start(**settings)
+            except BaseException:
+                self.close()
+                raise
+
     security = None
     if tls is not None:
         files = {key: tls / name for key, name in TLS_FILES.items()}
@@ -67,7 +77,7 @@ def connected(address: str, tls: Path | None) -> Client:
         keys = {key: str(path) for key, path in files.items()}
         security = distributed.Security(require_encryption=True, **keys)
     try:
-        return distributed.Client(address, timeout=CONNECT_S, security=security)
+        return Client(address, timeout=CONNECT_S, security=security)
     except ssl.SSLError as error:
         said = f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
         raise InputError(said) from error

@@ -187,10 +187,10 @@ def place_words(place: str) -> str:
 
 
 def _cogging(result: Margins) -> str:
-    """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
-    away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
-    words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
-    return words * (away and any(one.sound is False for one in result.loops.values()))
+    """What a data sheet leaves open, where a loop is unstable by it: where in its cogging the rotor is."""
+    names = ", ".join(LOOPS[name].lower() for name in result.by_cogging)
+    away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
+    return f" ({names}: by cogging alone, {away})" if names else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
