@@ -22,6 +22,10 @@ from analyses.records.record import Record
 STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
+AT_END = 1e-9
+"""Part of the start within which a value is at the end of what its key allows."""
+LEAST_STEPPED = 0.1
+"""Part of the start below which a value's own size is no measure of its step: it may go to zero."""
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
 MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
@@ -71,17 +75,18 @@ def fit_output(
     output_of: Callable[[Design], Floats],
     measured: Floats,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    step: float = STEP,
+    iterations: int = ITERATIONS,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
     Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
-    differences of 0.1 % of each value.
+    differences of a share ``step`` of each value.
     """
     start = np.array([parameter_value(design, path) for path in paths])
-    scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
-    fields = [field_of(path) for path in paths]
-    ends = np.array([(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]).T
-    count, most = 0, ITERATIONS * (2 * len(paths) + 1)
+    scale, ends = box_of(design, paths)
+    count, most = 0, iterations * (2 * len(paths) + 1)
 
     def values_at(moved: Floats) -> Floats:
         return np.asarray(np.clip(start + scale * (moved - 1.0), *ends))
@@ -98,19 +103,32 @@ def fit_output(
     begin = np.ones(len(paths))
     first = residual(begin)
     box = 1.0 + (ends - start) / scale
-    options = {"method": "dogbox", "diff_step": STEP, "xtol": TOLERANCE, "max_nfev": ITERATIONS}
-    found = least_squares(residual, begin, jac="3-point", bounds=box, **options)
-    dead = np.flatnonzero(np.linalg.norm(found.jac, axis=0) <= 1e-12 * np.linalg.norm(found.fun))
-    if len(dead):
-        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
+
+    def slopes(moved: Floats) -> Floats:
+        to = step * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
+        both = [np.clip(moved + side * to, *box) for side in (1.0, -1.0)]
+        pairs = zip(*both, strict=True)
+        change = np.array([residual(up) - residual(down) for up, down in pairs])
+        return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
+
+    options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": iterations}
+    found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
+    at_end = np.abs(found.x - box) <= AT_END
     return Moved(
-        values=values_at(found.x),
+        values=np.select(list(at_end), list(ends), values_at(found.x)),
         slopes=found.jac / scale,
         rest=found.fun,
         first=first,
         iterations=int(found.njev),
-        at_bound=tuple(path for path, side in zip(paths, found.active_mask, strict=True) if side),
+        at_bound=tuple(path for path, there in zip(paths, at_end.any(axis=0), strict=True) if there),
     )
+
+
+def box_of(design: Design, paths: Sequence[str]) -> tuple[Floats, Floats]:
+    """What each value is measured by, shape (p,), and the least and the largest of its key, shape (2, p)."""
+    fields = [field_of(path) for path in paths]
+    ends = [(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]
+    return np.array([_scale(design, path, parameter_value(design, path)) for path in paths]), np.array(ends).T
 
 
 def _scale(design: Design, path: str, start: float) -> float:
@@ -169,6 +187,9 @@ def refine_records(
         return np.concatenate(parts)
 
     found = fit_output(design, paths, output, wanted, progress)
+    dead = np.flatnonzero(np.linalg.norm(found.slopes, axis=0) == 0.0)
+    if len(dead):
+        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
     norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
     values = dict(zip(paths, found.values.tolist(), strict=True))
     return OutputErrorResult(
