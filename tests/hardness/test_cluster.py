@@ -197,7 +197,6 @@ def deadly(number: int) -> int:
 def test_a_part_that_kills_its_workers_is_one_line(monkeypatch) -> None:
     import dask
 
-    monkeypatch.setattr(clusters, "_RETRIES", 0)
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         pytest.raises(NumericalError, match="workers keep dying over one part"),
