@@ -45,8 +45,8 @@ class Analysis:
     request: type | None = None
     _: KW_ONLY
     words: str = ""  # the command's help, its first paragraph stands in the list; docstring of the request
-    # ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
-    # result says ``passed``, that is the exit status.
+    # ``package.name`` of ``(design, request) -> result``; where empty that of the command's name in the
+    # module ``run`` beside the request. Where the result says ``passed``, that is the exit status.
     function: str = ""
     # The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
     # that of a list
@@ -84,7 +84,8 @@ class Analysis:
         return (made(design, **values) if made else self.request(**values),)
 
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
-        package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
+        beside = self.request.__module__.rpartition(".")[0] if self.request else ""
+        package, _, name = (self.function or f"{beside}.run.{self.name}").rpartition(".")
         of = () if self.alone else (design,)
         return getattr(import_module(package), name)(*of, *asked, **more)
 
@@ -129,6 +130,7 @@ ANALYSES = (
     Analysis(
         "stiffness",
         LINEAR,
+        function="analyses.stiffness.stiffness",
         words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
@@ -171,19 +173,12 @@ ANALYSES = (
         "identify",
         RECORDS,
         IdentificationAsked,
-        function="analyses.identification.run.identify",
         doing="identifying",
         stem="identification",
         example="analyses.records.campaign_file",
     ),
     Analysis(
-        "correlate",
-        RECORDS,
-        CorrelationAsked,
-        function="analyses.correlation.run.correlate",
-        shown="correlation",
-        doing="simulating",
-        stem="correlation",
+        "correlate", RECORDS, CorrelationAsked, shown="correlation", doing="simulating", stem="correlation"
     ),
     Analysis(
         "compare",
@@ -206,7 +201,7 @@ ANALYSES = (
         keeps=True,
         out="out/montecarlo",
     ),
-    Analysis("tune", STUDIES, TuningAsked, function="analyses.tuning.tune", doing="tuning", out="out/tune"),
+    Analysis("tune", STUDIES, TuningAsked, doing="tuning", out="out/tune"),
     Analysis(
         "nightly",
         STUDIES,
@@ -223,7 +218,6 @@ ANALYSES = (
         AskedController,
         page=False,
         function="reports.exports.export_controller",
-        shown="listing",
     ),
     Analysis("export fmu", EXPORTS, AskedFmu, page=False, function="reports.exports.export_fmu"),
     Analysis("export linear", EXPORTS, AskedLinear, page=False, function="reports.exports.export_linear"),
