@@ -195,7 +195,8 @@ def _given(start: Design, fit: ResponseFit, seen: _Seen) -> dict[str, Fixed]:
         key, told = parameter(one).key, fit.fixed[one].reason if one in fit.fixed else ""
         more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
         moved = scaled_lstsq(fit.slopes, seen.of(more) - seen.of(found))
-        given |= kept_constant(start, one, fit, moved / fit.values / STEP, told)
+        share = np.divide(moved, STEP * fit.values, out=np.zeros_like(moved), where=fit.values != 0.0)
+        given |= kept_constant(start, one, fit, share, told)
     return given
 
 

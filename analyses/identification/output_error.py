@@ -88,8 +88,10 @@ def fit_output(
     scale, ends = box_of(design, paths)
     count, most = 0, iterations * (2 * len(paths) + 1)
 
+    box = 1.0 + (ends - start) / scale
+
     def values_at(moved: Floats) -> Floats:
-        return np.asarray(np.clip(start + scale * (moved - 1.0), *ends))
+        return np.select(list(np.abs(moved - box) <= AT_END), list(ends), start + scale * (moved - 1.0))
 
     def residual(moved: Floats) -> Floats:
         nonlocal count
@@ -102,7 +104,6 @@ def fit_output(
 
     begin = np.ones(len(paths))
     first = residual(begin)
-    box = 1.0 + (ends - start) / scale
 
     def slopes(moved: Floats) -> Floats:
         to = step * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
@@ -113,14 +114,14 @@ def fit_output(
 
     options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": iterations}
     found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
-    at_end = np.abs(found.x - box) <= AT_END
+    values = values_at(found.x)
     return Moved(
-        values=np.select(list(at_end), list(ends), values_at(found.x)),
+        values=values,
         slopes=found.jac / scale,
         rest=found.fun,
         first=first,
         iterations=int(found.njev),
-        at_bound=tuple(path for path, there in zip(paths, at_end.any(axis=0), strict=True) if there),
+        at_bound=tuple(path for path, one, at in zip(paths, values, ends.T, strict=True) if one in at),
     )
 
 

@@ -153,6 +153,15 @@ def test_a_delay_that_is_not_told_is_the_design_s_and_the_others_hang_on_it(tmp_
     assert "its standard error is larger than the design's value: not determined" in kept.reason
 
 
+def test_a_value_that_would_be_negative_ends_at_zero_and_is_named(tmp_path) -> None:
+    """The truth leads by 0.1 ms where the model may only lag: 0 s exactly, and the check fails."""
+    seen = open_loop(HERTZ, {**TRUTH, "control.computing_delay": 0.0}) * np.exp(2e-4j * np.pi * HERTZ)
+    result = identify_response(_design(OFF), _written(tmp_path, HERTZ, seen, 0.01))
+    assert result.fit["control.computing_delay"] == 0.0
+    assert result.fit.at_bound == ("control.computing_delay",)
+    assert not result.passed
+
+
 def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> None:
     """A source 10 % stronger, with all inertias, stiffness and friction 10 % larger, is the same loop."""
     result = _found(tmp_path, "L", 1e-7, 0, stated=False)
