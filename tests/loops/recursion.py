@@ -74,7 +74,8 @@ def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0
     f = f if f > 1e-9 else 0.0  # the rule of `split_delay`: an unstable drive would show the difference
     pieces = []
     for h in (f * Ts, (1 - f) * Ts):
-        whole, (size, _) = matrix_balance(np.block([[A * h, B * h], [np.zeros((3, 8))]]), permute=0, separate=1)
+        whole = np.block([[A * h, B * h], [np.zeros((3, 8))]])
+        whole, (size, _) = matrix_balance(whole, permute=False, separate=True)
         E = size[:, None] * expm(whole) / size  # without the balance a stiff one loses seven digits
         pieces.append((E[:5, :5], E[:5, 5:]))
     plain = Unlimited(design, inject or {})
