@@ -18,6 +18,7 @@ ULP = 8  # by how much the entries may be wrong
 NEIGHBOURS = 6
 STEP = arb(2) ** -100
 NEXT = 1e-12  # relative: to the end of an interval
+LOWEST = 1e-60  # of an interval that begins at rest: poles may lie twelve decades below the delay
 BITS = (256, 1024, 4096, 16384)
 
 
@@ -115,7 +116,7 @@ def late_gains(loop: control.LTI, delay_s: float, top: float) -> list[tuple[floa
         edges = sorted({0.0, top, *(w for w in (*axis, *map(float, positive(slope))) if w < top)})
         found = []
         for low, high in pairwise(edges):
-            low, high = low * (1.0 + NEXT) or NEXT * high, high * (1.0 - NEXT)
+            low, high = low * (1.0 + NEXT) or LOWEST * high, high * (1.0 - NEXT)
             first, last = sorted((half_turns(low) / 2, half_turns(high) / 2), key=float)
             turns = range(int(first.ceil().unique_fmpz()), int(last.floor().unique_fmpz()) + 1)
             for k in turns:
