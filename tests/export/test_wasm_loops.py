@@ -36,9 +36,9 @@ STAGES = {
     "w_ref": linear.AT_SPEED, "i_ref": linear.AT_CURRENT, "u": linear.AT_VOLTAGE,
 }  # fmt: skip
 ANGLES = np.geomspace(1e-2, 3.1, 40)  # rad per sample; below, z I - A of the linear form loses digits
-# Of the random drives, whose numbers are 1e-9 beyond what a nudge of the design's values moves: the rounding of the
-# matrices themselves moves them, whose poles lie 1e-8 from one (3, 61), whose inner loop grows by 4e10 a sample (57)
-# or whose path to the current starts with states of 1e5 (8). 1, 32: more states than figures of many designs take.
+# Of the random drives. Four are 1e-9 beyond what a nudge of the design's values moves: the rounding of the
+# matrices moves them, whose poles lie 1e-8 from one (3, 61), whose inner loop grows by 4e10 a sample (57), or
+# whose states before the current are 1e5 (8). 1, 32: more states than figures of many designs take.
 MISSED = (1, 3, 8, 32, 57, 61)
 FURTHEST_DB = 200.0  # a crossing further off than this is where rounding makes the phase
 
