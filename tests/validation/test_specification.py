@@ -45,6 +45,22 @@ def test_the_simulated_rate_is_that_of_the_closed_form(name: str) -> None:
             assert one.simulated_current_A == pytest.approx(one.figures.motor_current_A, rel=1e-6)
 
 
+def test_a_drive_that_takes_an_hour_to_run_up_is_run_for_its_start(monkeypatch) -> None:
+    """No run is beyond the 60 000 samples of a step; the acceleration is that of the closed form."""
+    ran = []
+
+    def counted(design, command, time, load, **more):
+        ran.append(time / design.controller.period_s)
+        return simulate(design, command, time, load, **more)
+
+    monkeypatch.setattr("analyses.specification.capability.simulate", counted)
+    slow = changed(AMBER, load={"inertia_kgm2": 1e9 * AMBER.load.inertia_kgm2})
+    push = drive_figures(slow, 0.0).acceleration_rad_s2
+    found = specification(slow).capabilities[0].simulated_acceleration_rad_s2
+    assert max(ran) <= 60_000
+    assert 0.9 < found / push <= 1.0 + 1e-9
+
+
 def test_current_and_rate_at_8_Nm(amber: Specification) -> None:
     """(C0 + CM 8 + Cv 942.5)/kM = 3.037 A, three quarters of the continuous current; paper: 22.7 deg/s."""
     loaded = amber.capabilities[1]
