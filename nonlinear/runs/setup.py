@@ -20,6 +20,7 @@ from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
 
 CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
+STAGE_OF = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}
 STATE_PLACES = {  # where a run begins with each number of a `State` (in the row), and ends with it
     "motor_angle_rad": (at.ANGLE_START, at.S_ANGLE),
     "motor_speed_rad_s": (at.SPEED_START, at.S_SPEED),
@@ -222,10 +223,7 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
         if probe.point in seen:
             raise InputError(f"two probes at {probe.point}: one a point is allowed")
         seen.add(probe.point)
-        stage = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}.get(
-            probe.point
-        )
-        if stage is not None and not row[stage]:
+        if probe.point in STAGE_OF and not row[STAGE_OF[probe.point]]:
             raise InputError(f"probe point = {probe.point!r}: this design has no such stage")
         place = write_probe(probe, row)
         if isinstance(probe.injection, Command):
