@@ -15,7 +15,7 @@ from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
-from nonlinear.loads import LoadMoment, as_load
+from nonlinear.loads import LoadMoment, constant
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
 
@@ -115,7 +115,7 @@ class Run:
             if signal is not None:
                 check_frequency(design, signal)
                 _put_signal(row, place, signal, tables)
-        _put_load(row, as_load(self.load_Nm), tables)
+        _put_load(row, self.load_Nm, tables)
         _put_probes(row, self.probes, tables)
         put_state(row, self.initial or State())
         if 2 * self.reducers.window_ticks > row[at.TICKS]:
@@ -182,8 +182,9 @@ def check_frequency(design: Design, command: Command) -> None:
         raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
 
 
-def _put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
-    """Write the load torque."""
+def _put_load(row: Floats, given: float | LoadMoment, tables: Tables) -> None:
+    """Write the load torque; a plain number is a constant one."""
+    load = given if isinstance(given, LoadMoment) else constant(given)
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:
