@@ -18,7 +18,7 @@ from reports.cli.output import console, printable
 from reports.document_schema import GOES_ON
 from reports.html import show_signed
 from reports.numbers import prose, show
-from reports.verdict_summary import role, why
+from reports.verdict_summary import judged, role, tally, walk, why
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
@@ -57,9 +57,9 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
         out.print(Text(f"note: {note}", style="yellow"))
 
 
-def print_verdict(passed: bool | Verdict, words: str) -> None:
+def print_verdict(passed: bool | Verdict, words: str, but: str = "") -> None:
     verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
-    line = Text().append(HEADS[verdict], style=COLOURS[verdict.role()])
+    line = Text().append(HEADS[verdict] + but, style=COLOURS[verdict.role()])
     console().print(line.append(f"  {printable(prose(words))}"), soft_wrap=True)
 
 
@@ -69,7 +69,8 @@ def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, nam
     if passed is None:
         console().print(Text(printable(words)), soft_wrap=True)
     else:
-        print_verdict(passed, words)
+        open_ones = tally(judged(walk(section))).not_proven if passed is True else 0
+        print_verdict(passed, words, f", {open_ones} not proven" if open_ones else "")
     if section["intro"]:
         console().print(Text(section["intro"], style="dim"))
     print_blocks(section["blocks"])

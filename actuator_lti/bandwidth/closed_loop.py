@@ -25,7 +25,7 @@ from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
-from actuator_lti.systems.exact_fraction import Fraction, dc_noise, exact_fraction, shown
+from actuator_lti.systems.exact_fraction import dc_noise, shown
 from actuator_lti.systems.measured_response import is_measured
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
@@ -72,36 +72,28 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
             return _of_delays(system, delay_s, level)
         system, delay_s = plain
     system = _without_rest_mode(system)
-    loop, fraction = rational_loop(system), exact_fraction(system)
-    seen = shown(fraction, loop)
-    response = RationalResponse.of(seen, loop.in_z)
-    if response is None:
+    loop, given = rational_loop(system), given_of(system)
+    exact = exact_loop(given)
+    seen = shown(exact, loop)
+    if seen.D[0] == 0:
         raise InputError(_POLE)
-    if seen is not fraction:
-        at = 1 if loop.in_z else 0
-        if _taken(fraction, response.dc, at):
-            raise InputError(_NO_GAIN)
-        if _told(given_of(system), response.dc, at):
-            response = RationalResponse.of(fraction, loop.in_z) or response
+    response = RationalResponse(seen.N, seen.D)
+    if seen is not exact:
+        if exact.D[0] != 0 and abs(flint.fmpq(exact.N[0], exact.D[0])) < _TAKEN * abs(response.dc):
+            raise InputError(_NO_GAIN)  # a mode seen at zero frequency alone takes the gain: a spring
+        if _told(given, response.dc):
+            response = RationalResponse(exact.N, exact.D)
     if abs(response.lead) <= dc_noise(loop):
         raise InputError(_NO_GAIN)
     floor = _FLOOR * abs(response.lead)
-    if delay_s:
-        turn = first_turn(loop_of(given_of(system), warp=True), delay_s, floor)
-    else:
-        turn = response.first_turn(floor)
+    late = loop_of(given, warp=True) if delay_s else None
+    turn = first_turn(late, delay_s, floor) if late else response.first_turn(floor)
     return _bandwidth(response, turn, level, loop.period_s)
 
 
-def _taken(fraction: Fraction, dc: flint.fmpq, at: int) -> bool:
-    """Whether a mode seen at zero frequency alone takes the gain away there: a spring, however weak."""
-    below = fraction.den(at)
-    return bool(below != 0 and abs(fraction.num(at) / below) < _TAKEN * abs(dc))
-
-
-def _told(given: Given, dc: flint.fmpq, at: int) -> bool:
+def _told(given: Given, dc: flint.fmpq) -> bool:
     """Whether 8 ulp of the entries leave the gain at zero frequency what it is, apart from that given."""
-    values = []
+    values, at = [], 0 if given.period_s is None else 1
     for num, den in map(exact_polynomials, (given, *given.neighbours())):
         if den(at) == 0:
             return False

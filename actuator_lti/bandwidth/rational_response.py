@@ -1,7 +1,5 @@
 """What a rational response does over frequency, see `DelayResponse`: certified roots, no grid."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
@@ -11,7 +9,7 @@ from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.real_roots import positive_roots
 from actuator_lti.margins.exact.roots import V, split
-from actuator_lti.systems.exact_fraction import Fraction, double
+from actuator_lti.systems.exact_fraction import double
 
 _BITS = 128
 
@@ -22,12 +20,6 @@ class RationalResponse:
 
     N: fmpz_poly
     D: fmpz_poly
-
-    @classmethod
-    def of(cls, fraction: Fraction, sampled: bool) -> RationalResponse | None:
-        """Of a transfer function; ``None``: a pole at zero frequency."""
-        num, den = fraction.warped() if sampled else (fraction.num, fraction.den)
-        return cls(num.numer() * den.denom(), den.numer() * num.denom()) if den[0] != 0 else None
 
     @property
     def dc(self) -> fmpq:

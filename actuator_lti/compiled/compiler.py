@@ -29,15 +29,14 @@ class Target:
     zig: str
     wheel: str
     suffix: str
-    flags: tuple[str, ...]
 
 
 TARGETS = {
-    "linux-x86_64": Target("x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64", ".so", ("-shared", "-fPIC")),
-    "linux-aarch64": Target("aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64", ".so", ("-shared", "-fPIC")),
-    "win32-AMD64": Target("x86_64-windows-gnu", "win_amd64", ".dll", ("-shared",)),
-    "darwin-x86_64": Target("x86_64-macos.11.0", "macosx_11_0_x86_64", ".dylib", ("-shared", "-fPIC")),
-    "darwin-arm64": Target("aarch64-macos.11.0", "macosx_11_0_arm64", ".dylib", ("-shared", "-fPIC")),
+    "linux-x86_64": Target("x86_64-linux-gnu.2.17", "manylinux_2_17_x86_64", ".so"),
+    "linux-aarch64": Target("aarch64-linux-gnu.2.17", "manylinux_2_17_aarch64", ".so"),
+    "win32-AMD64": Target("x86_64-windows-gnu", "win_amd64", ".dll"),
+    "darwin-x86_64": Target("x86_64-macos.11.0", "macosx_11_0_x86_64", ".dylib"),
+    "darwin-arm64": Target("aarch64-macos.11.0", "macosx_11_0_arm64", ".dylib"),
 }
 HERE = f"{sys.platform}-{platform.machine()}"
 
@@ -88,11 +87,11 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
     ``portable``: for every machine of the target, as in a wheel: by zig, with an old C library. `InputError`:
     there is no compiler, or it fails.
     """
-    known = TARGETS.get(target)
-    more, flags = (["-target", known.zig], known.flags) if known else ([], ("-shared", "-fPIC"))
+    more = ["-target", TARGETS[target].zig] if target in TARGETS else []
     allowed = "gcc, clang, or pip install ziglang"
     command = _chosen(target, more, allowed, own=target == HERE and not portable)
-    return compile_files({"kernels.c": text}, output, target, (*LIBRARY_FLAGS, *flags), command=command)
+    flags = (*LIBRARY_FLAGS, "-shared", *(() if output.endswith(".dll") else ("-fPIC",)))
+    return compile_files({"kernels.c": text}, output, target, flags, command=command)
 
 
 def compile_files(

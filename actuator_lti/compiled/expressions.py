@@ -6,7 +6,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from actuator_lti.compiled.kernel import is_kernel
+from actuator_lti.compiled.kernel import is_marked
 from actuator_lti.compiled.kinds import FUNCTIONS, Function, Kind, c_float, c_name, named
 
 Text = tuple[str, Kind]
@@ -193,7 +193,7 @@ class Expressions:
         """
         self.want(not node.keywords, node, "arguments by name are not in the subset")
         value = named(node.func, self.function.scope)
-        self.want(is_kernel(value), node, f"{ast.unparse(node.func)} is no compiled function")
+        self.want(is_marked(value, "kernel"), node, f"{ast.unparse(node.func)} is no compiled function")
         emitted = [self.emit(argument) for argument in node.args]
         callee = self.call(value, [kind for _, kind in emitted], node, self.function)
         for argument, name in zip(node.args, callee.arguments, strict=True):

@@ -1,43 +1,28 @@
-"""The mark of a function that is compiled: written in the subset of Python that becomes C.
+"""The marks of a function that is compiled: written in the subset of Python that becomes C.
 
 It runs in Python as it stands, slowly: for a debugger, and as the reference of the compiled form.
 """
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, Literal, TypeVar
 
 Written = TypeVar("Written", bound=Callable[..., Any])
-_MARK, _SELDOM, _WIDE = "is_kernel", "is_seldom", "is_wide"
+Mark = Literal["kernel", "seldom", "wide"]
 
 
-def kernel(function: Written) -> Written:
-    """Mark a function of the subset."""
-    setattr(function, _MARK, True)
-    return function
+def _marking(mark: Mark) -> Callable[[Written], Written]:
+    def marked(function: Written) -> Written:
+        setattr(function, f"is_{mark}", True)
+        return function
+
+    return marked
 
 
-def seldom(function: Written) -> Written:
-    """Mark a kernel that is called where something happens: `Form` leaves it as it is."""
-    setattr(function, _SELDOM, True)
-    return function
+def is_marked(value: object, mark: Mark) -> bool:
+    """Whether something is a function with a mark."""
+    return callable(value) and getattr(value, f"is_{mark}", False)
 
 
-def wide(function: Written) -> Written:
-    """Mark a kernel whose loop becomes vector instructions: it is there for AVX2 too."""
-    setattr(function, _WIDE, True)
-    return function
-
-
-def is_wide(value: object) -> bool:
-    """Whether something is marked by `wide`."""
-    return bool(getattr(value, _WIDE, False))
-
-
-def is_seldom(value: object) -> bool:
-    """Whether something is marked by `seldom`."""
-    return bool(getattr(value, _SELDOM, False))
-
-
-def is_kernel(value: object) -> bool:
-    """Whether something is a function that `kernel` has marked."""
-    return callable(value) and getattr(value, _MARK, False)
+kernel = _marking("kernel")  # a function of the subset
+seldom = _marking("seldom")  # a kernel that is called where something happens: `Form` leaves it as it is
+wide = _marking("wide")  # a kernel whose loop becomes vector instructions: it is there for AVX2 too

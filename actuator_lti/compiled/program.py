@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.compiled.expressions import Constant, Expressions
 from actuator_lti.compiled.form import Form, Known
-from actuator_lti.compiled.kernel import is_seldom, is_wide
+from actuator_lti.compiled.kernel import is_marked
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name, tree_of
 from actuator_lti.compiled.statements import INDENT, Statements, result_type
 
@@ -116,7 +116,7 @@ def program_of(collector: Collector, names: Sequence[str], second: Sequence[_For
         inner = function.prefix != prefix and not root
         linkage = "" if public else _INLINED if inner else "static "
         linkage += f"{prefix}clones " if root else ""
-        linkage += f"{prefix}wide " if is_wide(function.scope.get(function.name)) else ""
+        linkage += f"{prefix}wide " if is_marked(function.scope.get(function.name), "wide") else ""
         texts.append(collector.definition(function, linkage + head, lines))
     texts = [f"static {collector.head(formed.root)};" for formed in second] + texts
     parts = "\n".join(types), "\n".join(texts)
@@ -214,7 +214,8 @@ class _Formed(Collector):
         return function
 
     def call(self, python: Any, kinds: list[Kind], node: ast.AST | None, caller: Function | None) -> Function:
-        return (self.program.call if is_seldom(python) else super().call)(python, kinds, node, caller)
+        collect = self.program.call if is_marked(python, "seldom") else super().call
+        return collect(python, kinds, node, caller)
 
 
 def declared(function: Function) -> list[str]:

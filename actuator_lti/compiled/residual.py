@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from actuator_lti.compiled.form import Known
-from actuator_lti.compiled.kernel import is_kernel
+from actuator_lti.compiled.kernel import is_marked
 from actuator_lti.compiled.kinds import named, stored, tree_of
 from actuator_lti.compiled.statements import overlap, without_docstring
 
@@ -163,7 +163,7 @@ class _Body(Known):
     def visit_Call(self, node: ast.Call) -> ast.expr:
         arguments = [self.visit(each) for each in node.args]
         target = named(node.func, {**_BUILT_IN, **self.scope})
-        if not is_kernel(target):
+        if not is_marked(target, "kernel"):
             if callable(target) and all(isinstance(each, ast.Constant) for each in arguments):
                 return ast.Constant(target(*(each.value for each in arguments)))
             return _unlimited(node.func, arguments) or ast.Call(node.func, arguments, [])

@@ -1,7 +1,4 @@
-"""Measurement, control, limits and supply of a drive as data, and the keys that they are read from.
-
-A stage that the drive does not have is ``None``; a limit that it does not have is ``inf``.
-"""
+"""Measurement, control, limits and supply of a drive as data, and the keys that they are read from."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -322,11 +319,8 @@ class Limits:
         if self.peak_time_s is None:
             return None
         r2 = (self.peak_current_A / self.continuous_current_A) ** 2
-        return (
-            self.peak_time_s * (r2 - 1)
-            if self.overload == "excess"
-            else self.peak_time_s / np.log(r2 / (r2 - 1))
-        )
+        excess = self.overload == "excess"
+        return self.peak_time_s * (r2 - 1) if excess else self.peak_time_s / np.log(r2 / (r2 - 1))
 
 
 @dataclass(frozen=True, kw_only=True)

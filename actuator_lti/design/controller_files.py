@@ -130,9 +130,8 @@ def _torque_mode(given: Tree, design: Design) -> str:
     by_current = str(given.get("torque_controller")).endswith(("foc_current", "dc_current"))
     if by_current == (design.controller.current is not None):
         return ""
-    return f"its torque control is by {'current' if by_current else 'voltage'}; allowed: a design " + (
-        "with [control.current]" if by_current else "without [control.current]"
-    )
+    kind, there = ("current", "with") if by_current else ("voltage", "without")
+    return f"its torque control is by {kind}; allowed: a design {there} [control.current]"
 
 
 def _motor_type(given: Tree, design: Design) -> str:

@@ -208,13 +208,7 @@ FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
 
 
 def field_of(path: str) -> Field | None:
-    """The field of a dotted path such as ``"gear.planetary.ratio"``; None if there is none.
-
-    Examples
-    --------
-    >>> field_of("gear.worm.ratio").path
-    'gear.*.ratio'
-    """
+    """The field of a dotted path such as ``"gear.planetary.ratio"``; None if there is none."""
     return None if "*" in path else FIELDS.get(template_of(path))
 
 

@@ -24,18 +24,11 @@ _AT_MOTOR = re.compile(
 _TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?)\s*")
 BARE = re.compile(r"\s*[0-9.]+\s*\Z")
 _ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
+Takes = Callable[[str, str], bool]
 _COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
 
 
-def with_numbers(
-    word: str,
-    path: str,
-    key: str,
-    table: Tree,
-    tree: Tree,
-    frame: Frame,
-    takes: Callable[[str, str], bool],
-) -> str:
+def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree, frame: Frame, takes: Takes) -> str:
     """The words of a hint with the numbers of the file: of the key's own table and of the whole ``tree``.
 
     ``takes`` tells whether a key reads a text as it stands.
@@ -119,7 +112,7 @@ def _over_step(text: Any, section: str, frame: Frame) -> str:
     return f"; here {over:.10g} counts" if over else ""
 
 
-def _lines(value: Any, word: str, takes: Callable[[str, str], bool]) -> str:
+def _lines(value: Any, word: str, takes: Takes) -> str:
     """A number of lines or counts, as a file says which."""
     number = re.match(r"\s*[0-9]+", f"{value}")
     if "some makers" not in word or number is None:

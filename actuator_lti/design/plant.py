@@ -1,8 +1,4 @@
-"""The plant of a drive as data, and the keys of the file that it is read from.
-
-All values are in SI units on the motor side unless a name says otherwise.  For a linear axis
-(``axis = "linear"``) read N for N m, m for rad, kg for kg m2 in every name.
-"""
+"""The plant of a drive as data (units: `actuator_lti.design.model`), and the keys of the file."""
 
 from dataclasses import dataclass, replace
 from math import inf, pi

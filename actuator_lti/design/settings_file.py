@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, get_args
 from xml.etree.ElementTree import Element, ParseError, SubElement, indent, register_namespace, tostring
 
+import tomli_w
+
 from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH
 from actuator_lti.design.asked import ControllerObject, ControllerObjects, ObjectFamily, ObjectPlace
 from actuator_lti.design.objects import OBJECTS, checked_objects
@@ -20,13 +22,28 @@ _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 
 
 def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Read a settings file; XML where it begins with ``<``, else TOML.
+    """Read a settings file, see `parse_settings`."""
+    return parse_settings(read_text(path, "settings file"), shown_path(path), velocity_gain_factor)
 
+
+def parse_settings(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
+    """Settings from XML where the text begins with ``<``, else from TOML.
+
+    XML: the actual values of its CANopen objects and sub-objects; no DTD, no entities.
+    TOML: ``velocity_gain_factor``, and ``"0x2344.01" = 120000`` in a table ``[objects]``.
     The factor is 1 (per rad/s) or 9.549 (per rpm); without it what a TOML file says, else 1.
     """
-    text = read_text(path, "settings file")
-    read = read_settings_xml if text.lstrip().startswith("<") else read_settings_toml
-    return read(text, shown_path(path), velocity_gain_factor)
+    with in_file(where):
+        if text.lstrip().startswith("<"):
+            values = tuple(item for item, _ in _objects_in(parsed_xml(text)))
+            result = checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor)
+            none = "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC"
+        else:
+            result = objects_from(parse_toml(text, where), velocity_gain_factor, "objects")
+            none = 'objects: missing; allowed: a table with entries such as "0x2344.01" = 344'
+        if not result.values:
+            raise InputError(none)
+    return result
 
 
 def parse_label(label: str) -> tuple[int, int]:
@@ -77,19 +94,8 @@ def objects_from(raw: Any, factor: float | None = None, values: str = "values") 
     return replace(checked_objects(read, factor), family=family)
 
 
-def read_settings_toml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Settings from TOML: ``velocity_gain_factor``, and ``"0x2344.01" = 120000`` in a table ``[objects]``."""
-    with in_file(where):
-        result = objects_from(parse_toml(text, where), velocity_gain_factor, "objects")
-        if not result.values:
-            raise InputError('objects: missing; allowed: a table with entries such as "0x2344.01" = 344')
-    return result
-
-
 def write_settings_toml(objects: ControllerObjects) -> str:
     """Settings as TOML, each known object with its meaning and unit beside it."""
-    import tomli_w
-
     lines = [
         "# Settings of the motion controller, in the units of its own objects.",
         f"velocity_gain_factor = {objects.velocity_gain_factor!r}  # 1: 0x2344.01 per rad/s; 9.549: per rpm",
@@ -103,20 +109,6 @@ def write_settings_toml(objects: ControllerObjects) -> str:
         comment = f"{known.meaning}, {known.unit}" if known else "kept as it came"
         lines.append(f'"{item.label}" = {inline}  # {comment}')
     return "\n".join(lines) + "\n"
-
-
-def read_settings_xml(text: str, where: str, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Settings from XML: the actual values of its CANopen objects and sub-objects.
-
-    No DTD, no entities and no external references are accepted.
-    """
-    with in_file(where):
-        values = tuple(item for item, _ in _objects_in(parsed_xml(text)))
-        if not values:
-            raise InputError(
-                "holds no CANopenObject with an actualValue, nor is it an MCConfiguration of a VESC"
-            )
-        return checked_objects(values, 1.0 if velocity_gain_factor is None else velocity_gain_factor)
 
 
 def parsed_xml(text: str) -> Element:
@@ -179,7 +171,7 @@ def _object_of(element: Element, place: ObjectPlace) -> ControllerObject:
 
 
 def write_settings_xml(objects: ControllerObjects) -> str:
-    """Settings as ``.xdc``-style XML that :func:`read_settings_xml` turns back into the same objects."""
+    """Settings as ``.xdc``-style XML that `parse_settings` turns back into the same objects."""
     root = listed = Element("ISO15745ProfileContainer", {"xmlns": _NAMESPACE})
     for tag in ("ISO15745Profile", "ProfileBody", "ApplicationLayers", "CANopenObjectList"):
         listed = SubElement(listed, tag)

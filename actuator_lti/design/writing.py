@@ -10,6 +10,8 @@ from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
 from typing import Any, cast
 
+import tomli_w
+
 from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
@@ -33,8 +35,6 @@ def write_design(design: Design) -> str:
 
     Values stay as they were written, with source, grade and tolerance; comments are not kept.
     """
-    import tomli_w
-
     return tomli_w.dumps(design_tree(as_design(design)))
 
 
@@ -43,8 +43,6 @@ def write_changed(before: Design, after: Design) -> str:
 
     Where that does not read as the same design, or the file is gone: as `write_design` has it.
     """
-    import tomli_w
-
     with suppress(InputError):
         raw = parse_toml(design_text(before.origin), before.origin)
         text = tomli_w.dumps(_changed(raw, design_tree(as_design(before.origin)), design_tree(after)))
@@ -172,8 +170,6 @@ def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
 
 def overridden_text(design: Design, path: str, value: Any) -> str:
     """The design file with one key changed as `with_overrides` does, without a look at the value."""
-    import tomli_w
-
     tree = design_tree(design)
     _override(tree, path, value, design)
     return tomli_w.dumps(tree)

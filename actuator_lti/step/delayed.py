@@ -40,21 +40,18 @@ def delayed_response(system: Any) -> tuple[Motion, float, Pieces]:
     poles, at_rest = sorted_poles(collocated(form, _POINTS), False), DelayResponse.of(form)
     if at_rest.order > 0 or poles.unstable or poles.border > 1:
         raise InputError(UNSTABLE)
-    final = 0.0 if at_rest.order else at_rest.lead
-    around = 1j * np.abs(poles.values[np.abs(poles.values) > 0.0])
-    if final == 0.0:
+    if at_rest.order:
         raise InputError(NO_FINAL)
+    final, around = at_rest.lead, 1j * np.abs(poles.values[np.abs(poles.values) > 0.0])
     if abs(final) <= _ZERO * float(np.abs(response(system, around)).max(initial=0.0)):
         raise NumericalError(LOST)
     head, u = _FIRST * float(form.delays_s.max()), np.ones(1)
-    if head > MOST_PIECES * float(form.delays_s.min()):
-        raise NumericalError(_OFTEN)
     walk = DelayStepper(system, 0.0, np.zeros(form.states), u)
-    while True:
+    while head <= MOST_PIECES * float(form.delays_s.min()):
         try:
             walk.at(head, u)
         except InputError:  # more pieces than it takes
-            raise NumericalError(_OFTEN) from None
+            break
         begins, lengths, series = walk.pieces()
         series = series[..., 0] / final
         series[:, -1] -= 1.0
@@ -66,6 +63,7 @@ def delayed_response(system: Any) -> tuple[Motion, float, Pieces]:
             A = acb_mat(n, n, [complex(p) for p in np.diag(exact).ravel()])
             return Motion(A, np.ones(n), state, False, head), final, (begins, lengths, series)
         head *= 2.0
+    raise NumericalError(_OFTEN)
 
 
 def collocated(form: DelayForm, points: int) -> Real:

@@ -9,25 +9,19 @@ c (1 - A)^-1 ((1 + A)/(1 - A))^k x.
 Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Orthogonal Basis Functions, 2005.
 """
 
+import math
 from typing import Any
 
 import numpy as np
-from flint import acb, acb_mat, acb_poly, arb, ctx, fmpq_poly
+from flint import acb, acb_mat, acb_poly, arb, arb_poly, ctx, fmpq, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
+from actuator_lti.margins.exact.loop import ExactLoop, exact_loop
 from actuator_lti.margins.exact.roots import at_enough_bits
+from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.search import OVER, Search
-from actuator_lti.systems.exact_fraction import (
-    balls,
-    dc_noise,
-    divided,
-    double,
-    exact_fraction,
-    near_dc,
-    roots,
-    shown,
-)
+from actuator_lti.systems.exact_fraction import dc_noise, divided, double, near_dc, of_s, shown
 from actuator_lti.types import Complex, Real
 
 UNSTABLE = "the system is not stable: it has no step figures"
@@ -132,36 +126,33 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
     exactly from its doubles, its roots are isolated in certified balls, and the coordinates of the motion are
     computed in as many digits as they need.
     """
-    whole = exact_fraction(system)
-    f, hidden = shown(whole, loop), whole.whole_den / whole.den
-    num, den = f.warped() if loop.in_z else (f.num, f.den)
+    exact = shown(exact_loop(given_of(system)), loop)
+    N, D = exact.N, exact.D
+    final = double(fmpq(N[0], D[0])) if D[0] != 0 else math.inf
 
     def motion() -> Motion | None:
-        poles = _poles(loop, f.den, hidden)
-        if num[0] == 0:
+        poles = _poles(exact, loop)
+        if N[0] == 0:
             raise InputError(NO_FINAL)
-        if abs(double(num[0] / den[0])) <= dc_noise(loop):
+        if abs(final) <= dc_noise(loop):
             raise NumericalError(LOST)
-        rest = (num * den[0] / num[0] - den) / fmpq_poly([0, den[den.degree()]])
-        return _free_motion(balls(rest), poles, loop.in_z)
+        rest = (fmpq_poly(N) * D[0] / N[0] - D) / fmpq_poly([0, D[D.degree()]])
+        return _free_motion(acb_poly(arb_poly(rest)), poles, exact.sampled)
 
-    return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), double(num[0] / den[0])
+    return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), final
 
 
-def _poles(loop: RationalLoop, den: fmpq_poly, hidden: fmpq_poly) -> list[acb]:
+def _poles(exact: ExactLoop, loop: RationalLoop) -> list[acb]:
     """All that the response shows, each as often as it is repeated, the slowest first; in s."""
-    dc = acb(1 if loop.in_z else 0)
-    seen, unseen = roots(den), [p for p, _ in roots(hidden) if not near_dc(p, loop)]
-    outside = [
-        p
-        for p in [*unseen, *(p for p, _ in seen)]
-        if not (abs(p) < 1 if loop.in_z else p.real < 0) and not (p - dc).contains(0)  # where not certain
-    ]
-    at_dc = sum(times for p, times in seen if (p - dc).contains(0))
-    if outside or at_dc:
-        raise InputError(UNSTABLE if outside or at_dc > 1 else _INTEGRATES)
-    seen.sort(key=lambda root: -abs(complex(root[0])) if loop.in_z else -complex(root[0]).real)
-    return [(p - 1) / (p + 1) if loop.in_z else p for p, times in seen for _ in range(times)]
+    poles = exact.poles
+    hidden = (p for p in exact.hidden_modes.roots if not p.contains(0) and not near_dc(p, loop))
+    at_end = exact.degree > exact.D.degree() or exact.hidden_at_end
+    if poles.right or poles.on_border > poles.at_zero or at_end or not all(p.real < 0 for p in hidden):
+        raise InputError(UNSTABLE)
+    if poles.at_zero:
+        raise InputError(_INTEGRATES if poles.at_zero == 1 else UNSTABLE)
+    placed = [(of_s(p, loop), p) for p in poles.find()]
+    return [p for z, p in sorted(placed, key=lambda each: -abs(each[0]) if loop.in_z else -each[0].real)]
 
 
 def _free_motion(rest: acb_poly, poles: list[acb], sampled: bool) -> Motion | None:

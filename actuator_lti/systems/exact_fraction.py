@@ -1,14 +1,13 @@
-"""A rational system as a fraction of two polynomials with exact coefficients: its doubles, as they are."""
+"""What the response of a loop of exact polynomials shows, its roots, and what rounding leaves of its gain."""
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import replace
 
 import flint
 import numpy as np
 
-from actuator_lti.margins.exact.loop import exact_polynomials, rational
-from actuator_lti.margins.exact.roots import all_roots, warped
-from actuator_lti.margins.given import ULP, given_of
+from actuator_lti.margins.exact.loop import ExactLoop, rational
+from actuator_lti.margins.exact.roots import all_roots
+from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop
 
 _EPS = float(np.finfo(float).eps)
@@ -17,33 +16,6 @@ _CLOSE = 1e-3  # a computed eigenvalue this near may be such a pole
 _UNSEEN = 1e-9  # what it may move, of the final value, before the rest has settled
 _BITS = 256
 _LOST = 1e3 * _EPS  # cancellation in c A^-1 b of a state space that leaves no figure
-
-
-@dataclass(frozen=True)
-class Fraction:
-    """num/den in lowest terms, lowest power of s or z first, and the denominator before it was cancelled."""
-
-    num: flint.fmpq_poly
-    den: flint.fmpq_poly
-    whole_den: flint.fmpq_poly
-
-    def warped(self) -> tuple[flint.fmpq_poly, flint.fmpq_poly]:
-        """Both in s of z = (1 + s)/(1 - s): the unit circle becomes the imaginary axis."""
-        n = self.den.degree()
-        return warped(self.num, n), warped(self.den, n)
-
-
-def exact_fraction(system: Any) -> Fraction:
-    """Find the transfer function of a StateSpace or TransferFunction, SISO, without a rounding."""
-    num, den = (flint.fmpq_poly(p) for p in exact_polynomials(given_of(system)))
-    common = num.gcd(den)
-    return Fraction(num / common, den / common, den) if num != 0 else Fraction(num, flint.fmpq_poly([1]), den)
-
-
-def roots(p: flint.fmpq_poly) -> list[tuple[flint.acb, int]]:
-    """Every root, isolated, with its multiplicity; real ones have no imaginary part at all."""
-    zeros = next((k for k, c in enumerate(p.coeffs()) if c != 0), 0)
-    return [(flint.acb(0), zeros)] * bool(zeros) + all_roots(p.numer())
 
 
 def divided(p: flint.acb_poly, at: flint.acb) -> flint.acb_poly:
@@ -55,46 +27,58 @@ def divided(p: flint.acb_poly, at: flint.acb) -> flint.acb_poly:
     return flint.acb_poly(quotient[-2::-1])
 
 
-def balls(p: flint.fmpq_poly) -> flint.acb_poly:
-    """The same in balls of the working precision."""
-    return flint.acb_poly(flint.arb_poly(p))
+def of_s(p: flint.acb, loop: RationalLoop) -> complex:
+    """A pole in the plane of the samples, or itself, where the exact loop has s of z = (1 + s)/(1 - s)."""
+    s = complex(p)
+    return (1.0 + s) / (1.0 - s) if loop.in_z else s
 
 
-def shown(f: Fraction, loop: RationalLoop) -> Fraction:
+def shown(exact: ExactLoop, loop: RationalLoop) -> ExactLoop:
     """Without poles of a state space at zero frequency but for rounding that the response does not show.
 
     In exact numbers such a mode is rarely cancelled: its residue is a rounding error. It is left out where it
     would move the response by less than 1e-9 of its value before the slowest of the others has settled.
     """
-    if loop.coefficients is not None or loop.order < 2:
-        return f
-    if _nearest_dc(np.linalg.eigvals(loop.A), loop) > _CLOSE:
-        return f
+    if loop.coefficients is not None or loop.order < 2 or not exact.D.degree():
+        return exact
+    centre, size = (1.0, 1.0) if loop.in_z else (0.0, _size(loop))
+    if float(np.abs(np.linalg.eigvals(loop.A) - centre).min()) > _CLOSE * size:
+        return exact
     with flint.ctx.workprec(_BITS):
-        every = roots(f.den)
-        near = [p for p, times in every if times == 1 and _nearest_dc(complex(p), loop) < _NEAR_DC]
+        every = [(flint.acb(0), exact.poles.at_zero)] * (exact.D[0] == 0) + all_roots(exact.D)
+        near = [p for p, times in every if times == 1 and _off_dc(p, loop) < _NEAR_DC]
         others = [p for p, times in every if not any(p is each for each in near) for _ in range(times)]
         if not near or not others:
-            return f
-        rates = [-np.log(max(abs(complex(p)), 1e-9)) if loop.in_z else -complex(p).real for p in others]
+            return exact
+        values = [of_s(p, loop) for p in others]
+        rates = [-np.log(max(abs(p), 1e-9)) if loop.in_z else -p.real for p in values]
         slowest = min((rate for rate in rates if rate > 0.0), default=np.inf)
-        above, residues = balls(f.num / f.den[f.den.degree()]), []
+        scaled = flint.fmpq_poly(exact.N) / exact.D[exact.D.degree()]
+        above, residues = flint.acb_poly(flint.arb_poly(scaled)), []
         for k, p in enumerate(near):
             beside = flint.acb_poly.from_roots([*others, *near[k + 1 :]])
             residues.append(above(p) / beside(p))
             above = divided(above - residues[-1] * beside, p)
-        below, dc = flint.acb_poly.from_roots(others), flint.acb(1 if loop.in_z else 0)
-        size = abs(complex(above(dc) / below(dc)))
-        if any(abs(complex(r)) > _UNSEEN * slowest * size for r in residues):
-            return f
-        return Fraction(_middle(above), _middle(below), f.whole_den)
+        below = flint.acb_poly.from_roots(others)
+        most = (
+            _UNSEEN * slowest * abs(complex(above(0) / below(0))) * (0.5 if loop.in_z else 1.0)
+        )  # dz = 2 ds
+        if any(abs(complex(r)) > most for r in residues):
+            return exact
+        N, D = _middle(above), _middle(below)
+        return replace(
+            exact, N=N.numer() * D.denom(), D=D.numer() * N.denom(), degree=exact.degree - len(near)
+        )
 
 
-def _nearest_dc(p: Any, loop: RationalLoop) -> float:
-    """Smallest distance to zero frequency, in a sampling period or over the entries of A."""
-    if loop.in_z:
-        return float(np.abs(p - 1.0).min())
-    return float(np.abs(p).min()) / max(float(np.abs(loop.A).max()), 1e-300)
+def _size(loop: RationalLoop) -> float:
+    return max(float(np.abs(loop.A).max()), 1e-300)
+
+
+def _off_dc(p: flint.acb, loop: RationalLoop) -> float:
+    """Distance of a pole to zero frequency, in a sampling period or over the entries of A."""
+    s = complex(p)
+    return abs(2.0 * s / (1.0 - s)) if loop.in_z else abs(s) / _size(loop)
 
 
 def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
@@ -107,7 +91,7 @@ def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
 
 def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
     """Whether a hidden pole of a state space counts as one at zero frequency."""
-    return loop.coefficients is None and _nearest_dc(complex(p), loop) <= _NEAR_DC
+    return loop.coefficients is None and _off_dc(p, loop) <= _NEAR_DC
 
 
 def double(value: flint.fmpq) -> float:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,7 +16,17 @@ from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.correlation.driving import LOADS, at_ticks, first_states, load_of, needed_command, supply_of
+from analyses.correlation.driving import (
+    LOADS,
+    Driven,
+    at_ticks,
+    earlier_s,
+    first_states,
+    load_of,
+    needed_command,
+    steps_at,
+    supply_of,
+)
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
@@ -34,6 +44,9 @@ AXIS_SIGNALS = {
 """What a record of an axis may hold that the model has too."""
 VELOCITY_CUTOFF_HZ = 100.0
 FIRST_ROWS = 50
+ANSWERS = ("angle", "output_angle", "position", "speed", "velocity", "current", "force")
+"""What tells when a step of the command acted, the surest first."""
+STEP_ROUNDS = 6
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -183,42 +196,61 @@ def model_signals(
     model, load = load_of(driven.design, record, time, notes)
     period = model.controller.period_s
     duration = float(time[-1]) + 2.0 * period
-    go: Callable[..., Trajectory] = partial(
-        simulate,
-        model,
-        commands.sampled(*at_ticks(driven, time, duration), where=record.name),
-        load_Nm=load,
-        **supply,
-    )
     initial, moving = first_states(driven, record, measured)
+
+    def run(early_s: Floats, *, until: float = duration, at: State = initial, **more: Any) -> Trajectory:
+        wanted = commands.sampled(*at_ticks(driven, time, duration, early_s), where=record.name)
+        return simulate(model, wanted, until, load, initial=at, **supply, **more)
+
     if moving is not initial:
-        part = time[:FIRST_ROWS]
-
-        def off(state: State) -> float:
-            """Sum over the signals of the squared relative difference over their first rows."""
-            series, total = _series(model, go(float(part[-1]) + 2.0 * period, initial=state)), 0.0
-            for name, values in measured.items():
-                first = values[: len(part)]
-                size, rest = float(first @ first), np.interp(part, series["time"], series[name]) - first
-                total += float(rest @ rest) / size if size > 0.0 else 0.0
-            return total
-
-        if off(moving) < off(initial):
+        part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
+        until, early = float(time[:FIRST_ROWS][-1]) + 2.0 * period, np.zeros(len(steps_at(driven.values)))
+        rest, goes = (_series(model, run(early, until=until, at=at), time) for at in (initial, moving))
+        if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
-    run = go(duration, initial=initial, progress=progress)
+    made, series = _with_steps(driven, time, measured, partial(run, at=initial, progress=progress))
     between = "command smooth between samples but for its steps"
-    notes.append(f"model: {len(run.time_s)} ticks of {period * 1e6:g} us, {between}")
-    limits = {name: use.fraction for name, use in run.limits.items()}
-    series = _series(model, run)
-    return {name: np.interp(time, series["time"], series[name]) for name in measured}, limits
+    notes.append(f"model: {len(made.time_s)} ticks of {period * 1e6:g} us, {between}")
+    limits = {name: use.fraction for name, use in made.limits.items()}
+    return {name: series[name] for name in measured}, limits
 
 
-def _series(design: Design, run: Trajectory) -> dict[str, Floats]:
-    """The signals of a run under the names of a record, and its time."""
+def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> float:
+    """Sum over the signals of the squared relative difference, over the measured rows."""
+    pairs = [(values, modelled[name][: len(values)]) for name, values in measured.items() if np.any(values)]
+    return sum(float(np.sum((made - own) ** 2) / np.sum(own**2)) for own, made in pairs)
+
+
+def _with_steps(
+    driven: Driven, time: Floats, measured: Mapping[str, Floats], run: Callable[[Floats], Trajectory]
+) -> tuple[Trajectory, dict[str, Floats]]:
+    """A run and its signals at the record's times, each step of the command at the tick that meets it best.
+
+    The record says between which samples a step was written, the answer to it at which tick: from a tick
+    after the later sample (written before it acts) to the earlier one.
+    """
+    tick, row = driven.design.controller.period_s, float(np.median(np.diff(time)))
+    early = np.zeros(len(steps_at(driven.values)))
+    made = run(early)
+    series = _series(driven.design, made, time)
+    name = next((name for name in ANSWERS if name in measured), "")
+    for _ in range(STEP_ROUNDS if len(early) and name else 0):
+        more = earlier_s(driven, time, measured[name], series[name])
+        moved = tick * np.clip(np.round((early + more) / tick), -1.0, np.floor(row / tick * (1.0 + 1e-9)))
+        if np.array_equal(moved, early):
+            break
+        other = run(moved)
+        if _off(measured, nearer := _series(driven.design, other, time)) >= _off(measured, series):
+            break
+        early, made, series = moved, other, nearer
+    return made, series
+
+
+def _series(design: Design, run: Trajectory, time: Floats) -> dict[str, Floats]:
+    """The signals of a run at some times, under the names of a record."""
     rate = run.output_speed_rad_s
-    return {
-        "time": run.time_s,
+    signals = {
         "angle": run.motor_angle_rad,
         "output_angle": run.output_angle_rad,
         "position": run.output_angle_rad,
@@ -228,3 +260,4 @@ def _series(design: Design, run: Trajectory) -> dict[str, Floats]:
         "voltage": run.voltage_V,
         "force": motor_torque_Nm(design, run.current_A, run.voltage_V),
     }
+    return {name: np.interp(time, run.time_s, values) for name, values in signals.items()}

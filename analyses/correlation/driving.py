@@ -14,7 +14,7 @@ from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats, Mask
+from actuator_lti.types import Floats, Ints, Mask
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
@@ -102,19 +102,19 @@ def needed_command(design: Design, record: Record, signal: str | None = None) ->
     return driven
 
 
-def at_ticks(driven: Driven, time_s: Floats, duration_s: float) -> tuple[Floats, Floats]:
+def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats) -> tuple[Floats, Floats]:
     """Times and values of the command at the drive's ticks.
 
     Through the samples goes a smooth curve, as a feed-forward takes the slope: straight lines would give it
     steps at the very instants of the record. A jump between two stretches that stand still is a step of the
-    command, and comes with the later sample.
+    command, and comes ``early_s`` (one for each) before the later sample.
     """
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
-    jumps = np.flatnonzero(steps_of(driven.values))
-    starts, ends = [0, *(jumps + 1)], [*(jumps + 1), len(time_s)]
-    edges = np.searchsorted(ticks, time_s[starts] - 1e-6 * period)
+    later = steps_at(driven.values)
+    starts, ends = [0, *later], [*later, len(time_s)]
+    edges = np.searchsorted(ticks, time_s[starts] - [0.0, *early_s] - 1e-6 * period)
     edges[0] = 0
     for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
         part = slice(start, end)
@@ -150,6 +150,30 @@ def steps_of(values: Floats) -> Mask:
     moves = np.diff(values) != 0.0
     around = np.concatenate([[False], moves, [False]])
     return np.asarray(moves & ~around[:-2] & ~around[2:])
+
+
+def steps_at(values: Floats) -> Ints:
+    """The first row behind each of these jumps."""
+    return np.flatnonzero(steps_of(values)) + 1
+
+
+def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats) -> Floats:
+    """By how much each step of the command came earlier than it was modelled, by a signal that answers it, s.
+
+    From each step to the next one the answer moves with it, by its rate; a stretch of the answer (the gains,
+    the inertia, the clock) stands beside it, so that it is not taken for a time.
+    """
+    rate, off, found = np.gradient(modelled, time_s), measured - modelled, []
+    later = steps_at(driven.values)
+    for start, end in zip(later, [*later[1:], len(time_s)], strict=True):
+        part, before = slice(start, end), start - 1
+        moved = rate[part] - rate[before]
+        stretch = (time_s[part] - time_s[before]) * moved
+        table = np.column_stack([moved, stretch])
+        size = np.linalg.norm(table, axis=0)
+        told = np.linalg.lstsq(table / np.where(size > 0.0, size, 1.0), off[part] - off[before], rcond=None)
+        found.append(float(told[0][0] / size[0]) if size[0] > 0.0 else 0.0)
+    return np.array(found)
 
 
 def jump_share(design: Design, record: Record) -> float:

@@ -39,6 +39,7 @@ PARAMETERS = {
     "load_coefficient": Parameter("Load friction", "N m/(N m)", "friction.load_coefficient"),
     "gravity_sin": Parameter("Gravity, m g l cos(offset)", TORQUE),
     "gravity_cos": Parameter("Gravity, m g l sin(offset)", TORQUE),
+    "gravity": Parameter("Gravity, m g l", TORQUE),
     "motor_inertia": Parameter("Inertia before the coupling, at the motor", INERTIA, "motor.rotor_inertia"),
     "load_inertia": Parameter("Inertia behind it, at its own shaft", INERTIA, "load.inertia"),
     "stiffness": Parameter("Stiffness", "N m/rad", "coupling.stiffness"),

@@ -85,7 +85,8 @@ class Asked(Settings):
 
     Every column of every file is accounted for. Each record is held against itself and against the design's
     limits, and the written design against the record that it came from. Where a check fails the status is 1,
-    and no design is written without --accept; with --out, page and JSON are.
+    and no design is written without --accept; with --out, page and JSON are. What the records do not tell is
+    not proven: it is said, and the status is 0 (PASS, 2 not proven).
 
     Try: actuator-lti identify DATA_EMPS.mat --design emps --out result
     """

@@ -154,7 +154,7 @@ def identify_bench(
         findings=findings,
         model=model,
         refined=refined,
-        design=made,
+        design=written,
         resimulated=again,
         items=tuple(items),
         settings=settings,

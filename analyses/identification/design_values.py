@@ -69,7 +69,7 @@ class DesignValue:
 def design_values(
     design: Design, model: JointModel, records: Sequence[Record], start: Design
 ) -> tuple[DesignValue, ...]:
-    """Every number of a design that the records tell: friction, inertia, load friction, R, kE.
+    """Every number of a design that the records tell: friction, inertia, load friction, gravity, R, kE.
 
     ``start`` is the design with what was found of its motor first; its constants made torques of currents.
     """
@@ -85,6 +85,7 @@ def design_values(
         for name in model.names
         if not name.startswith(("offset", "map_", "gravity"))
     ]
+    found.append(_gravity_value(design, model))
     whole = [record for record in records if {"voltage", "current"} <= set(record.signals)]
     own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}
     known = start.effective_motor
@@ -93,6 +94,21 @@ def design_values(
             electrical = fit_electrical(start, whole, model.asked)
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
     return tuple(one for one in found if one is not None)
+
+
+def _gravity_value(design: Design, model: JointModel) -> DesignValue | None:
+    """The pendulum's moment, by what was found of it along the design's own offset; None without either."""
+    gravity, slopes = design.load.gravity, {}
+    if gravity is not None:
+        offset = gravity.offset_rad
+        both = {"gravity_sin": float(np.cos(offset)), "gravity_cos": float(np.sin(offset))}
+        slopes = {name: share for name, share in both.items() if name in model.names}
+    size = sum(share**2 for share in slopes.values())
+    if gravity is None or size < 1e-12:
+        return None
+    along = {name: share / size for name, share in slopes.items()}  # of one term alone: that over its share
+    one = design_value(design, model.mapped({"gravity": along}), "gravity", gravity.peak_Nm)
+    return one and replace(one, allowed=own_share(design, "load.gravity.mass"))
 
 
 def design_value(
@@ -116,7 +132,8 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     """The one cause that explains what is off: in words, its factor, and its standard error.
 
     Each cause moves the logarithms of the values along a line; weighted least squares finds its factor, and
-    chi-square says whether the rest is chance. None where chance explains all, or no one cause does.
+    chi-square says whether the rest is chance. None where chance explains all, no one cause does, or fewer
+    than two of the values that it moves are off by themselves.
 
     Examples
     --------
@@ -133,13 +150,15 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     std = np.array([float(np.hypot(one.error / one.ratio, one.allowed)) for one in values])
     if len(values) < LEAST_VALUES or chi2.sf(float(np.sum((x / std) ** 2)), len(x)) > NO_CHANCE:
         return None
+    sizes = [(one.ratio - 1.0) / float(np.hypot(one.error, ALIKE)) for one in values]
+    off = chi2.sf(np.square(sizes), 1) < NO_CHANCE
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])
-        told = np.count_nonzero(g)
-        if told < 2:
-            continue
         a, b = g / close, x / close
+        told = np.count_nonzero(g)
+        if np.count_nonzero(off[g != 0.0]) < 2:
+            continue  # one value that is off says that this value is off, no more
         factor = float(a @ b) / float(a @ a)
         if told < LEAST_VALUES and abs(factor) < log(FEW):
             continue
@@ -178,8 +197,11 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     """
     each: dict[str, list[str]] = {}
     for one, share in zip(fit.names, shares.tolist(), strict=True):
+        known, part = parameter(one), f"{100.0 * STEP * share:+.2g} %"
+        if abs(STEP * share) > 1.0:  # of more than the value itself: it is about zero
+            part = f"{STEP * share * known.scale * fit[one]:+.2g} {known.unit}"
         if abs(share) > LEAST_SHARE:
-            each.setdefault(f"{100.0 * STEP * share:+.2g} %", []).append(one)
+            each.setdefault(part, []).append(one)
     if not each:
         return {}
     words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())

@@ -4,11 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
-from analyses.correlation.driving import jump_share
+from analyses.correlation.driving import command_of, jump_share
 from analyses.estimation.arrays import lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
@@ -16,7 +17,7 @@ from analyses.estimation.parameters import Parameter, parameter
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
-from analyses.records.consistency import RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 
@@ -43,16 +44,20 @@ class Lag:
 class Followed:
     """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it.
 
-    Of the following error, recorded over simulated, and of what the position has too much of the motion.
+    Of the following error, recorded over simulated, and of what the position has too much of the motion;
+    behind a commanded speed (``stage`` is velocity) clock and scale are one. ``alike`` is the correlation of
+    the recorded motion with the simulated one.
     """
 
+    stage: str
+    alike: float
     clock: float
     off: float = 0.0
 
     @property
     def fails(self) -> bool:
         """Whether they are off by more than an interval can hold."""
-        return max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
+        return self.alike < ALIKE or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -267,34 +272,35 @@ def _step(z: Floats, table: Floats, y: Floats) -> tuple[float, float]:
 
 
 def followed(design: Design, record: Record, simulated: Record) -> Followed | None:
-    """The following error as a clock: the loops' gains are per second, whatever the drive's torque.
+    """The motion behind a command as a clock: the loops' gains are per second, whatever the drive's torque.
 
     Inertia, friction and gravity of a record whose clock runs wrong agree with each other, as its torque is
-    right and its motion only stretched. But a position loop over a velocity loop lags by ``(v + i/Kp)/Kv``
+    right and its motion only stretched. But a position loop T over a velocity loop lags by ``(v + i/Kp)/Kv``
     (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
-    factor shows as about the same factor between the recorded following error and the simulated one, a
-    scale of the position as a part of the motion in it. Both are regressed together; noise is in the
-    recorded position alone. None where the drive has no such loops, or the motion does not tell.
+    factor changes Kv by it, so the motion by ``T (command - motion)``; a scale of the position by a part of
+    the motion. Both are regressed together. A speed is followed one to one: there clock and scale are one.
+    Noise is in the recorded position alone. None where no such loop acts, or the motion does not tell.
     """
     design = record.drive(design)
-    control = design.controller
-    if control.position is None or control.velocity is None:
+    control, driven = design.controller, command_of(design, record)
+    if driven is None or control.velocity is None or driven.stage not in ("position", "velocity"):
         return None
-    command, place = "position_reference", "position"
-    if design.axis == "rotary":
-        command, place = "reference", "angle" if control.position.sensor == "motor" else "output_angle"
-    if not {command, place} <= set(record.signals) or place not in simulated.signals:
+    at_output = driven.stage == "position" and control.position and control.position.sensor != "motor"
+    place = "position" if design.axis == "linear" else "output_angle" if at_output else "angle"
+    if place not in simulated.signals:
         return None
-    factor = design.total_ratio if place == "angle" else 1.0
-    record = record.slice(0, len(simulated))  # of a long one the first part is simulated
-    columns = (factor * record[command], record[place], simulated[place])
-    wanted, own, model = (values - values.mean() for values in columns)
-    table = np.column_stack([wanted - model, model])
-    kept, _ = told_apart(table, ("following error", "motion"))
-    if 0 not in kept or not np.any(wanted - own):
+    own, model = record[place][: len(simulated)], simulated[place]  # of a long one the first part
+    columns = [model]
+    if driven.stage == "position" and control.position:
+        factor, lag = design.total_ratio if place == "angle" else 1.0, control.position.gain * record.period_s
+        error = factor * driven.values[: len(model)] - model
+        columns = [-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error), model]
+    table = np.column_stack([values - values.mean() for values in columns])
+    kept, _ = told_apart(table, ("clock", "motion")[-len(columns) :])
+    if 0 not in kept or not np.ptp(own):
         return None
     size = np.linalg.norm(table[:, kept], axis=0)
-    solved = solve(table[:, kept] / size, wanted - own)
-    (ratio, *more), errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
-    shares = np.array([ratio - 1.0, *(-scale for scale in more)])
-    return Followed(*np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())
+    solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
+    shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
+    alike = float(np.corrcoef(own, model)[0, 1])
+    return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())

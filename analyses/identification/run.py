@@ -98,7 +98,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     if count and len(fit.told) == len(NAMES):
         suggestion = suggest_runs(design, fit, count=count, criterion=asked.criterion, progress=progress)
     return CampaignAnswer(
-        design=made,
+        design=written,
         items=campaign_items(design, result, simulated, asked.residual_limit / 100.0, held),
         result=result,
         shares=contributions(fit.values, fit.covariance, load_Nm=load, speed_rad_s=speed),

@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2
 
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
 from analyses.identification.diagnosis import Followed
-from analyses.records.consistency import RATE_TOLERANCE, Finding, wrong_of
+from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
@@ -40,6 +41,11 @@ class Item:
     limit: float | None = None
     reason: str = ""
 
+    @property
+    def verdict(self) -> Verdict:
+        """In the word of every page."""
+        return Verdict.of(self.passed)
+
     @classmethod
     def of(cls, id: str, label: str, wrong: str, **share: float) -> Item:
         """What holds but for ``wrong``; empty: it holds."""
@@ -60,9 +66,14 @@ class Identified:
         return write_design(self.design)
 
     @property
+    def verdict(self) -> Verdict:
+        """The worst of all items."""
+        return Tally.of(item.verdict for item in self.items).verdict
+
+    @property
     def passed(self) -> bool:
-        """Whether nothing failed."""
-        return all(item.passed is not False for item in self.items)
+        """Whether nothing failed; what records do not tell is not proven, and lets it pass."""
+        return self.verdict is not Verdict.NOT_MET
 
 
 def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
@@ -174,14 +185,20 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
 
 
 def following_item(record: str, followed: Followed) -> Item:
-    """Whether the recorded following error is that of the design's loops at this motion."""
-    label = f"{record}: following error is that of the design's loops"
-    clock, off = followed.clock, followed.off
-    reason = (
-        f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with: "
-        "counts a revolution, the reduction, or a unit"
-        if abs(off) > RATE_TOLERANCE
-        else f"the following error is {1.0 + clock:.4g} times that of the design's loops at this motion: "
-        f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
-    )
-    return share_item(f"following-{record}", label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)
+    """Whether the record follows its command as the design's loops do at this motion."""
+    label = f"{record}: the command is followed as by the design's loops"
+    id, clock, off = f"following-{record}", followed.clock, followed.off
+    if followed.alike < ALIKE:
+        return Item.of(id, label, f"the motion is not that of the command (correlation {followed.alike:.2f})")
+    scale = "counts a revolution, the reduction, or a unit"
+    reason = f"the motion is {1.0 + clock:.4g} times that which the loops make of the commanded speed: "
+    reason += f"the clock, {scale}"
+    if abs(off) > RATE_TOLERANCE:
+        reason = (
+            f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with"
+        )
+        reason += f": {scale}"
+    elif followed.stage == "position":
+        reason = f"the following error is {1.0 + clock:.4g} times that of the design's loops at this motion: "
+        reason += f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+    return share_item(id, label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)

@@ -157,7 +157,8 @@ def answer(
     parts = [*notices(missing, one.name), *in_amperes(one.sections(result), drive)]
     if drive is not None:
         doc.waived(parts, drive)
-    passed = getattr(result, "verdict", getattr(result, "passed", None))
+    passed = getattr(result, "passed", None)
+    passed = passed or getattr(result, "verdict", passed)
     files = one.shows("write", lambda *_: [])(result, out)
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)

@@ -63,11 +63,10 @@ def _listed(design: Design) -> Listed:
 
 def _loops(design: Design) -> tuple[str, ...]:
     words = []
-    for name in ("current", "velocity", "position"):
+    for name in reversed(design.controller.stages):
         loop = getattr(design.controller, name)
-        if loop is not None:
-            kind = "PI" if getattr(loop, "integral_time_s", None) is not None else "P"
-            kind = kind if loop.law is None else "law of one's own"
-            every = getattr(loop, "every", 1)
-            words.append(f"{name} {kind}" + (f" every {every} ticks" if every > 1 else ""))
+        kind = "PI" if loop.integral_time_s is not None else "P"
+        kind = kind if loop.law is None else "law of one's own"
+        every = getattr(loop, "every", 1)
+        words.append(f"{name} {kind}" + (f" every {every} ticks" if every > 1 else ""))
     return tuple(words)

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from actuator_lti.design import design_hash
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.design_values import given_constant
@@ -10,6 +11,7 @@ from analyses.records.consistency import Finding
 from analyses.records.inputs import InputUse
 from reports import document as doc
 from reports.numbers import show
+from reports.verdict_summary import BENCH_CHECKS
 
 
 def judged(
@@ -17,7 +19,10 @@ def judged(
 ) -> doc.Section:
     """Put the section of one kind together: its verdict first, in words and item by item."""
     status: doc.Status = "pass" if found.passed else "fail"
-    first = [doc.verdicts(map(_verdict, found.items), "bench checks")]
+    first = [doc.verdicts(map(_verdict, found.items), BENCH_CHECKS)]
+    if open_ones := [item.label for item in found.items if item.passed is None]:
+        first.append(doc.remark(f"Not proven, which alone does not fail: {'; '.join(open_ones)}"))
+    first.append(doc.facts([doc.fact("Design found, SHA-256", design_hash(found.design))]))
     if not found.passed:
         said = "The design is written as it was accepted, a check failed"
         otherwise = "No design is written, as a check fails; --accept writes it all the same"

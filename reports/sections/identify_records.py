@@ -6,9 +6,9 @@ import numpy as np
 
 from analyses.estimation.parameters import parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import DesignValue, given_constant
+from analyses.identification.design_values import given_constant
 from analyses.identification.friction_map import LawChoice
-from analyses.identification.joint_model import JointModel, RecordFit
+from analyses.identification.joint_model import JointModel, RecordFit, default_value
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style
@@ -20,7 +20,7 @@ from reports.sections.names import speed_unit
 def section(result: BenchResult) -> doc.Section:
     axis, model = result.design.axis, result.model
     blocks = [_parameters(model, axis)]
-    blocks += [_against_design(result.design_values, axis)] if result.design_values else []
+    blocks += [_against_design(result)] if result.design_values else []
     if result.refined is not None:
         refined = result.refined
         note = (
@@ -104,7 +104,9 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
     return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 
 
-def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
+def _against_design(result: BenchResult) -> doc.Block:
+    """Each number beside what the records say of it; those that the design keeps at the end."""
+    model, axis, values = result.model, result.design.axis, result.design_values
     columns = [
         doc.of(lambda one: parameter(one.name, axis).label, "name", "Number"),
         doc.of("design", "design", "Design", format="sig:4"),
@@ -113,13 +115,27 @@ def _against_design(values: Sequence[DesignValue], axis: str) -> doc.Block:
         doc.of("ratio", "ratio", "Records over design", format="sig:4"),
         doc.of("error", "error", "Standard error", format="sig:2"),
         doc.of("allowed", "allowed", "Design's own uncertainty", "%", scale=100.0, format="sig:2"),
-        doc.of("agrees", "agrees", "Agrees", format="yesno"),
+        doc.of(lambda one: "yes" if one.agrees else "no", "agrees", "Agrees"),
     ]
-    note = "A number agrees where chance, with both errors, explains the difference (level 0.1 %)."
-    return doc.listing(
+    note = (
+        "A number agrees where chance, with both errors, explains the difference (level 0.1 %). Kept: the "
+        "records do not tell it, or it came out at zero within its error; the design has its own."
+    )
+    block = doc.listing(
         "The design's numbers against the records", values, columns, note,
         status=lambda one: "pass" if one.agrees else "warn",
     )  # fmt: skip
+    assert block["kind"] == "table"
+    told = tuple(one.name for one in values)  # gravity: both of its terms
+    own = {name: default_value(result.design, name) for name in model.names if name != "offset"}
+    own |= {name: one.value for name, one in model.fixed.items()}
+    kept = [
+        (parameter(name, axis), value) for name, value in own.items() if value and not name.startswith(told)
+    ]
+    rows: list[doc.Row] = [
+        {"name": one.label, "design": value, "unit": one.unit, "agrees": "kept"} for one, value in kept
+    ]
+    return {**block, "rows": [*block["rows"], *rows]}
 
 
 def law_table(result: BenchResult, axis: str) -> doc.Block:

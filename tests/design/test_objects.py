@@ -14,9 +14,8 @@ from actuator_lti.design.model import ControllerObject, ControllerObjects
 from actuator_lti.design.objects import OBJECTS, PER_RPM, calibration, export_objects, import_objects
 from actuator_lti.design.settings_file import (
     parse_label,
+    parse_settings,
     read_settings,
-    read_settings_toml,
-    read_settings_xml,
     update_settings_xml,
     write_settings_toml,
     write_settings_xml,
@@ -54,7 +53,7 @@ def test_a_design_survives_export_and_import() -> None:
     for factor in (1.0, PER_RPM):
         design = replace(AMBER, objects=ControllerObjects(velocity_gain_factor=factor))
         settings_text = write_settings_xml(export_objects(design).objects)
-        back = import_objects(read_settings_xml(settings_text, "s", factor), design)
+        back = import_objects(parse_settings(settings_text, "s", factor), design)
         assert back.changed == ()
         assert replace(back.design, objects=design.objects) == design
 
@@ -99,8 +98,7 @@ REFUSING: dict[str, Callable[[Any], object]] = {
     "import": lambda values: import_objects(objects(values), AMBER, "my.xdc"),
     "export": lambda values: export_objects(with_values(AMBER, values)),
     "export a drive": lambda name: export_objects(load_design(name)),
-    "xml": lambda text: read_settings_xml(text, "x"),
-    "toml": lambda text: read_settings_toml(text, "s"),
+    "settings": lambda text: parse_settings(text, "s"),
     "calibration": calibration,
 }
 
@@ -122,25 +120,25 @@ REFUSING: dict[str, Callable[[Any], object]] = {
         ("export a drive", "emps", "current, velocity and position"),
         ("export a drive", "ctms-motor-position", "current, velocity and position"),
         ("calibration", "Hz", '"rad/s" or "rpm"'),
-        ("xml", BOMB, "DTD"),
-        ("xml", OUTSIDE, "DTD"),
-        ("xml", "<a>", "not XML"),
-        ("xml", "<a/>", "no CANopenObject"),
-        ("xml", "<a>" * 50_000, "not XML"),
-        ("xml", "<a>" * 500 + "</a>" * 500, "nested too deeply"),
-        ("xml", "<CANopenObject index='xyz'/>", "hexadecimal"),
-        ("xml", "<CANopenObject index='2348' actualValue='1.5'/>", "whole number"),
-        ("xml", "<CANopenObject index='2348' actualValue='" + "9" * 30 + "'/>", "whole number"),
-        ("xml", "<?xml version='1.0' encoding='utf-7'?><a/>", "not XML"),
-        ("toml", "[objects]\n", "missing"),
-        ("toml", "x = 1", "unknown key"),
-        ("toml", '[objects]\n"2348" = 1.5', "whole number"),
-        ("toml", '[objects]\n"2348" = true', "whole number"),
-        ("toml", '[objects]\n"23481" = 1', "allowed: an object"),
-        ("toml", '[objects]\n"2348.01" = { valu = 1 }', "value, name, data_type"),
-        ("toml", 'velocity_gain_factor = 0\n[objects]\n"2348.01" = 1', "9.549"),
-        ("toml", '[objects]\n"0x2348.01" = 1\n"2348.01" = 2', "each object once"),
-        ("toml", '[objects]\n"0x3000.01" = 99999999999999999999', "64 bits"),
+        ("settings", BOMB, "DTD"),
+        ("settings", OUTSIDE, "DTD"),
+        ("settings", "<a>", "not XML"),
+        ("settings", "<a/>", "no CANopenObject"),
+        ("settings", "<a>" * 50_000, "not XML"),
+        ("settings", "<a>" * 500 + "</a>" * 500, "nested too deeply"),
+        ("settings", "<CANopenObject index='xyz'/>", "hexadecimal"),
+        ("settings", "<CANopenObject index='2348' actualValue='1.5'/>", "whole number"),
+        ("settings", "<CANopenObject index='2348' actualValue='" + "9" * 30 + "'/>", "whole number"),
+        ("settings", "<?xml version='1.0' encoding='utf-7'?><a/>", "not XML"),
+        ("settings", "[objects]\n", "missing"),
+        ("settings", "x = 1", "unknown key"),
+        ("settings", '[objects]\n"2348" = 1.5', "whole number"),
+        ("settings", '[objects]\n"2348" = true', "whole number"),
+        ("settings", '[objects]\n"23481" = 1', "allowed: an object"),
+        ("settings", '[objects]\n"2348.01" = { valu = 1 }', "value, name, data_type"),
+        ("settings", 'velocity_gain_factor = 0\n[objects]\n"2348.01" = 1', "9.549"),
+        ("settings", '[objects]\n"0x2348.01" = 1\n"2348.01" = 2', "each object once"),
+        ("settings", '[objects]\n"0x3000.01" = 99999999999999999999', "64 bits"),
     ],
 )
 def test_what_cannot_be_held_or_read_is_refused(what: str, given: Any, says: str) -> None:
@@ -172,8 +170,8 @@ def any_objects(draw: st.DrawFn) -> ControllerObjects:
 def test_settings_survive_design_toml_and_xml(given_set: ControllerObjects) -> None:
     factor = given_set.velocity_gain_factor
     if given_set.values:
-        assert read_settings_toml(write_settings_toml(given_set), "t") == given_set
-        assert read_settings_xml(write_settings_xml(given_set), "x", factor) == given_set
+        assert parse_settings(write_settings_toml(given_set), "t") == given_set
+        assert parse_settings(write_settings_xml(given_set), "x", factor) == given_set
     design = import_objects(given_set, AMBER).design
     stored = read_design_text(write_design(design), design.origin)
     assert stored == design
@@ -197,16 +195,16 @@ DEVICE = """<?xml version="1.0" encoding="utf-8"?>
 
 
 def test_a_device_configuration_with_more_in_it_is_read_and_updated_in_place() -> None:
-    result = {item.label: (item.value, item.name) for item in read_settings_xml(DEVICE, "x").values}
+    result = {item.label: (item.value, item.name) for item in parse_settings(DEVICE, "x").values}
     assert result == {
         "0x2348.00": (1, "Number of entries"),
         "0x2348.01": (50, "Kv"),
         "0x6083.00": (250, "Profile acceleration"),
     }
     same, _ = update_settings_xml(DEVICE, ControllerObjects())
-    assert read_settings_xml(same, "x") == read_settings_xml(DEVICE, "x")
+    assert parse_settings(same, "x") == parse_settings(DEVICE, "x")
     text, left = update_settings_xml(DEVICE, objects({"0x2348.01": 60, "0x6083.00": 300, "0x2342.01": 20}))
-    values = {item.label: item.value for item in read_settings_xml(text, "x").values}
+    values = {item.label: item.value for item in parse_settings(text, "x").values}
     assert values == {"0x2348.00": 1, "0x2348.01": 60, "0x6083.00": 300}
     assert left == ("0x2342.01",)
     assert all(words in text for words in ('actualValue="0x3C"', "<ProfileName>x</", 'defaultValue="0x12"'))

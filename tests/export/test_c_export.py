@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from programs import needs_compiler, ran
-from random_drives import random_drive, random_elastic_drive, random_inputs
 
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.design import design_hash, load_design
@@ -22,6 +21,7 @@ from nonlinear.export import c_export
 from nonlinear.export.c_files import exported_row, spare_parameters
 from nonlinear.export.program import source_hash
 from nonlinear.native import LIBRARY, parameters, tick
+from tests.validation.rich_drives import random_inputs, rich_drive
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
@@ -90,13 +90,12 @@ class Twins:
 
 
 @needs_compiler
-@pytest.mark.parametrize("seed", [*range(40), *range(1000, 1040)])
+@pytest.mark.parametrize("seed", range(120))
 def test_every_row_has_the_same_bits_in_random_drives(library: ctypes.CDLL, seed: int) -> None:
-    """Both through random inputs, every row compared at every tick; elastic ones from seed 1000 on."""
-    rng = np.random.default_rng(seed)
-    row = exported_row((random_drive if seed < 1000 else random_elastic_drive)(rng))
-    twins, ticks = Twins(library, row), 300 if seed < 1000 else 200
-    for command, moment in np.transpose(random_inputs(rng, ticks, float(row[at.PERIOD]))):
+    """Both through random inputs, every row compared at every tick."""
+    design, rng = rich_drive(seed), np.random.default_rng(seed)
+    twins = Twins(library, exported_row(design))
+    for command, moment in np.transpose(random_inputs(design, rng, 250)):
         assert twins.tick(command, moment) == at.OK
     assert np.abs(twins.rows[1][at.S_CURRENT]) > 0.0
     assert twins.rows[1][at.S_STATUS] == at.OK
@@ -124,9 +123,10 @@ def test_parameters_changed_on_the_way_have_the_same_bits(library: ctypes.CDLL, 
 @needs_compiler
 def test_two_drives_interleave_and_each_goes_back(library: ctypes.CDLL) -> None:
     """Two designs in one program tick in turns; one is saved, runs ahead, goes on twice elsewhere."""
-    rng = np.random.default_rng(8)
-    twins = [Twins(library, exported_row(make(rng))) for make in (random_drive, random_elastic_drive)]
-    inputs = [random_inputs(rng, 300, float(each.rows[0][at.PERIOD])) for each in twins]
+    rng, designs = np.random.default_rng(8), (rich_drive(1), rich_drive(2))
+    assert [design.coupling is None for design in designs] == [True, False]
+    twins = [Twins(library, exported_row(design)) for design in designs]
+    inputs = [random_inputs(design, rng, 300) for design in designs]
     p, s, io = twins[1].c_rows
     kept, behind = np.zeros_like(s), io.copy()
     for k in range(300):

@@ -6,20 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from executed import executed
-from random_drives import random_drive, random_elastic_drive
 
 from actuator_lti import load_design
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.design.access import parameter_value, paths_of, stacked
 from actuator_lti.design.model import Design, FrictionPoint, Supply
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
+from tests.validation.rich_drives import rich_drive
 
 NAMES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_motion")
 
 
 def drives() -> list[Design]:
-    rng = np.random.default_rng(20261122)
-    made = [random_drive(rng) for _ in range(12)] + [random_elastic_drive(rng) for _ in range(8)]
     amber, Tc = load_design("ilr33-amber"), load_design("ilr33-amber").friction.dry_torque_Nm
     curve = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 9e-3))
     points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in curve)
@@ -29,7 +27,7 @@ def drives() -> list[Design]:
         {"supply": Supply(resistance_ohm=0.02)},
         {"load": replace(amber.load, path="self-locking")},
     )
-    made += [replace(amber, **each) for each in changed]
+    made = [*map(rich_drive, range(20)), *(replace(amber, **each) for each in changed)]
     return made + [load_design(name) for name in ("fin", "emps", "joint")]
 
 

@@ -8,9 +8,8 @@ import control
 import numpy as np
 import pytest
 from programs import needs_compiler
-from random_drives import random_drive, random_elastic_drive
 
-from actuator_lti import InputError, load_design, stability_margins
+from actuator_lti import Design, InputError, load_design, stability_margins
 from actuator_lti.axis.library import LIBRARY as AXIS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
@@ -19,6 +18,7 @@ from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native,
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
+from tests.validation.rich_drives import rich_drive, sizes
 
 quiet = pytest.mark.filterwarnings("ignore:.*encountered in scalar:RuntimeWarning")  # Python divides by 0
 
@@ -39,14 +39,14 @@ def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
 @quiet
 @pytest.mark.parametrize("seed", range(10))
 def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
-    rng = np.random.default_rng(300 + seed)
-    design = random_elastic_drive(rng) if seed % 2 else random_drive(rng)
-    probe = Probe(point="i_ref", injection=commands.sine(0.1, 40.0))
+    design = rich_drive(200 + seed)
+    (size, load), period_s = sizes(design), design.controller.period_s
+    probe = Probe(point="u", injection=commands.sine(0.1 * design.limits.voltage_V, 0.1 / period_s))
 
     def work() -> Trajectory:
         return simulate(
-            design, commands.chirp(0.05, 1.0, 40.0, 0.05), 150 * design.controller.period_s,
-            loads.constant(2.0), energy=seed % 4 > 1, probes=[probe] if seed % 3 == 0 else [],
+            design, commands.chirp(size, 1e-3 / period_s, 9e-3 / period_s, 100 * period_s), 150 * period_s,
+            loads.constant(load), energy=seed % 4 > 1, probes=[probe] if seed % 3 == 0 else [],
             record_every=1 + seed % 2, raise_on_failure=False,
         )  # fmt: skip
 
@@ -83,12 +83,17 @@ def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(name: str, de
 
 @quiet
 def test_batches_have_the_bits_of_the_kernels_as_written() -> None:
-    rng = np.random.default_rng(5)
-    runs = [
-        Run(design=random_drive(rng), command=commands.sine(0.02, 20.0), duration_s=0.02,
-            reducers=Reducers(window_ticks=50, harmonics=3, extremes=True, step_target_rad=0.02))
-        for _ in range(3)
-    ]  # fmt: skip
+    def one(design: Design) -> Run:
+        (size, _), period_s = sizes(design), design.controller.period_s
+        reducers = Reducers(window_ticks=50, harmonics=3, extremes=True, step_target_rad=size)
+        return Run(
+            design=design,
+            command=commands.sine(size, 5e-3 / period_s),
+            duration_s=200 * period_s,
+            reducers=reducers,
+        )
+
+    runs = [one(rich_drive(seed)) for seed in (3, 4, 5)]
     ours = simulate_many(runs)
     with native.LIBRARY.written():
         theirs = simulate_many(runs, threads=1)

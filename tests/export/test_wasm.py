@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 from programs import in_json, in_node, needs_node
-from random_drives import random_drive, random_inputs
 
 from actuator_lti import load_design
 from actuator_lti.compiled.compiler import zig_command
@@ -17,6 +16,7 @@ from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.wasm_module import MOST_BYTES, build_wasm, kept_wasm, record, sources_hash
 from nonlinear.native import parameters, tick
+from tests.validation.rich_drives import random_inputs, rich_drive
 
 AT = {
     "command": at.IN_COMMAND, "moment": at.IN_LOAD, "output": at.IO_OUTPUT, "speed": at.IO_SPEED,
@@ -46,10 +46,9 @@ def test_building_again_gives_the_same_bytes() -> None:
 
 def drive(seed: int, ticks: int = 400) -> tuple[dict[str, Any], np.ndarray]:
     """A drive with what comes into it, and what the simulator makes of it; no instruments, which round."""
-    rng = np.random.default_rng(200 + seed)
-    design = load_design("ilr33-amber") if seed < 0 else random_drive(rng)
+    design = load_design("ilr33-amber") if seed < 0 else rich_drive(seed)
     design = replace(design, instruments=Instruments())
-    command, moment = random_inputs(rng, ticks, design.controller.period_s)
+    command, moment = random_inputs(design, np.random.default_rng(200 + seed), ticks)
     row = exported_row(design)
     p, s = parameters(row)
     io, ours = np.zeros(at.IO_SIZE), np.empty((ticks, 3))

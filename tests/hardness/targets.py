@@ -23,7 +23,7 @@ from actuator_lti.design.controller_files import import_controller_file
 from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import import_objects
-from actuator_lti.design.settings_file import read_settings_toml, read_settings_xml, write_settings_xml
+from actuator_lti.design.settings_file import parse_settings, write_settings_xml
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.design.writing import design_tree
 from actuator_lti.files.reading import decode
@@ -119,8 +119,7 @@ def override(path: Path) -> None:
 
 
 def settings(path: Path) -> None:
-    read = read_settings_xml if path.suffix == ".xml" else read_settings_toml
-    import_objects(read(decode(path.read_bytes(), "f"), "f"), base())
+    import_objects(parse_settings(decode(path.read_bytes(), "f"), "f"), base())
 
 
 def controller_file(path: Path) -> None:
@@ -310,7 +309,7 @@ def targets() -> tuple[Target, ...]:
     designs = tuple(design_text(name).encode() for name in shipped_designs())
     to_pdf = command("pdf", "FILE", "--out", "FOLDER/x.pdf")
     kept = sealed("k" * 64, {"x": [1, 2]}, {"report.html": b"<p>" * 40})
-    xml = write_settings_xml(read_settings_toml(SETTINGS.decode(), "f"))
+    xml = write_settings_xml(parse_settings(SETTINGS.decode(), "f"))
     move = ("simulate", "FILE", "--duration", "0.02", "--quiet", "--json")
     return (
         Target("quantity", (b"2.25e-3 N*m", b"12 mN*m", b"-5 N*cm"),

@@ -1,14 +1,18 @@
 """`identify` and `correlate` from the command line: what they print, what they write, how they refuse."""
 
+import json
 import shutil
+from collections import Counter
 from pathlib import Path
 
 import pytest
 
-from actuator_lti.design import load_design
+from actuator_lti.design import design_hash, load_design
 from examples.virtual_bench import BenchPlan
 from examples.virtual_bench.__main__ import main as simulate
 from reports.document import load as load_document
+from reports.verdict_summary import judged, walk
+from tests.identification.bench_records import columns_of, motion, write
 
 
 @pytest.fixture(scope="module")
@@ -119,3 +123,24 @@ def test_bad_input_is_one_line_and_status_2(arguments, reason, tmp_path, monkeyp
     rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99))
     Path("r.csv").write_text(f"time_s,position_m,force_N\n{rows}")
     assert reason in cli.refused(*arguments)
+
+
+def test_terminal_page_json_and_status_say_not_proven_alike(tmp_path, cli) -> None:
+    """Of a current alone kM is not proven: nothing fails, so 0; the hash is that of the file written."""
+    write(tmp_path / "r.csv", columns_of(motion(2)))
+    words = ("identify", tmp_path / "r.csv", "--design", "ilr33-amber", "--out", tmp_path)
+    told, shown = cli.data(*words), " ".join(cli.text(*words).split())
+    page = json.loads((tmp_path / "identification.json").read_text())
+    of_page = {item["id"]: item["verdict"] for item in judged(walk(page["sections"][0]))}
+    assert of_page == {item["id"]: item["verdict"] for item in told["items"]}
+    assert Counter(of_page.values())["not proven"] == 2
+    assert (told["verdict"], told["passed"]) == (page["verdict"]["verdict"], page["verdict"]["passed"])
+    assert (told["verdict"], told["passed"]) == ("not proven", True)
+    assert shown.startswith("PASS, 2 not proven ilr33-amber: ")
+    assert "Not proven, which alone does not fail: Load friction; Torque constant kM." in shown
+    (against,) = (one for one in page["sections"][0]["blocks"] if "numbers" in one.get("caption", ""))
+    kept = {row["name"]: row["design"] for row in against["rows"] if row["agrees"] == "kept"}
+    assert kept == {"Load friction": 1.34e-3, "Torque constant kM": 5.9e-3}
+    written = design_hash(load_design(tmp_path / "ilr33-amber-identified.toml"))
+    assert told["design"]["hash"] == written
+    assert f"Design found, SHA-256 {written}" in shown

@@ -86,6 +86,9 @@ def test_the_joint_is_identified_and_meets_its_records_within_0_06_rad(tmp_path,
         "--design", guess, "--inertia-to", "load.inertia", "--out", tmp_path, "--json",
     )  # fmt: skip
     assert ran.status == 0, [check for check in ran.data["items"] if check["passed"] is False]
+    (found,) = (one for one in ran.data["design_values"] if one["name"] == "gravity")
+    assert found["design"] == pytest.approx(0.5 * 9.80665 * 0.15, rel=1e-6)
+    assert found["found"] == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)
     written = tmp_path / "joint-identified.toml"
     gravity = load_design(written).load.gravity
     assert gravity.peak_Nm == pytest.approx(0.8 * 9.80665 * 0.15, rel=0.05)

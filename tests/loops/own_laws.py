@@ -13,7 +13,7 @@ from tests.changed import changed
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
          "output_speed": 1e-3}  # fmt: skip
-STAGES = {"current": 0.02, "velocity": 0.05, "position": 50.0}
+STAGES = ("current", "velocity", "position")
 BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
 
@@ -50,18 +50,27 @@ def radius(design: Design) -> float:
     return float(np.max(np.abs(np.linalg.eigvals(A))))
 
 
-def random_law(rng: np.random.Generator, design: Design, stage: str, stable: bool = False) -> Design:
-    """A law of any order and any inputs, its gains over decades; at most so large that the loop is stable."""
+def random_law(
+    rng: np.random.Generator, design: Design, stage: str, *, order: int | None = None, stable: bool = False
+) -> Design:
+    """A law on any inputs, over decades of the stage's gain; at most so large that the loop is stable."""
     known = [name for name in LAW_INPUTS if name != "current" or design.motor.has_electrical_dynamics]
-    inputs = [name for name in known if rng.random() < 0.6] or ["error"]
-    n, m, size = int(rng.integers(0, 7)), len(inputs), STAGES[stage] * 10.0 ** rng.uniform(-3, 0)
+    inputs = [name for name in known if rng.random() < 0.6]
+    inputs += [] if {"command", "error"} & {*inputs} else ["error"]
+    n, m, size = (
+        int(rng.integers(0, 7)) if order is None else order,
+        len(inputs),
+        10.0 ** rng.uniform(-1, 0.3),
+    )
     A = rng.standard_normal((n, n))
     A *= rng.uniform(0.2, 1.0) / max(np.abs(np.linalg.eigvals(A)), default=1.0)
     B, C, D = rng.standard_normal((n, m)), rng.standard_normal((1, n)), rng.standard_normal((1, m))
-    scale = np.array([SIZES[name] for name in inputs])
+    loop = getattr(design.controller, stage)
+    scale = np.array([SIZES[name] for name in inputs]) * (loop.gain_V_A if stage == "current" else loop.gain)
+    settings = {"L": 0.1 * rng.standard_normal(n) if n else (), "gain": rng.uniform(0.5, 2.0)}
     for _ in range(60):
         made = (A, B * size * scale, C, D * size * scale, period_s(design, stage))
-        result = design.with_law(stage, made, inputs, L=0.1 * rng.standard_normal(n) if n else ())
+        result = design.with_law(stage, made, inputs, **settings)
         if not stable or radius(result) < 1.0 + 1e-6:
             return result
         size *= 0.5
@@ -72,14 +81,14 @@ def drawn(case: int, stable: bool = False) -> tuple[Design, str] | None:
     """The case-th drive with its law; None where the drive has no such stage."""
     rng = np.random.default_rng(case)
     design = linear(load_design(BASES[case % len(BASES)]))
-    stage = str(rng.choice(list(STAGES)))
+    stage = str(rng.choice(STAGES))
     if getattr(design.controller, stage) is None:
         return None
     if rng.random() < 0.5 and design.controller.velocity is not None:
         tracking = Encoder(speed="tracking", bandwidth_rad_s=0.3 / period_s(design, "velocity"))
         counted = Encoder(speed="difference", difference_samples=3)
         design = replace(design, encoder=(tracking, counted)[int(rng.integers(2))])
-    return random_law(rng, design, stage, stable), stage
+    return random_law(rng, design, stage, stable=stable), stage
 
 
 class PlainLaw:

@@ -33,7 +33,7 @@ class Dice:
         return values[int(self.rng.integers(len(values)))]
 
 
-def _full_torque(design: model.Design) -> float:
+def full_torque(design: model.Design) -> float:
     """What the motor reaches at its limits, at standstill."""
     motor, limits = design.motor, design.limits
     return motor.torque_constant_Nm_A * min(limits.peak_current_A, limits.voltage_V / motor.resistance_ohm)
@@ -54,7 +54,7 @@ def _rigid_drive(dice: Dice, seed: int) -> model.Design:
         controller=control, limits=limits,
         validation=model.Validation(full_deflection_rad=full if full > 0.0 else 0.1),
     )  # fmt: skip
-    torque = _full_torque(design)
+    torque = full_torque(design)
     design = replace(design, friction=_friction(dice, torque, speed), encoder=_encoder(dice, control, axis))
     if not dice.chance(0.2):
         return design
@@ -147,7 +147,7 @@ def full_drive(seed: int) -> model.Design:
     """A drive with any mixture of what sections 6 and 7 of the model know; not known to be stable yet."""
     design, dice = _rigid_drive(Dice(seed), seed), Dice(10**6 + seed)
     for change in (
-        _elastic, _frictions, _loads, _motor_data, _filtered, _regulators, _outer, _sensors, _commanded,
+        elastic, _frictions, _loads, _motor_data, _filtered, _regulators, _outer, _sensors, _commanded,
         _supplied, _protected, _instrumented, _outermost,
     ):  # fmt: skip
         design = changed(design, **change(dice, design))
@@ -164,7 +164,7 @@ def _damped(dice: Dice, design: model.Design) -> Parts:
     return {"load": {"moment_damping_Nms_rad": damping, "path": path}}
 
 
-def _elastic(dice: Dice, design: model.Design) -> Parts:
+def elastic(dice: Dice, design: model.Design) -> Parts:
     """A coupling, with play and friction behind it."""
     if not dice.chance(0.3) or design.friction.law == "tanh":
         return {}
@@ -174,7 +174,7 @@ def _elastic(dice: Dice, design: model.Design) -> Parts:
     k = omega**2 * design.inertia_kgm2 * 0.2 * design.total_ratio**2
     friction = None
     if dice.chance(0.3):
-        torque = _full_torque(design)
+        torque = full_torque(design)
         friction = model.LoadFriction(dry_torque_Nm=torque * design.total_ratio * dice.decades(1e-3, 0.03))
     damping = dice.decades(0.01, 0.2) * k / omega
     play = design.validation.full_deflection_rad * dice.one_of(0.0, 0.0, 1e-3, 0.01)
@@ -190,11 +190,7 @@ def _frictions(dice: Dice, design: model.Design) -> Parts:
     friction, kind = design.friction, dice.one_of("", "", "", "asymmetric", "offset", "map", "load")
     dry = friction.dry_torque_Nm
     if kind == "map" and dry > 0.0 and friction.law == "coulomb":
-        free = design.limits.voltage_V / design.motor.back_emf_constant_Vs_rad
-        fast = 0.3 * min(design.limits.speed_rad_s, free)
-        curve = ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
-        points = tuple(model.FrictionPoint(speed_rad_s=w * fast, torque_Nm=dry * T) for w, T in curve)
-        return {"friction": {"dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0, "points": points}}
+        return {"friction": friction_map(design)}
     viscous = 0.6 * friction.viscous_Nms_rad
     kinds: dict[str, Parts] = {
         "asymmetric": {"dry_torque_reverse_Nm": 1.4 * dry, "viscous_reverse_Nms_rad": viscous},
@@ -204,10 +200,19 @@ def _frictions(dice: Dice, design: model.Design) -> Parts:
     return {"friction": kinds.get(kind, {})}
 
 
+def friction_map(design: model.Design) -> Parts:
+    """A Stribeck curve in the place of dry and viscous friction."""
+    free = design.limits.voltage_V / design.motor.back_emf_constant_Vs_rad
+    fast, dry = 0.3 * min(design.limits.speed_rad_s, free), design.friction.dry_torque_Nm
+    curve = ((0.0, 1.0), (0.02, 0.7), (0.2, 0.75), (1.0, 1.2))
+    points = tuple(model.FrictionPoint(speed_rad_s=w * fast, torque_Nm=dry * T) for w, T in curve)
+    return {"dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0, "points": points}
+
+
 def _loads(dice: Dice, design: model.Design) -> Parts:
     if not dice.chance(0.15) or design.axis == "linear":
         return {}
-    peak = dice.decades(0.01, 0.2) * _full_torque(design) * design.total_ratio
+    peak = dice.decades(0.01, 0.2) * full_torque(design) * design.total_ratio
     gravity = model.Gravity(mass_kg=peak / 9.80665, arm_m=1.0, offset_rad=dice.one_of(0.0, 0.5, pi))
     return {"load": {"gravity": gravity, "path": "back-drivable", "moment_slope_Nm_rad": 0.0}}
 
