@@ -45,8 +45,8 @@ class Analysis:
     request: type | None = None
     _: KW_ONLY
     words: str = ""  # the command's help, its first paragraph stands in the list; docstring of the request
-    # ``package.name`` of ``(design, request) -> result``; ``analyses.NAME.NAME`` where empty. Where the
-    # result says ``passed``, that is the exit status.
+    # ``package.name`` of ``(design, request) -> result``; where empty that of the command's name in the
+    # module ``run`` beside the request. Where the result says ``passed``, that is the exit status.
     function: str = ""
     # The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
     # that of a list
@@ -59,7 +59,6 @@ class Analysis:
     # Whether the function takes ``out`` as well, the folder, and keeps there what it finds
     keeps: bool = False
     written: str = ""  # a flag of the request that is set where the answer is written as a page or as JSON
-    warns: bool = False  # whether what is suspicious about the design is said first
     stem: str = ""  # name of the page's files; that of the command where empty
     # Folder of the page where none is given; without it, a page is made only where ``--out`` says so
     out: str = ""
@@ -71,6 +70,11 @@ class Analysis:
         """What the command says of itself."""
         return cleandoc(self.words or (self.request.__doc__ if self.request else "") or "")
 
+    @property
+    def warns(self) -> bool:
+        """Whether what is suspicious about the design is said first: where loops or runs are made of it."""
+        return self.group in (LINEAR, NONLINEAR)
+
     def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
         """What the function is given beside the design: nothing, or the request with what is chosen."""
         if self.request is None:
@@ -80,7 +84,8 @@ class Analysis:
         return (made(design, **values) if made else self.request(**values),)
 
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
-        package, _, name = (self.function or f"analyses.{self.name}.{self.name}").rpartition(".")
+        beside = self.request.__module__.rpartition(".")[0] if self.request else ""
+        package, _, name = (self.function or f"{beside}.run.{self.name}").rpartition(".")
         of = () if self.alone else (design,)
         return getattr(import_module(package), name)(*of, *asked, **more)
 
@@ -121,10 +126,11 @@ ANALYSES = (
     ),
     Analysis("init", DESIGNS, StartAsked, alone=True, function="reports.design_files.start.start"),
     Analysis("keys", DESIGNS, KeysAsked, alone=True, function="reports.design_files.keys.keys"),
-    Analysis("margins", LINEAR, MarginsAsked, warns=True),
+    Analysis("margins", LINEAR, MarginsAsked),
     Analysis(
         "stiffness",
         LINEAR,
+        function="analyses.stiffness.stiffness",
         words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
@@ -135,9 +141,7 @@ ANALYSES = (
         """,
     ),
     Analysis("corners", LINEAR, CornersAsked, also=True),
-    Analysis(
-        "simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating", warns=True
-    ),
+    Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),
     Analysis(
@@ -169,19 +173,12 @@ ANALYSES = (
         "identify",
         RECORDS,
         IdentificationAsked,
-        function="analyses.identification.run.identify",
         doing="identifying",
         stem="identification",
         example="analyses.records.campaign_file",
     ),
     Analysis(
-        "correlate",
-        RECORDS,
-        CorrelationAsked,
-        function="analyses.correlation.run.correlate",
-        shown="correlation",
-        doing="simulating",
-        stem="correlation",
+        "correlate", RECORDS, CorrelationAsked, shown="correlation", doing="simulating", stem="correlation"
     ),
     Analysis(
         "compare",
@@ -204,7 +201,7 @@ ANALYSES = (
         keeps=True,
         out="out/montecarlo",
     ),
-    Analysis("tune", STUDIES, TuningAsked, function="analyses.tuning.tune", doing="tuning", out="out/tune"),
+    Analysis("tune", STUDIES, TuningAsked, doing="tuning", out="out/tune"),
     Analysis(
         "nightly",
         STUDIES,
@@ -221,7 +218,6 @@ ANALYSES = (
         AskedController,
         page=False,
         function="reports.exports.export_controller",
-        shown="listing",
     ),
     Analysis("export fmu", EXPORTS, AskedFmu, page=False, function="reports.exports.export_fmu"),
     Analysis("export linear", EXPORTS, AskedLinear, page=False, function="reports.exports.export_linear"),

@@ -73,11 +73,8 @@ def report(
         Further sections, of `reports.analyses.FURTHER`.
     added : sequence of section
         Sections of other documents, put before the further ones.
-    response : path or control.FrequencyResponseData, optional
-        A measured response, laid over the model; of what, and with how many averages behind its coherence, as
-        `analyses.margins.run.measured_over` has it.
-    response_of : str
-    averages : int, optional
+    response, response_of, averages : optional
+        A measured response, laid over the model: as `analyses.margins.run.measured_over` has it.
     source : str, optional
         See `design_report`; the file's text where ``design`` is a name or a path.
     step : callable, optional

@@ -43,6 +43,7 @@ from reports.document_schema import (
     VerdictItem,
     validate,
 )  # fmt: skip
+from reports.drawing import refuse_undrawable
 from reports.numbers import prose, show
 from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible
@@ -372,8 +373,6 @@ def load(path: str | Path) -> Tree:
 
     Refused is also one whose verdict is not that of its sections, or of which a figure cannot be drawn.
     """
-    from reports.drawing import refuse_undrawable
-
     made = read_json(path)
     check(made, shown_path(path))
     refuse_undrawable(figures(made), shown_path(path))

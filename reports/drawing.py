@@ -19,16 +19,16 @@ PLACEHOLDER = (
 
 def draw_all(
     blocks: Sequence[Mapping[str, Any]], progress: Progress | None = None, page: bool = True
-) -> list[str]:
-    """Draw figure blocks, in order; one that fails is a notice in its place, and is noted.
+) -> dict[int, str]:
+    """Draw figure blocks: SVG by the block's ``id()``; one that fails is a notice in its place, and is noted.
 
     For a page: a picture a column, colours as CSS variables with the light ones as fallback, the legend as a
     list. Otherwise one picture with plain colours.
     """
-    drawn: list[str] = []
+    drawn: dict[int, str] = {}
     for k, block in enumerate(blocks, 1):
         svg, missing = caught(f"figure {k} ({block['figure']})", partial(draw_svg, block, f"f{k}", page))
-        drawn.append(svg or PLACEHOLDER)
+        drawn[id(block)] = svg or PLACEHOLDER
         note([missing] if missing else [])
         if progress is not None:
             progress(k, len(blocks))

@@ -11,8 +11,14 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.files.atomic import write_bytes, write_together
 from analyses.linear.code_check import CodeCheck, check_code
+from nonlinear.export import PLATFORMS, c_export, controller_export, fmu_bytes, refuse_unknown
+from nonlinear.runs.watch import told_if_slow
 from reports.cli.options import folder_for_results, refuse_existing
+from reports.export_documents import check_text, export_documents, summary
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
+from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
+from reports.model_picture import model_png
+from reports.provenance import package_version
 
 
 @dataclass(frozen=True)
@@ -29,16 +35,11 @@ class Exported:
         return None if self.check is None or self.check.reason else Verdict.of(not self.check.failed)
 
     def __str__(self) -> str:
-        from reports.export_documents import summary
-
         return "\n".join([self.words, *([summary(self.check)] if self.check else [])])
 
 
 def export_c(design: Design, asked: AskedC) -> Exported:
     """Write what `AskedC` says; refused where there are such files already, or the prefix is no name."""
-    from nonlinear.export import c_export
-    from reports.export_documents import check_text
-
     folder_for_results(asked.target)
     texts = c_export(design, single_precision=asked.single, prefix=asked.prefix)
     _refuse_any(asked.target, texts, asked.force)
@@ -49,8 +50,6 @@ def export_c(design: Design, asked: AskedC) -> Exported:
 
 def export_controller(design: Design, asked: AskedController) -> Exported:
     """Write what `AskedController` says; refused as by `export_c`."""
-    from nonlinear.export import controller_export
-
     folder_for_results(asked.target)
     texts = controller_export(design, single_precision=asked.number == "float", prefix=asked.prefix)
     _refuse_any(asked.target, texts, asked.force)
@@ -59,11 +58,6 @@ def export_controller(design: Design, asked: AskedController) -> Exported:
 
 def export_fmu(design: Design, asked: AskedFmu) -> Exported:
     """Write what `AskedFmu` says; refused where there is such a file, for an unknown version or platform."""
-    from nonlinear.export import PLATFORMS, fmu_bytes, refuse_unknown
-    from reports.export_documents import export_documents
-    from reports.model_picture import model_png
-    from reports.provenance import package_version
-
     target = asked.target or Path(f"{design.name}.fmu")
     refuse_existing(target, asked.force)
     platforms = tuple(dict.fromkeys(asked.platform or PLATFORMS))
@@ -84,8 +78,6 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
     """Write what `AskedLinear` says; refused where there is such a file already."""
-    from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
-
     target = asked.target or Path(f"{design.name}-linear{SUFFIXES[asked.to]}")
     refuse_existing(target, asked.force)
     tree = linear_models(design)
@@ -106,7 +98,5 @@ def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None)
 
 
 def _checked(design: Design) -> CodeCheck:
-    from nonlinear.runs.watch import told_if_slow
-
     with told_if_slow("measuring the margins of the compiled code (--no-check leaves it out)"):
         return check_code(design)

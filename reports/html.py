@@ -48,8 +48,7 @@ def write_report(
 
 def page(made: Mapping[str, Any], *, progress: Progress | None = None) -> str:
     """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all)."""
-    blocks = figures(made)
-    drawings = dict(zip(map(id, blocks), draw_all(blocks, progress), strict=True))
+    drawings = draw_all(figures(made), progress)
 
     def drawn(block: Mapping[str, Any]) -> Markup:
         return Markup(drawings[id(block)])
@@ -134,10 +133,10 @@ def script(*, live: bool = False) -> str:
     return bundled("folds", "figures", "hands") if live else bundled("folds", "figures")
 
 
-def security_policy(*scripts: str, wasm: bool = False) -> str:
-    """Give the page's content security policy: no request at all, and only these scripts run."""
-    digests = (base64.b64encode(hashlib.sha256(script.encode()).digest()).decode() for script in scripts)
-    allowed = " ".join(f"'sha256-{digest}'" for digest in digests) + " 'wasm-unsafe-eval'" * wasm
+def security_policy(script: str, *, wasm: bool) -> str:
+    """Give the page's content security policy: no request at all, and only this script runs."""
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    allowed = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
     return (
         f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}; base-uri 'none'"
     )

@@ -1,8 +1,7 @@
 """`actuator-lti export linear`: every loop and response of a design as state space, for other programs.
 
-The sampled form is exact; the continuous one carries its delays apart
-(`actuator_lti.systems.delay_system`). What is
-written is one tree of names, units, matrices and margins.
+The sampled form is exact; the continuous one carries its delays apart (`actuator_lti.systems.delay_system`).
+What is written is one tree of names, units, matrices and margins.
 """
 
 import io
@@ -18,7 +17,9 @@ from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-from actuator_lti.loops import Form, Loop, Loops, exact_margins
+from actuator_lti.loops import Form, Loop, Loops, assemble_loops, exact_margins
+from actuator_lti.margins import stability_margins
+from nonlinear.export.c_files import stage_words
 
 SCHEMA = "actuator-lti/linear"
 SUFFIXES = {"json": ".json", "mat": ".mat", "python": ".py"}
@@ -52,8 +53,6 @@ def system(entry):
 
 def linear_models(design: Design) -> Tree:
     """The tree of a design at its usual operating point: per form its loops, break points and responses."""
-    from actuator_lti import assemble_loops
-
     about = {"name": design.name, "revision": design.revision or "", "hash": design_hash(design)}
     tree: Tree = {"schema": SCHEMA, "version": 1, "design": about}
     for form in FORMS[:1] if design.controller.sampled_only else FORMS:
@@ -62,8 +61,6 @@ def linear_models(design: Design) -> Tree:
 
 
 def _form(loops: Loops) -> Tree:
-    from nonlinear.export.c_files import stage_words
-
     design = loops.design
     length, force = ("m", "N") if design.axis == "linear" else ("rad", "N*m")
     answer = {"position": length, "velocity": f"{length}/s", "current": "A"}
@@ -97,8 +94,6 @@ def _loop(loop: Loop, loops: Loops) -> Tree:
 
 def margins_tree(system: Any) -> Tree:
     """Verdict, evidence and every margin of an open loop; why there are none, where it is refused."""
-    from actuator_lti.margins import stability_margins
-
     try:
         found = stability_margins(system)
     except InputError as refusal:

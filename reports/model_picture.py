@@ -6,12 +6,13 @@ from importlib.util import find_spec
 
 from actuator_lti.design.model import Design
 from reports.charts.paint import COLOURS
+from reports.charts.pen import Pen
 from reports.numbers import seconds
-from reports.visible import escape
 
 WIDTH, HEIGHT = 640, 300
 LEFT, TOP, GAP = 16.0, 62.0, 14.0
 BOX_HEIGHT, ROW = 62.0, 128.0
+PEN = Pen(prefix="", page=False, keys={})
 FONT = "DejaVu Sans Mono"  # comes with the typesetter, so that the picture is the same on every machine
 PPI = 144.0  # two pixels a point
 MOST_CHARACTERS = 14
@@ -129,6 +130,4 @@ def _words(
     x: float, y: float, text: str, size: float, *, colour: str = "ink", bold: bool = False, most: int = 60
 ) -> str:
     short = text if len(text) <= most else text[: most - 1] + "."
-    weight = ' font-weight="bold"' if bold else ""
-    place = f'x="{x:.1f}" y="{y:.1f}" font-size="{size:g}" fill="{COLOURS[colour]}"{weight}'
-    return f'<text {place} text-anchor="middle">{escape(short)}</text>'
+    return PEN.words(short, x, y, size=size, anchor="middle", colour=colour, bold=bold)

@@ -7,7 +7,6 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +52,7 @@ def pdf_bytes(made: Mapping[str, Any]) -> bytes:
     system's.  The same document gives the same file wherever those are the same.
     """
     need("typst", "pdf", "a PDF")
+    import matplotlib
     import typst
 
     data = json.dumps(printable(made), ensure_ascii=False, allow_nan=False)
@@ -63,7 +63,7 @@ def pdf_bytes(made: Mapping[str, Any]) -> bytes:
             typst.compile(
                 str(TEMPLATE),
                 root=str(TEMPLATE.parent),
-                font_paths=[font_folder()],
+                font_paths=[str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")],
                 sys_inputs={"document": data},
                 timestamp=_time(made),
                 format="pdf",
@@ -71,14 +71,6 @@ def pdf_bytes(made: Mapping[str, Any]) -> bytes:
         )
     except typst.TypstError as error:
         raise NumericalError(f"typst refuses the report: {str(error).splitlines()[0]}") from error
-
-
-@cache
-def font_folder() -> str:
-    """Folder of the fonts that matplotlib brings along: those of the figures."""
-    import matplotlib
-
-    return str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")
 
 
 def _time(made: Mapping[str, Any]) -> int:
@@ -103,8 +95,7 @@ def summary(made: Mapping[str, Any]) -> Tree:
 
 def printable(made: Mapping[str, Any]) -> Tree:
     """Turn a document into what ``report.typ`` reads; nothing in it is markup any more."""
-    blocks = figures(made)
-    drawings = dict(zip(map(id, blocks), draw_all(blocks, page=False), strict=True))
+    drawings = draw_all(figures(made), page=False)
     design, origin = made.get("design") or {}, made.get("provenance") or {}
     every = (block for part in made["sections"] for block in walk(part))
     own = (block for block in every if block.get("what", "requirements") == "requirements")
@@ -243,6 +234,5 @@ def _table(block: Mapping[str, Any]) -> Tree:
 
 
 def _cell(value: Any, form: str) -> dict[str, str]:
-    if isinstance(value, Mapping):
-        return {"text": clean(show(value.get("text"), form)), "status": value.get("status") or ""}
-    return {"text": clean(show(value, form)), "status": ""}
+    mark = value if isinstance(value, Mapping) else {"text": value}
+    return {"text": clean(show(mark.get("text"), form)), "status": mark.get("status") or ""}

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 def shown_unit(unit: str) -> tuple[str, float]:
     """The unit in which reports write figures and limits of a unit, and the factor to it: times are ms."""
-    return ("ms", 1e3) if unit == "s" else ("" if unit == "1" else unit, 1.0)
+    return ("ms", 1e3) if unit == "s" else ("" if unit == "1" else unit.replace("*", " "), 1.0)
 
 
 def with_unit(value: float, unit: str, format: str = "g") -> str:

@@ -9,7 +9,7 @@ from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.real_roots import positive_roots
 from actuator_lti.margins.exact.roots import V, split
-from actuator_lti.systems.exact_fraction import double
+from actuator_lti.systems.exact_response import double
 
 _BITS = 128
 

@@ -34,6 +34,8 @@ def many_loops(
     the open loop's, then of the closed loop's; where the first is NaN, the row is left as it is.
     """
     count, n = B.shape
+    if n == 0:  # of a law that does not take its command: no loop, and no row has a first pole
+        return
     flat = [each.reshape(-1) for each in (A, B, C, poles, leads)]
     lent = [np.zeros(length) for length in room(n)]
     LIBRARY.functions.many_loops(count, n, *flat, int(time_figures), out.reshape(-1), *lent)

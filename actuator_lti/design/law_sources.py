@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import read_mat5
-from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
+from actuator_lti.files.reading import decode, parse_json, read_bytes, shown, shown_path
 from actuator_lti.files.tree import Tree
 
 PARTS = ("A", "B", "C", "D")
@@ -77,7 +77,13 @@ def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) 
         **{name: parts[name].ravel().tolist() for name in ("C", "D", "L")},
     }
     tree = {name: value for name, value in tree.items() if value}
-    return tree if period_s is None else {**tree, "period": f"{float(period_s)!r} s"}
+    if period_s is None:
+        return tree
+    try:
+        return {**tree, "period": f"{float(period_s)!r} s"}
+    except (ValueError, TypeError):
+        said = f"dt = {shown(period_s)}: allowed: a period in s, or 0 of a continuous system"
+        raise InputError(said) from None
 
 
 def _shape(matrix: np.ndarray) -> str:

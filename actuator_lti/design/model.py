@@ -194,7 +194,7 @@ class Design:
 
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""
-        names = (id, f"{id}".rpartition("/")[0])
+        names = (id, id.rpartition("/")[0])
         return next((item for item in self.waivers if item.requirement in names), None)
 
     @property

@@ -22,8 +22,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _gears, _loads, _pedigree, _encoder,
-        elastic_warnings,
+        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _pedigree,
+        _encoder, elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
@@ -104,6 +104,28 @@ def _unused(design: Design) -> Iterator[str]:
             yield f"limits.{key}: clamps nothing, the design has no velocity loop"
     if design.friction.law == "tanh" and design.friction.breakaway_ratio != 1.0:
         yield "friction.breakaway_ratio: not used by the tanh law"
+
+
+def _unseen(design: Design) -> Iterator[str]:
+    """Counts that were set, and are not only quoted of a data sheet, where no loop sees them."""
+    control, ideal = design.controller, design.encoder.speed == "ideal"
+    if control.own_law is not None:  # takes the angles that it likes
+        return
+    speed = None if control.velocity is None or ideal else control.velocity.sensor
+    unseen = {"encoder": speed != "motor", "output_encoder": speed != "output"}
+    unseen["output_encoder"] &= control.position is None or control.position.sensor != "output"
+    for sensor in (name for name in unseen if unseen[name]):
+        counts = design.parameters.get(f"{sensor}.counts_per_rev")
+        if counts is not None and counts.source[:7] in ("", "changed"):
+            why = "encoder.speed is ideal" if ideal else "the speed is not made of them"
+            why = why if sensor == "encoder" else "no loop has this sensor"
+            yield f"{sensor}.counts_per_rev: acts on nothing, {why}"
+
+
+def _cogging(design: Design) -> Iterator[str]:
+    if design.motor.cogging_Nm != 0.0 and "motor.cogging_phase" not in design.parameters:
+        drives = "at angle 0 cogging drives the motor away; 180 deg: it holds"
+        yield f"motor.cogging_phase: not given, 0 assumed: {drives}"
 
 
 def _gears(design: Design) -> Iterator[str]:

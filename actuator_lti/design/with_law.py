@@ -101,7 +101,7 @@ def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> t
     from scipy.signal import cont2discrete
 
     law_tree(*parts)
-    if method not in METHODS:
+    if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method = {shown(method)}: allowed: {' or '.join(METHODS)}")
     if dt not in (None, 0) or dt is False:
         raise InputError(f"method = {shown(method)}: the system is sampled already, dt = {dt}")

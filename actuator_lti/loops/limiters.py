@@ -15,7 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import command_mean, profile_onset_rad
 from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.drive.wiring import Drive
-from actuator_lti.errors import InputError, shown
+from actuator_lti.errors import InputError, finite_number, shown
 from actuator_lti.loops.result import Loops
 
 Response = Callable[[np.ndarray], np.ndarray]
@@ -69,7 +69,7 @@ class LimiterPath:
         double frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds
         its square and, by the product of both, a ripple of the single frequency, bounded by its amplitude.
         """
-        magnitude, bias = np.abs(self.response(omega_rad_s)), abs(bias)
+        magnitude, bias = np.abs(self.response(omega_rad_s)), abs(finite_number("bias", bias))
         headroom: Any = max(self.limit - bias, 0.0)
         if self.averaged_s is not None:  # bias^2 + 2 bias I r1 + (I^2/2) (1 + r2) = limit^2
             omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
@@ -114,6 +114,7 @@ def onset(loops: Loops, omega_rad_s: Any, bias: Mapping[str, float] | None = Non
     used, known = {} if bias is None else bias, ", ".join(loops.limiters) or "none"
     if not isinstance(used, Mapping) or not used.keys() <= loops.limiters.keys():
         raise InputError(f"bias = {shown(bias)}: allowed: numbers by the name of a limiter ({known})")
+    used = {name: finite_number(f"bias[{name!r}]", value) for name, value in used.items()}
     omega = _frequencies(omega_rad_s)
     mean = command_mean(loops.design)
     before = np.ones(omega.shape) if mean is None else np.abs(mean.response(omega))

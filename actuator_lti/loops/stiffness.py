@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.drive.choice import where
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, pruned, siso
@@ -56,7 +55,7 @@ class StiffnessFigures:
 
     @property
     def lost_motion_rad(self) -> Any:
-        """At +-3 % of the largest load moment; 0 of a rigid drive train."""
+        """At +-3 % of the largest load moment, never below the play; 0 of a rigid drive train."""
         return lost_motion_rad(self.design)
 
     @cached_property
@@ -88,21 +87,17 @@ def static_stiffness(response: Compliance) -> Any:
 
 
 def lost_motion_rad(design: Design) -> Any:
-    """Lost motion at the output as gear makers read it: the hysteresis of the twist under a slow moment, the
-    motor held, between the middles of its width at +-`LOST_MOTION_SHARE` of the largest load moment.
+    """Lost motion at the output as gear makers read it, the motor held: the twist between the middles of the
+    hysteresis where the spring carries +-`LOST_MOTION_SHARE` of the largest load moment, play and twice m/k.
 
-    On either branch the spring carries the moment less or more the load's dry friction.  At m > C0_l that is
-    2 (b + m/k)/N_r, of one stiffness; below it the play lies within the width.  Without a load moment: the
-    play.
+    The load's friction has no part in it, as on a bench for gears: it widens the hysteresis, and where it is
+    larger than m the play lies within that width.
     """
-    coupling, friction = design.coupling, design.load.friction
+    coupling = design.coupling
     if coupling is None:
         return 0.0
-    dry = 0.0 if friction is None else friction.dry_torque_Nm
     m = LOST_MOTION_SHARE * design.load.moment_max_Nm / design.ratio_behind_coupling
-    behind_dry = where(m > dry, 1.0, where(m < dry, 0.0, 0.5))  # share of the play that the width leaves
-    twist = coupling.stretch_rad(m + dry) + coupling.stretch_rad(m - dry) + behind_dry * coupling.play_rad
-    return where(m == 0.0, coupling.play_rad, twist) / design.ratio_behind_coupling
+    return (coupling.play_rad + 2.0 * coupling.stretch_rad(m)) / design.ratio_behind_coupling
 
 
 def _plain(value: Any) -> Any:

@@ -11,7 +11,7 @@ from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
 from actuator_lti.systems.delay_response import plain_behind_delay
-from actuator_lti.systems.exact_fraction import exact_sum
+from actuator_lti.systems.exact_response import exact_sum
 from actuator_lti.systems.measured_response import refuse_measured
 from actuator_lti.types import Real
 

@@ -21,7 +21,7 @@ from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.search import OVER, Search
-from actuator_lti.systems.exact_fraction import dc_noise, divided, double, near_dc, of_s, shown
+from actuator_lti.systems.exact_response import dc_noise, divided, double, near_dc, of_s, shown
 from actuator_lti.types import Complex, Real
 
 UNSTABLE = "the system is not stable: it has no step figures"
@@ -51,6 +51,7 @@ class Motion:
         size = float(np.linalg.norm(self._A, 2)) if n and not sampled else 0.0
         self.shortest = 2.0 ** -np.ceil(np.log2(_FINE * size)) if size else 1.0
         self._moves = self._transitions(A)
+        self.whole = float(self.shortest * 2.0 ** (len(self._moves) - 1))  # how long it lasts
         turned = self._A - np.eye(n) if sampled else self._A
         # rows that bound abs(e) over a span, and how far e leaves its chord there, from abs(x) at its start
         rows = np.abs([self._c, 0.125 * self.shortest**2 * (self._c @ turned @ turned)])
@@ -71,11 +72,6 @@ class Motion:
                     return moves
                 move = move * move
         raise NumericalError(_LONG)
-
-    @property
-    def whole(self) -> float:
-        """How long it lasts."""
-        return float(self.shortest * 2.0 ** (len(self._moves) - 1))
 
     def curve(self, end: float, count: int) -> tuple[Real, Real]:
         """Times from the start on to ``end``, at most twice ``count`` and evenly apart, and e there."""

@@ -99,11 +99,10 @@ class ControlFace(control.FrequencyResponseData, NonlinearIOSystem):
 
 def _grid(system: DelaySystem) -> np.ndarray:
     """Logarithmic, and dense enough in phase where the delays turn."""
-    rates = [np.abs(np.linalg.eigvals(system.A))] if system.A.size else []
+    rates = [np.abs(np.linalg.eigvals(system.A)), 1.0 / system.delays_s]
     with suppress(InputError):
         rates += [np.abs(system.without_delays().poles())]
-    rates += [1.0 / system.delays_s]
-    every = np.concatenate(rates) if rates else np.ones(1)
+    every = np.concatenate(rates)
     every = every[np.isfinite(every) & (every > 1e-9 * every.max(initial=1e-30))]
     low, high = (every.min(), every.max()) if every.size else (1.0, 1.0)
     return np.geomspace(low / 100.0, high * 10.0, _POINTS)

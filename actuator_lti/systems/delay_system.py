@@ -151,15 +151,9 @@ class DelaySystem(ControlFace):
         InputError
             If that leaves an algebraic loop without a solution.
         """
-        k = len(self.delays_s)
-        loop = np.eye(k) - self.D22
-        if k and np.linalg.cond(loop) > 1e12:
+        if self.delays_s.size and np.linalg.cond(np.eye(self.delays_s.size) - self.D22) > 1e12:
             raise InputError("without_delays: an algebraic loop without a solution remains")
-        C, D = (np.linalg.solve(loop, M) if k else M for M in (self.C2, self.D21))
-        return control.ss(
-            self.A + self.B2 @ C, self.B1 + self.B2 @ D, self.C1 + self.D12 @ C, self.D11 + self.D12 @ D,
-            inputs=self.input_labels, outputs=self.output_labels,
-        )  # fmt: skip
+        return self._with_each(control.ss([], [], [], 1.0))
 
     def pade(self, order: int = 4) -> control.StateSpace:
         """An approximation as `control.StateSpace`: each delay as a Pade quotient of this order.
@@ -186,24 +180,23 @@ class DelaySystem(ControlFace):
         if isinstance(order, bool) or not isinstance(order, int) or not 1 <= order <= 12:
             raise InputError(f"order = {order!r}: allowed: a whole number, 1 to 12")
         unit = control.ss(control.tf(*control.pade(1.0, order)))  # in time over the delay: well scaled
-        rates = np.diag(1.0 / self.delays_s)
-        A, B = np.kron(rates, unit.A), np.kron(rates, unit.B)
-        C, D = (np.kron(np.eye(len(rates)), part) for part in (unit.C, unit.D))
-        # v = C2 x + D21 u + D22 z, z = C p + D v
-        algebra = np.eye(len(self.delays_s)) - self.D22 @ D
-        Vx, Vp, Vu = (np.linalg.solve(algebra, M) for M in (self.C2, self.D22 @ C, self.D21))
-        Zx, Zp, Zu = D @ Vx, C + D @ Vp, D @ Vu
         own = self.state_labels if self.nstates else []
-        labels = {"inputs": self.input_labels, "outputs": self.output_labels}
         states = [*own, *(f"delay{k}_{j}" for k in range(len(self.delays_s)) for j in range(order))]
+        return self._with_each(unit, name=f"{self.name}_pade{order}", states=states)
+
+    def _with_each(self, unit: control.StateSpace, **names: Any) -> control.StateSpace:
+        """State space with a system, in time over the delay, in the place of each delay."""
+        rates, one = np.diag(1.0 / self.delays_s), np.eye(len(self.delays_s))
+        A, B, C, D = map(np.kron, (rates, rates, one, one), (unit.A, unit.B, unit.C, unit.D))
+        # v = C2 x + D21 u + D22 z, z = C p + D v
+        Vx, Vp, Vu = (np.linalg.solve(one - self.D22 @ D, M) for M in (self.C2, self.D22 @ C, self.D21))
+        Zx, Zp, Zu = D @ Vx, C + D @ Vp, D @ Vu
         return control.ss(
             np.block([[self.A + self.B2 @ Zx, self.B2 @ Zp], [B @ Vx, A + B @ Vp]]),
             np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]),
             np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
             self.D11 + self.D12 @ Zu,
-            name=f"{self.name}_pade{order}",
-            **labels,
-            **({"states": states} if states else {}),
+            **({"inputs": self.input_labels, "outputs": self.output_labels} | names),
         )
 
     def characteristic(self, s: Any) -> np.ndarray:

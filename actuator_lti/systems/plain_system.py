@@ -121,11 +121,8 @@ class PlainDelaySystem:
             raise InputError(
                 f"feedback: {p} outputs into {back.ninputs} inputs, {back.noutputs} back into {m}"
             )
-        source = np.vstack([np.eye(m), np.zeros((back.ninputs, m))])
-        sink = np.hstack([np.eye(p), np.zeros((p, back.noutputs))])
-        loop = np.zeros((m + back.ninputs, p + back.noutputs))
-        loop[:m, p:], loop[m:, :p] = sign * np.eye(m, back.noutputs), np.eye(back.ninputs, p)
-        return joined_by(self, back, source, sink, loop)
+        loop = np.eye(m + p, p + m, k=-m) + sign * np.eye(m + p, p + m, k=p)  # forth, and back
+        return joined_by(self, back, np.eye(m + p, m), np.eye(p, p + m), loop)
 
     def named(self, name: str, source: str, signal: str) -> PlainDelaySystem:
         """The same under other names."""
@@ -146,12 +143,9 @@ def in_series(first: PlainDelaySystem, second: PlainDelaySystem) -> PlainDelaySy
     """Series connection."""
     if first.noutputs != second.ninputs:
         raise InputError(f"series: {first.noutputs} outputs into {second.ninputs} inputs")
-    m, q = first.ninputs, first.noutputs
-    source = np.vstack([np.eye(m), np.zeros((second.ninputs, m))])
-    sink = np.hstack([np.zeros((second.noutputs, q)), np.eye(second.noutputs)])
-    loop = np.zeros((m + second.ninputs, q + second.noutputs))
-    loop[m:, :q] = np.eye(q)
-    return joined_by(first, second, source, sink, loop)
+    m, q, p = first.ninputs, first.noutputs, second.noutputs
+    loop = np.eye(m + q, q + p, k=-m)
+    return joined_by(first, second, np.eye(m + q, m), np.eye(p, q + p, k=q), loop)
 
 
 def in_parallel(a: PlainDelaySystem, b: PlainDelaySystem) -> PlainDelaySystem:

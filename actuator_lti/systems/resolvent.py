@@ -49,9 +49,18 @@ def responses(system: Any, points: np.ndarray) -> np.ndarray:
 
 
 def solved_at(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Solve stacked equations; NaN where a matrix is singular."""
+    """Solve stacked equations; NaN where a matrix is singular.
+
+    What is left of them is solved for once more: each is right to rounding of its own terms then, not of
+    the largest (Skeel, Math. Comp. 35, 1980), and a small sum of large states keeps its digits.
+    """
+    found = _solved(matrices, right)
+    return found + _solved(matrices, right - matrices @ found)
+
+
+def _solved(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     try:
-        return np.linalg.solve(matrices, right)
+        return np.asarray(np.linalg.solve(matrices, right))
     except np.linalg.LinAlgError:
         singular = np.array([np.linalg.det(each) == 0 for each in matrices])
         regular = np.where(singular[:, None, None], np.eye(matrices.shape[1]), matrices)

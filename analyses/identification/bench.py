@@ -18,7 +18,7 @@ from analyses.identification.design_values import (
     with_found_constant,
     with_given_constant,
 )
-from analyses.identification.diagnosis import Diagnosed, diagnosed
+from analyses.identification.diagnosis import Diagnosed, diagnosed, without_flat_tops
 from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
@@ -113,7 +113,10 @@ def identify_bench(
         model = with_given_constant(start, model, used, compared)
     else:
         model, both = with_found_constant(start, model, used, electrical_values(start, electrical))
-    findings |= {name: (*findings[name], *more) for name, more in right.findings.items()}
+    others = [without_flat_tops(start, record, recipe) for record in unseen]
+    unseen = tuple(record for record, _ in others)
+    told_of = {**right.findings, **{record.name: tuple(clipped) for record, clipped in others}}
+    findings |= {name: (*findings[name], *more) for name, more in told_of.items()}
     source = f"identified from {names}{at_constant(model)}"
     loaded = any(is_loaded(record) for record in used)
     size = verdict.size_item(design, compared, kept_constants=electrical is None, loaded=loaded)

@@ -85,7 +85,7 @@ def diagnosed(
 
     ``start`` is the design with what the voltage equation gave; ``fit`` gives the model of records.
     """
-    whole = [_without_flat_tops(start, record, recipe) for record in records]
+    whole = [without_flat_tops(start, record, recipe) for record in records]
     used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
     model = fit(used)
     sure: dict[int, Lag] = {}
@@ -185,7 +185,7 @@ def flat_tops(values: Floats) -> Mask:
     return np.any([lasting(np.abs(values - level) <= near, LEAST_RUN) for level in ends], axis=0)
 
 
-def _without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> tuple[Record, list[Finding]]:
+def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> tuple[Record, list[Finding]]:
     """The record without the rows of a flat top, where all others say that the drive signal was larger."""
     name = drive_of(start, record)[1]
     flat = flat_tops(record[name])

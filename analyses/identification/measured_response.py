@@ -1,11 +1,12 @@
 """Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.special import stdtrit
 from scipy.stats import chi2
 
@@ -13,18 +14,19 @@ from actuator_lti.design import parameter_value, paths_of, read_design_text, wit
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.asked import Of
 from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
-from analyses.identification.output_error import STEP, fit_output
+from analyses.identification.output_error import Moved, box_of, fit_output
 from analyses.identification.to_design import design_with_fit
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
+from analyses.records.consistency import SURE
 
 KEYS = (
     "motor.rotor_inertia",
@@ -38,7 +40,17 @@ CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
 RESOLVED = 1e-5
-"""Share of a slope that is its own, by differences of 0.1 %: below it two values do the same."""
+"""Share of a slope that is its own: below it two values do the same."""
+STEP = 1e-5
+"""Share of a value for its differences: those of a sharp resonance curve at 1e-3 already."""
+STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
+"""Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
+REACH = 30.0
+"""Factor of a value that a rough fit may move it by."""
+ROUNDS = 40, 100
+"""Iterations of a rough fit, and of the one that follows."""
+AS_WELL = float(chi2.isf(0.05, 1))
+"""Rise of the sum of squares, of deviation 1, within which other values explain a response as well."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,12 +59,35 @@ class ResponseFit(Fit):
 
     ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
     Errors are widened by a misfit above 1; without deviations they are those of the residual, so large that
-    1.96 of them hold Student's 95 % interval at its degrees of freedom.
+    1.96 of them hold Student's 95 % interval at its degrees of freedom. ``also`` are other values, beyond
+    these errors, that explain the response as well.
     """
 
     misfit: float | None
     at_bound: tuple[str, ...]
+    also: Mapping[str, float]
     slopes: Floats = field(repr=False)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """A measured response, the deviation of each of its parts (1: not known), and the model of it."""
+
+    measured: Complexes
+    size: Floats
+    model: Callable[[Design], Complexes]
+
+    def parts(self, values: Complexes) -> Floats:
+        """Real and imaginary parts over their deviations."""
+        return np.concatenate([(values / self.size).real, (values / self.size).imag])
+
+    def of(self, tried: Design) -> Floats:
+        """Those of a design."""
+        return self.parts(self.model(tried))
+
+    def ratio(self, tried: Design) -> Floats:
+        """What is left of a design's logarithms: far from the truth they are straighter than the parts."""
+        return self.parts(np.log(self.model(tried) / self.measured) * np.abs(self.measured))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +118,8 @@ def identify_response(
     ----------
     design : Design
         Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
-        response does not determine (a standard error above the value itself) is kept too, and said.
+        response does not determine (a standard error above the design's value, and above a quarter of what
+        it is off) is kept too, and said.
     source : path or control.FrequencyResponseData
         See `actuator_lti.files.response.read_response`.
     loop : str, optional
@@ -109,20 +145,15 @@ def identify_response(
     model = _model(start, loop, of, measured)
     known = bool(np.all(np.isfinite(measured.deviation) & (measured.deviation > 0.0)))
     size = np.abs(measured.response) * (measured.deviation / np.sqrt(2.0) if known else 1.0)
-
-    def parts(values: Complexes) -> Floats:
-        return np.concatenate([(values / size).real, (values / size).imag])
-
+    seen = _Seen(measured.response, size, model)
     held = {key: Fixed(value=value, reason="fixed as asked") for key, value in (fixed or {}).items()}
     if start.load.inertia_kgm2 == 0.0:
         held.setdefault("load.inertia", Fixed(value=0.0, reason="0 in the design: kept"))
     names = tuple(key for key in KEYS if key in paths_of(start) and key not in held)
     _refuse_too_few(2 * len(size), len(names), measured.name)
-    fit, rest = _determined(
-        start, names, lambda tried: parts(model(tried)), parts(measured.response), known, progress
-    )
-    given = _given(start, fit, lambda tried: parts(model(tried))) if CONSTANT_KEYS.isdisjoint(held) else {}
-    fit = replace(fit, fixed={**held, **fit.fixed, **given})
+    fit, rest = _determined(start, names, seen, known, progress)
+    given = _given(start, fit, seen) if CONSTANT_KEYS.isdisjoint(held) else {}
+    fit = replace(fit, covariance=_widened(start, fit, given), fixed={**held, **fit.fixed, **given})
     made = design_with_fit(start, fit, f"frequency response {measured.name}{at_constant(fit)}")
     modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
@@ -134,6 +165,10 @@ def identify_response(
         items.insert(0, Item.of("misfit", label, "" if level > LEVEL else why))
     ended = "it ended at the least or largest value of its key: the response wants another"
     items += [Item.of(f"bound-{key}", f"{key} is within what its key allows", ended) for key in fit.at_bound]
+    if fit.also:
+        told = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
+        wrong = f"{told} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"
+        items.append(Item.of("also", "No other values explain the response", wrong))
     items += kept_items(fit, held)
     return ResponseResult(
         design=made,
@@ -146,16 +181,33 @@ def identify_response(
     )
 
 
-def _given(start: Design, fit: ResponseFit, parts: Callable[[Design], Floats]) -> dict[str, Fixed]:
-    """The constant that makes torques, which the response of a loop tells only with the values, to scale."""
+def _given(start: Design, fit: ResponseFit, seen: _Seen) -> dict[str, Fixed]:
+    """What the design alone tells, and how the values hang on it.
+
+    That is the constant that makes torques, which the response of a loop tells only with the values, to
+    scale, and each value that is not determined.
+    """
     name = next((name for name, of in CONSTANTS.items() if getattr(start.motor, of) is not None), None)
-    if name is None:
-        return {}
+    names = [key for key in fit.fixed if fit.fixed[key].value] + ([] if name is None else [name])
     found = with_values(start, dict(zip(fit.names, fit.values.tolist(), strict=True)), check=False)
-    key = parameter(name).key
-    more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
-    moved = scaled_lstsq(fit.slopes, parts(more) - parts(found))
-    return kept_constant(start, name, fit, moved / fit.values / STEP)
+    given = dict[str, Fixed]()
+    for one in names:
+        key, told = parameter(one).key, fit.fixed[one].reason if one in fit.fixed else ""
+        more = with_values(found, {key: (1.0 + STEP) * parameter_value(found, key)}, check=False)
+        moved = scaled_lstsq(fit.slopes, seen.of(more) - seen.of(found))
+        share = np.divide(moved, STEP * fit.values, out=np.zeros_like(moved), where=fit.values != 0.0)
+        given |= kept_constant(start, one, fit, share, told)
+    return given
+
+
+def _widened(start: Design, fit: ResponseFit, given: Mapping[str, Fixed]) -> Floats:
+    """The covariance with what the design's tolerances of the values that are not determined make of it."""
+    covariance = fit.covariance
+    for key in fit.fixed.keys() & given.keys():
+        moves = np.array([given[key].moves[name] for name in fit.names])
+        std = own_share(start, key, given[key].value) * given[key].value
+        covariance = covariance + std**2 * np.outer(moves, moves)
+    return np.asarray(covariance)
 
 
 def _model(
@@ -198,22 +250,71 @@ def _refuse_too_few(numbers: int, unknowns: int, where: str) -> None:
         raise InputError(f"{told}: no interval can be given; allowed: {allowed}", where=where)
 
 
+def _rough(seen: _Seen, start: Design, names: tuple[str, ...], factors: tuple[float, ...]) -> list[Design]:
+    """Where fits of the logarithms end, over the values' own, from several stiffnesses: the best ones."""
+    scale, ends = box_of(start, names)
+    off = np.array([name == "coupling.stiffness" for name in names], dtype=float)
+
+    def at(moved: Floats) -> Design:
+        values = np.clip(scale * np.exp(moved), *ends)
+        return with_values(start, dict(zip(names, values.tolist(), strict=True)), check=False)
+
+    ended = []
+    for factor in factors if off.any() else factors[:1]:
+        box, most = (-np.log(REACH), np.log(REACH)), ROUNDS[0]
+        begin = np.log(factor) * off
+        found = least_squares(
+            lambda moved: seen.ratio(at(moved)), begin, bounds=box, ftol=1e-4, xtol=1e-4, max_nfev=most
+        )
+        ended.append((found.cost, at(found.x)))
+    least = min(cost for cost, _ in ended)
+    return [tried for cost, tried in ended if cost <= 2.0 * least]
+
+
+def _least(
+    seen: _Seen,
+    start: Design,
+    names: tuple[str, ...],
+    factors: tuple[float, ...],
+    progress: Callable[[int, int], None] | None,
+) -> list[Moved]:
+    """The fits of several starts, the best one first."""
+    fits, failed, measured = list[Moved](), list[Exception](), seen.parts(seen.measured)
+    for begin in _rough(seen, start, names, factors):
+        try:
+            fits.append(
+                fit_output(begin, names, seen.of, measured, progress, step=STEP, iterations=ROUNDS[1])
+            )
+        except (InputError, NumericalError) as error:
+            failed.append(error)
+    if not fits:
+        raise failed[0]
+    return sorted(fits, key=lambda one: float(one.rest @ one.rest))
+
+
+def _from(start: Design, values: Mapping[str, float], left: Collection[str]) -> Design:
+    """A design with the values of a fit, but for those that are its own; a small one may come back."""
+    kept = {key: max(one, parameter_value(start, key) / REACH) for key, one in values.items()}
+    return with_values(start, {key: one for key, one in kept.items() if key not in left}, check=False)
+
+
 def _determined(
     start: Design,
     names: tuple[str, ...],
-    parts: Callable[[Design], Floats],
-    measured: Floats,
+    seen: _Seen,
     known: bool,
     progress: Callable[[int, int], None] | None,
 ) -> tuple[ResponseFit, Floats]:
     """The fit of what is determined, and its residual; of the others the one told worst goes first."""
     left: dict[str, str] = {}
-    while names:
-        found = fit_output(start, names, parts, measured, progress)
-        kept, like = told_apart(found.slopes, names, least=RESOLVED)
+    begin, factors = start, STARTS
+    while names := tuple(name for name in names if name not in left):
+        found, *others = _least(seen, begin, names, factors, progress)
+        values = dict(zip(names, found.values.tolist(), strict=True))
+        _, like = told_apart(found.slopes, names, least=RESOLVED)
         if like:
             left |= {one.name: str(one) for one in like}
-            names = tuple(names[k] for k in kept)
+            begin, factors = _from(start, values, left), STARTS[:1]
             continue
         size = np.linalg.norm(found.slopes, axis=0)
         unit = found.slopes / size
@@ -222,16 +323,20 @@ def _determined(
         student = float(stdtrit(freedom, 0.975)) / COVERAGE
         scale = max(variance, 1.0) if known else variance * student**2
         covariance = np.asarray(scale * (np.linalg.inv(unit.T @ unit) / np.outer(size, size)))
-        share = np.sqrt(np.diag(covariance)) / np.maximum(np.abs(found.values), 1e-300)
+        std, own = np.sqrt(np.diag(covariance)), np.array([parameter_value(start, name) for name in names])
+        share = std / np.maximum(np.maximum(np.abs(own), np.abs(found.values - own) / SURE), 1e-300)
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
             break
-        left[names[worst]] = "its standard error is larger than the value"
-        names = tuple(name for name in names if name != names[worst])
+        left[names[worst]] = "its standard error is larger than the design's value"
+        begin, factors = _from(start, values, left), STARTS[:1]
     else:
         raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
     kept_at = {key: parameter_value(start, key) for key in left}
     told = {key: f"{why}: not determined, the design's value kept" for key, why in left.items()}
+    most = float(found.rest @ found.rest) + AS_WELL * (max(variance, 1.0) if known else variance)
+    also = [one.values for one in others if one.rest @ one.rest <= most]
+    also = [one for one in also if np.any(np.abs(one - found.values) > COVERAGE * std)]
     fit = ResponseFit(
         names=names,
         values=found.values,
@@ -239,6 +344,7 @@ def _determined(
         fixed={key: Fixed(value=value, reason=told[key]) for key, value in kept_at.items()},
         misfit=float(np.sqrt(variance)) if known else None,
         at_bound=found.at_bound,
+        also=dict(zip(names, also[0].tolist(), strict=True)) if also else {},
         slopes=found.slopes,
     )
     return fit, found.rest

@@ -22,6 +22,10 @@ from analyses.records.record import Record
 STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
+AT_END = 1e-9
+"""Part of the start within which a value is at the end of what its key allows."""
+LEAST_STEPPED = 0.1
+"""Part of the start below which a value's own size is no measure of its step: it may go to zero."""
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
 MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
@@ -71,20 +75,23 @@ def fit_output(
     output_of: Callable[[Design], Floats],
     measured: Floats,
     progress: Callable[[int, int], None] | None = None,
+    *,
+    step: float = STEP,
+    iterations: int = ITERATIONS,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
     Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
-    differences of 0.1 % of each value.
+    differences of a share ``step`` of each value.
     """
     start = np.array([parameter_value(design, path) for path in paths])
-    scale = np.array([_scale(design, path, value) for path, value in zip(paths, start, strict=True)])
-    fields = [field_of(path) for path in paths]
-    ends = np.array([(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]).T
-    count, most = 0, ITERATIONS * (2 * len(paths) + 1)
+    scale, ends = box_of(design, paths)
+    count, most = 0, iterations * (2 * len(paths) + 1)
+
+    box = 1.0 + (ends - start) / scale
 
     def values_at(moved: Floats) -> Floats:
-        return np.asarray(np.clip(start + scale * (moved - 1.0), *ends))
+        return np.select(list(np.abs(moved - box) <= AT_END), list(ends), start + scale * (moved - 1.0))
 
     def residual(moved: Floats) -> Floats:
         nonlocal count
@@ -97,20 +104,32 @@ def fit_output(
 
     begin = np.ones(len(paths))
     first = residual(begin)
-    box = 1.0 + (ends - start) / scale
-    options = {"method": "dogbox", "diff_step": STEP, "xtol": TOLERANCE, "max_nfev": ITERATIONS}
-    found = least_squares(residual, begin, jac="3-point", bounds=box, **options)
-    dead = np.flatnonzero(np.linalg.norm(found.jac, axis=0) <= 1e-12 * np.linalg.norm(found.fun))
-    if len(dead):
-        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
+
+    def slopes(moved: Floats) -> Floats:
+        to = step * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
+        both = [np.clip(moved + side * to, *box) for side in (1.0, -1.0)]
+        pairs = zip(*both, strict=True)
+        change = np.array([residual(up) - residual(down) for up, down in pairs])
+        return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
+
+    options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": iterations}
+    found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
+    values = values_at(found.x)
     return Moved(
-        values=values_at(found.x),
+        values=values,
         slopes=found.jac / scale,
         rest=found.fun,
         first=first,
         iterations=int(found.njev),
-        at_bound=tuple(path for path, side in zip(paths, found.active_mask, strict=True) if side),
+        at_bound=tuple(path for path, one, at in zip(paths, values, ends.T, strict=True) if one in at),
     )
+
+
+def box_of(design: Design, paths: Sequence[str]) -> tuple[Floats, Floats]:
+    """What each value is measured by, shape (p,), and the least and the largest of its key, shape (2, p)."""
+    fields = [field_of(path) for path in paths]
+    ends = [(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]
+    return np.array([_scale(design, path, parameter_value(design, path)) for path in paths]), np.array(ends).T
 
 
 def _scale(design: Design, path: str, start: float) -> float:
@@ -169,6 +188,9 @@ def refine_records(
         return np.concatenate(parts)
 
     found = fit_output(design, paths, output, wanted, progress)
+    dead = np.flatnonzero(np.linalg.norm(found.slopes, axis=0) == 0.0)
+    if len(dead):
+        raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
     norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
     values = dict(zip(paths, found.values.tolist(), strict=True))
     return OutputErrorResult(
@@ -186,6 +208,8 @@ def refine_records(
 def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
+    Rows that no fit is to use, as their signal is clipped, are not compared either.
+
     A record without a command is held against the torque that the design's own inertia and friction need for
     its motion, by the record's own recipe, whatever cut-off the fit had.
     """
@@ -193,7 +217,10 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
     if command_of(design, record) is not None:
         try:
             name, part = output_name(design, record), simulated_part(design, record)
-            error = correlate_record(design, part)[name].relative_error
+            signal = correlate_record(design, part)[name]
+            kept = np.full(len(part), True) if part.left_out is None else ~part.left_out
+            off = np.linalg.norm((signal.modelled - signal.measured)[kept])
+            error = float(off / np.linalg.norm(signal.measured[kept]))
             first = "" if len(part) == len(record) else f"its first {len(part)} rows "
             how = f"{name}, {first}simulated"
             return Resimulated(record=record.name, signal=name, relative_error=error, how=how)

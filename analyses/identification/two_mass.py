@@ -48,7 +48,8 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
     drifts (an angle under a mean speed) loses the straight line of its mean rate first. The noise of a line
     is what the spectrum of the whole record holds beside it, where a periodic signal has nothing. (The
     scatter between periods would be too large: what a motion that is not periodic leaves at the ends of one
-    period comes back at the start of the next with the opposite sign, and goes out of the mean.)
+    period comes back at the start of the next with the opposite sign, and goes out of the mean.) A speed that
+    still settles is no noise: it is smooth there, and goes out of both.
     """
     samples = round(period_s / record.period_s)
     if samples < 8 or abs(samples * record.period_s - period_s) > 1e-3 * record.period_s:
@@ -60,16 +61,11 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
         raise InputError(told, where=record.name)
     start = len(record) - periods * samples
     spectra = np.array([_spectrum(record[name][start:], periods, samples) for name in names])
-    reach = min(periods - 1, BESIDE)
-    places = np.arange(0, spectra.shape[1] - reach, periods)
-    away = np.array([step for step in range(-reach, reach + 1) if step])
-    beside, means = spectra[:, np.abs(places[:, None] + away)], spectra[:, places]
-    noise = np.einsum("akr,bkr->kab", beside, beside.conj()) / len(away)
-    hertz, power = np.arange(len(places)) / period_s, np.abs(means[0]) ** 2
-    largest = float(np.max(power[1:], initial=0.0))
+    means, noise, freedom = _without_drift(spectra, periods, periods * samples)
+    hertz, power = np.arange(1, means.shape[1] + 1) / period_s, np.abs(means[0]) ** 2
+    largest = float(np.max(power, initial=0.0))
     floor = np.maximum(np.real(noise[:, 0, 0]), 1e-24 * largest)
-    chosen = (power > EXCITED * floor) & (power > 1e-6 * largest) & (hertz > 0.0)
-    chosen &= hertz <= TOP / record.period_s
+    chosen = (power > EXCITED * floor) & (power > 1e-6 * largest) & (hertz <= TOP / record.period_s)
     if np.count_nonzero(chosen) < MIN_PERIODS:
         raise InputError(f"{names[0]}: no lines of a period of {period_s:g} s are excited", where=record.name)
     return Lines(
@@ -78,8 +74,31 @@ def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Li
         noise=noise[chosen],
         names=names,
         periods=periods,
-        freedom=len(away),
+        freedom=freedom,
     )
+
+
+def _without_drift(spectra: Complexes, periods: int, samples: int) -> tuple[Complexes, Complexes, int]:
+    """Lines less what a drift leaves there, the covariance of their noise, and its degrees of freedom.
+
+    A parabola in time has the spectrum ``a/(1 - 1/z)^2``; that of a speed that settles differs from it by a
+    smooth factor, a straight line over the places beside a line (the local polynomial method: Pintelon and
+    Schoukens, System Identification, 2nd ed., section 7.3). What the fit of it leaves there is the noise.
+    """
+    reach = min(periods - 1, BESIDE)
+    places = np.arange(periods, spectra.shape[1] - reach, periods)
+    away = np.array([step for step in range(-reach, reach + 1) if step])
+    near = places[:, None] + away
+    falling = -np.expm1(-2j * np.pi * np.arange(spectra.shape[1]) / samples)
+    shape = (falling[places, None] / falling[near]) ** 2
+    drift = np.stack([shape, shape * away], axis=-1)
+    inverse, beside = np.linalg.pinv(drift), spectra[:, near]
+    found = np.einsum("krm,skm->skr", inverse, beside)
+    rest = beside - np.einsum("kmr,skr->skm", drift, found)
+    freedom = len(away) - 2
+    own = (1.0 + np.sum(np.abs(inverse[:, 0]) ** 2, axis=-1)) / freedom
+    noise = own[:, None, None] * np.einsum("akm,bkm->kab", rest, rest.conj())
+    return spectra[:, places] - found[:, :, 0], noise, freedom
 
 
 def _spectrum(values: Floats, periods: int, samples: int) -> Complexes:

@@ -33,7 +33,8 @@ class Asked:
         Path | None,
         Option(
             "Measured response of a loop, laid over the model: CSV or .mat with frequency, dB and "
-            "deg or real and imaginary part, perhaps coherence or deviation.",
+            "deg or real and imaginary part, perhaps coherence or deviation (rms of the complex error "
+            "over the size of the value).",
             "FILE",
         ),
     ] = None

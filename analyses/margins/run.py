@@ -15,7 +15,7 @@ from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.systems.measured_response import MeasuredResponse
 from actuator_lti.types import Floats
-from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures, other_loops
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
 from analyses.linear.responses import response_at
 from analyses.margins.asked import Asked
@@ -166,6 +166,7 @@ class Margins:
     around: Mapping[str, LoopFigures]
     operating_points: tuple[OperatingPointFigures, ...]
     measured: Measured | None = None  # a measured response over one of the loops
+    by_cogging: tuple[str, ...] = ()  # loops that are not stable by cogging alone
 
     @property
     def spread(self) -> Mapping[str, Mapping[str, Spread]]:
@@ -223,4 +224,15 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
         around=around,
         operating_points=tuple(operating_points(design, [], described=False, certify=False)),
         measured=measured,
+        by_cogging=_by_cogging(loops, figures),
     )
+
+
+def _by_cogging(loops: Loops, figures: Mapping[str, LoopFigures]) -> tuple[str, ...]:
+    """Unstable loops that are stable without cogging, which at angle 0 drives the rotor away."""
+    motor, lost = loops.design.motor, [name for name, one in figures.items() if one.sound is False]
+    if not lost or float(motor.over_angle.slope_at(0.0)) <= 0.0:
+        return ()
+    even = other_loops(loops, replace(loops.design, motor=replace(motor, cogging_Nm=0.0)))
+    without = all_loop_figures(even, step=False)
+    return tuple(name for name in lost if without[name].sound is True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, shown
 from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, Mismatch, join_records
 from analyses.records.inputs import InputUse, account
@@ -106,6 +106,8 @@ def import_campaign(
     InputError
         If no run at all can be used.
     """
+    if not isinstance(campaign, Campaign):
+        raise InputError(f"campaign = {shown(campaign)}: allowed: a Campaign, as load_campaign gives")
     runs, aside = [], []
     for k, entry in enumerate(campaign.runs, 1):
         try:

@@ -56,7 +56,7 @@ class StiffnessCurve:
 
 @dataclass(frozen=True)
 class LostMotion:
-    """How far the output stays apart after a moment to either side has gone, the motor held."""
+    """How far the output is apart under a small moment to either side, the motor held; at least the play."""
 
     play_rad: float  # the play of the coupling at the output
     # Read at +-3 % of the largest load moment (`actuator_lti.loops.stiffness.lost_motion_rad`)
@@ -181,44 +181,36 @@ def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
 
 
 def lost_motion_seen(design: Design) -> float:
-    """Lost motion in the simulator, the rotor held: 0, + peak, - peak, + peak, slowly.
+    """Lost motion in the simulator, the rotor held: a slow moment goes to +`LOST_MOTION_SHARE`, then to -.
 
-    The peak is the largest load moment, or thrice what the load's friction breaks away at.  Slow is
-    `PERIODS_WITHIN` oscillations of the load on the spring within the part that is read.  The load is damped
-    critically against the spring, which no rest shows, so that it lands behind the play without a bounce that
-    friction would keep; at each of the four readings the moment stays until it has gone through the play.
+    Slow is `PERIODS_WITHIN` oscillations of the load on the spring. The load is damped critically against the
+    spring, which no rest shows, in place of its own friction, so that it lands behind the play without a
+    bounce; at both readings the moment stays until it has gone through the play.
 
     Raises `InputError`: without a coupling, a position loop or a largest load moment.
     """
     coupling, rated = design.coupling, design.load.moment_max_Nm
     if coupling is None or design.controller.position is None or rated <= 0.0:
         raise InputError("stiffness: lost motion needs a coupling, a position loop and load.moment_max")
-    friction = design.load.friction or LoadFriction()
-    J, k, behind = design.load_side_inertia_kgm2, coupling.stiffness_Nm_rad, design.ratio_behind_coupling
-    damping = friction.viscous_Nms_rad + 2.0 * sqrt(k * J)
+    J, k, period = design.load_side_inertia_kgm2, coupling.stiffness_Nm_rad, design.controller.period_s
+    damping, m = 2.0 * sqrt(k * J), LOST_MOTION_SHARE * rated
     held = replace(
         design,
         motor=replace(design.motor, rotor_inertia_kgm2=HELD * design.motor.rotor_inertia_kgm2),
-        load=replace(design.load.bare(), friction=replace(friction, viscous_Nms_rad=damping)),
+        load=replace(design.load.bare(), friction=LoadFriction(viscous_Nms_rad=damping)),
     )
-    peak = max(rated, 3.0 * friction.dry_torque_Nm * friction.breakaway_ratio * behind)
-    share, period = LOST_MOTION_SHARE * rated / peak, design.controller.period_s
-    moved = LOST_MOTION_SHARE * rated / behind - friction.dry_torque_Nm  # what takes it through the play
     stay = TIME_CONSTANTS * (damping + coupling.damping_Nms_rad) / k
-    stay += 2.0 * coupling.play_rad * damping / moved if moved > 0.0 else 0.0
-    quarter = PERIODS_WITHIN * 2.0 * np.pi * sqrt(J / k) / share
-    quarter, stay = (min(each / period, _MOST_TICKS) for each in (quarter, stay))
-    moment = np.array([0.0, 1.0, share, share, -share, -share, -1.0, -share, -share, share, share])
-    way = np.abs(np.diff(moment))
-    ticks = np.where(way > 0.0, quarter * way, stay)
+    stay += 2.0 * coupling.play_rad * damping * design.ratio_behind_coupling / m
+    way = PERIODS_WITHIN * 2.0 * np.pi * sqrt(J / k)
+    ticks = np.minimum(np.array([way, stay, 2.0 * way, stay]) / period, _MOST_TICKS)
     grain = ceil(ticks.sum() / POINTS)  # ticks from one point of the loading to the next: corners are points
     ends = np.cumsum(np.maximum(np.ceil(ticks / grain), 2)).astype(int)
     points = np.arange(ends[-1] + 2)
-    loading = series(points * grain * period, peak * np.interp(points, np.append(0, ends), moment))
-    run = simulate(held, commands.hold(), points[-1] * grain * period, loading, record_every=grain)
-    twist = run.output_angle_rad - run.motor_angle_rad / design.total_ratio
-    down, up, far_down, far_up = twist[ends[[2, 9, 4, 7]]]
-    return float(0.5 * (down + up - far_down - far_up))
+    loading = m * np.interp(points, np.append(0, ends), [0.0, 1.0, 1.0, -1.0, -1.0])
+    load = series(points * grain * period, loading)
+    run = simulate(held, commands.hold(), points[-1] * grain * period, load, record_every=grain)
+    up, down = (run.output_angle_rad - run.motor_angle_rad / design.total_ratio)[ends[[1, 3]]]
+    return float(up - down)
 
 
 STATES: tuple[State, ...] = ("powered", "shorted", "open")

@@ -37,7 +37,6 @@ IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
 TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
 PARTS = ("scheduler", "worker", "nanny")
-_RETRIES = 20  # workers that may die over one part before the run gives up
 
 
 def is_open(address: str) -> bool:
@@ -58,6 +57,16 @@ def connected(address: str, tls: Path | None) -> Client:
 
     import distributed
 
+    class Client(distributed.Client):
+        """Closed at once where it cannot connect: collected while another starts, it would wait for ever."""
+
+        def start(self, **settings: Any) -> None:
+            try:
+                super().start(**settings)
+            except BaseException:
+                self.close()
+                raise
+
     security = None
     if tls is not None:
         files = {key: tls / name for key, name in TLS_FILES.items()}
@@ -67,7 +76,7 @@ def connected(address: str, tls: Path | None) -> Client:
         keys = {key: str(path) for key, path in files.items()}
         security = distributed.Security(require_encryption=True, **keys)
     try:
-        return distributed.Client(address, timeout=CONNECT_S, security=security)
+        return Client(address, timeout=CONNECT_S, security=security)
     except ssl.SSLError as error:
         said = f"--tls {tls}: {error.reason or error}: certificates that fit the scheduler"
         raise InputError(said) from error
@@ -137,13 +146,13 @@ def submit(
     here = prove(packages, work)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Sending large graph")  # a table of samples goes once
-        sent = client.submit(_the_same, work, pure=False, retries=_RETRIES)  # lost with a worker, made again
+        sent = client.submit(_the_same, work, pure=False)  # lost with a worker, made again
     width = max(2, sum(client.nthreads().values())) * IN_FLIGHT
     waiting = iter(todo)
     parts: dict[str, Any] = {}
 
     def start(part: Any) -> Any:
-        future = client.submit(_answered, sent, here, part, pure=False, retries=_RETRIES)
+        future = client.submit(_answered, sent, here, part, pure=False)
         parts[future.key] = part
         return future
 

@@ -130,20 +130,22 @@ class Study:
     variants: tuple[Variant, ...]
     validation: bool = False
     monte_carlo: MonteCarloPlan | None = None
+    nightly: Mapping[str, Any] = field(default_factory=dict)  # the table that the nightly reads
 
     @property
     def all(self) -> tuple[Variant, ...]:
         return (self.base, *self.variants)
 
 
-def is_study(path: str | Path) -> bool:
-    """Whether a file is a study (a TOML file with a ``[study]`` table) and not a design."""
-    file = Path(path)
+def study_or_design(path: str | Path, *, keep_going: bool = False) -> Study | Design:
+    """A study of a TOML file with a ``[study]`` table, as `load_study`; else the design that is named."""
     try:
-        there = file.is_file()
+        there = Path(path).is_file()
     except OSError:  # a name that is too long, say: whoever reads it as a design tells
-        return False
-    return there and "study" in read_toml(file, "study file")
+        there = False
+    if there and "study" in parse_toml(text := read_text(path, "study file"), shown_path(path)):
+        return _study_of_text(text, path, keep_going=keep_going)
+    return load_design(path)
 
 
 def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
@@ -152,7 +154,11 @@ def load_study(path: str | Path, *, keep_going: bool = False) -> Study:
     With ``keep_going`` a variant that its design's checks refuse is kept, with its error; without, and for
     all else, an `InputError` says file, key, value and what is allowed.
     """
-    text, where = read_text(path, "study file"), shown_path(path)
+    return _study_of_text(read_text(path, "study file"), path, keep_going=keep_going)
+
+
+def _study_of_text(text: str, path: str | Path, *, keep_going: bool) -> Study:
+    where = shown_path(path)
     tree = parse_toml(text, where)
     root = Table(tree, "", where)
     root.only(("study", "variant", "sweep", "grid", "requirement", "monte_carlo", "nightly"))
@@ -220,7 +226,8 @@ def _study(root: Table, asked: _Asked, folder: Path, *, keep_going: bool) -> Stu
     name = _name(root.table("study"), base.name if head.name is None else head.name)
     plan = _plan(root.table("monte_carlo")) if "monte_carlo" in root else None
     about = (name, head.title, head.description, where)
-    return Study(*about, first, tuple(variants), head.validation, plan)
+    nightly = root.table("nightly").data
+    return Study(*about, first, tuple(variants), head.validation, plan, nightly)
 
 
 def _name(table: Table, name: str) -> str:

@@ -51,11 +51,12 @@ def compared(
 
 def study_with(path: str, variants: dict[str, Tree]) -> Study:
     """A study file, or a study of a design; with more variants, by name."""
-    from actuator_lti.design import load_design, with_overrides
+    from actuator_lti.design import with_overrides
     from analyses.slugs import slug
-    from analyses.studies.study import Variant, is_study, load_study, study_of
+    from analyses.studies.study import Study, Variant, study_of, study_or_design
 
-    plan = load_study(path) if is_study(path) else study_of(load_design(path))
+    found = study_or_design(path)
+    plan = found if isinstance(found, Study) else study_of(found)
     base = plan.base.design
     assert base is not None
     extra = [Variant(words, slug(words), with_overrides(base, own), own) for words, own in variants.items()]

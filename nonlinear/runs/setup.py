@@ -159,10 +159,12 @@ def _put_signal(row: Floats, place: int, command: Command, tables: Tables) -> No
     write(command, row, place, offset, length)
 
 
-def check_command(given: object) -> None:
+def check_command(given: object, name: str = "command") -> None:
     """Refuse what is no command."""
     if not isinstance(given, Command):
-        raise InputError(f"{shown(given)}: allowed: a Command, from a function of nonlinear.commands")
+        raise InputError(
+            f"{name} = {shown(given)}: allowed: a Command, from a function of nonlinear.commands"
+        )
 
 
 def check_frequency(design: Design, command: Command) -> None:
@@ -203,7 +205,7 @@ def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
 
 def put_supply(row: Floats, design: Design, supply: Command, scales: bool, tables: Tables) -> None:
     """Write a bus voltage over time; see `nonlinear.simulate`."""
-    check_command(supply)
+    check_command(supply, "supply")
     nominal = design.limits.voltage_V
     if scales and (design.controller.current is not None or not isfinite(nominal)):
         message = "supply_scales: needs a drive without a current loop, and a finite limits.voltage"

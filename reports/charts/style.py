@@ -126,7 +126,6 @@ def kept_rows(series: Sequence[np.ndarray], buckets: int = 300) -> np.ndarray:
 
     Examples
     --------
-    >>> import numpy as np
     >>> y = np.zeros(1000)
     >>> y[503] = 1.0
     >>> bool(503 in kept_rows([y], 10))

@@ -15,6 +15,7 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, is_number, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
+from reports.cli.errors import leave_with
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DesignArgument,
@@ -26,6 +27,8 @@ from reports.cli.options import (
     read_changes,
     read_quantity,
 )
+from reports.cli.output import print_json, print_line, print_note, print_warning
+from reports.cli.progress import progress
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -125,9 +128,6 @@ def answer(
     from reports import document as doc
     from reports.amperes import in_amperes
     from reports.as_json import as_json as plain_data
-    from reports.cli.errors import leave_with
-    from reports.cli.output import print_json, print_line, print_note, print_warning
-    from reports.cli.progress import progress
     from reports.study_pages import notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
@@ -172,7 +172,6 @@ def answer(
 
 
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
-    from reports.cli.progress import progress
     from reports.html import write_report
     from reports.study_pages import study_document
 

@@ -10,6 +10,7 @@ import typer
 
 from actuator_lti.errors import InputError
 from reports.analyses import ANALYSES, COMMANDS_IN, DESIGNS, EXPORTS, LINEAR, NONLINEAR, RECORDS, STUDIES
+from reports.cli import time_limit
 from reports.cli.analysis import command as declared
 
 _WHOLE_BITS = 63
@@ -69,8 +70,6 @@ def about(
     ] = None,
 ) -> None:
     """Linear loop analysis of electromechanical actuators, checked by an exact nonlinear simulator."""
-    from reports.cli import time_limit
-
     time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from reports.cli.options import DEFAULT_DESIGN, DesignArgument, JsonOption, SetOption, load_drive, write_new
+from reports.cli.output import print_json, print_line, print_note
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import ControllerObject
@@ -16,7 +18,6 @@ app = typer.Typer(
     help="Settings in the motion controller's own objects: export and import.", no_args_is_help=True
 )
 
-SettingsArgument = Annotated[Path, typer.Argument(metavar="SETTINGS", help="Settings file of a controller.")]
 TargetOption = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")]
 PerOption = Annotated[
@@ -24,16 +25,6 @@ PerOption = Annotated[
     typer.Option(
         "--velocity-gain-per", metavar="UNIT", help="Unit of 0x2344.01: rad/s (factor 1) or rpm (9.549)."
     ),
-]
-BaseOption = Annotated[
-    str, typer.Option("--onto", metavar="DESIGN", help="Design that the settings are put into.")
-]
-IntoOption = Annotated[
-    Path | None,
-    typer.Option("--into", metavar="XDC", help="Device configuration whose other contents are kept."),
-]
-CompleteOption = Annotated[
-    bool, typer.Option("--complete", help="Also objects that the imported settings did not have.")
 ]
 
 
@@ -43,8 +34,13 @@ def export(
     changes: SetOption = None,
     out: TargetOption = None,
     per: PerOption = None,
-    complete: CompleteOption = False,
-    into: IntoOption = None,
+    complete: Annotated[
+        bool, typer.Option("--complete", help="Also objects that the imported settings did not have.")
+    ] = False,
+    into: Annotated[
+        Path | None,
+        typer.Option("--into", metavar="XDC", help="Device configuration whose other contents are kept."),
+    ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -52,11 +48,8 @@ def export(
 
     Try: actuator-lti objects export ilr33-amber --velocity-gain-per rad/s --out settings.toml
     """
-    from dataclasses import replace
-
     from actuator_lti.design.objects import calibration, export_objects
     from actuator_lti.design.settings_file import settings_xml, write_settings_toml
-    from reports.cli.output import print_json, print_line, print_note
 
     drive = load_drive(design, changes)
     if per is not None:
@@ -84,8 +77,10 @@ def export(
 
 @app.command("import")
 def import_settings(
-    settings: SettingsArgument,
-    base: BaseOption = DEFAULT_DESIGN,
+    settings: Annotated[Path, typer.Argument(metavar="SETTINGS", help="Settings file of a controller.")],
+    base: Annotated[
+        str, typer.Option("--onto", metavar="DESIGN", help="Design that the settings are put into.")
+    ] = DEFAULT_DESIGN,
     out: TargetOption = None,
     per: PerOption = None,
     force: ForceOption = False,
@@ -103,7 +98,6 @@ def import_settings(
     from actuator_lti.design.objects import calibration, import_objects
     from actuator_lti.design.settings_file import read_settings
     from actuator_lti.files.reading import shown_path
-    from reports.cli.output import print_json, print_line, print_note
 
     factor = None if per is None else calibration(per)
     drive = load_design(base)

@@ -78,7 +78,10 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     if kind in ("output", "load"):
         unit, allowed = _AT_OUTPUT[kind, drive.axis]
     else:
-        unit = _command_unit(drive) if kind == "command" else unit
+        if kind == "command":
+            from nonlinear.runs.trajectory import COMMAND_UNITS
+
+            unit, _ = COMMAND_UNITS[drive.axis, drive.controller.outermost]
         allowed = f'"5 {unit}", or 5 in {unit}' if unit else 'a number such as 0.5 or "50 %"'
     with suppress(ValueError):
         bare = None if kind == "output" else float(words)
@@ -89,12 +92,6 @@ def read_quantity(option: str, words: str | None, kind: Kind, drive: Design, uni
     except InputError as error:
         reason = error.message.partition("; allowed")[0]
         raise InputError(f"{option} {words!r}: {reason}; allowed: {allowed}") from None
-
-
-def _command_unit(drive: Design) -> str:
-    from nonlinear.runs.trajectory import COMMAND_UNITS
-
-    return COMMAND_UNITS[drive.axis, drive.controller.outermost][0]
 
 
 def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Design:

@@ -7,11 +7,8 @@ import typer
 
 from actuator_lti.errors import InputError
 from reports.cli.options import JsonOption
+from reports.cli.output import print_json, print_line
 
-ReportArgument = Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")]
-FileOption = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
-]
 SummaryOption = Annotated[
     bool,
     typer.Option("--summary", help="In the PDF the first screen and one line a section: about four pages."),
@@ -19,8 +16,10 @@ SummaryOption = Annotated[
 
 
 def pdf(
-    report: ReportArgument,
-    out: FileOption = None,
+    report: Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")],
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
+    ] = None,
     summary: SummaryOption = False,
     as_json: JsonOption = False,
 ) -> None:
@@ -29,7 +28,6 @@ def pdf(
     Try: actuator-lti pdf out/report.json --summary --out joint.pdf
     """
     from analyses.isolation import drain
-    from reports.cli.output import print_json, print_line
     from reports.document import load
     from reports.pdf import write_pdf
 

@@ -9,6 +9,7 @@ import typer
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
+from reports.cli.errors import leave_with
 from reports.cli.options import (
     DEFAULT_DESIGN,
     DEFAULT_OUT,
@@ -19,7 +20,9 @@ from reports.cli.options import (
     SetOption,
     load_drive,
 )
+from reports.cli.output import print_line
 from reports.cli.pdf import SummaryOption
+from reports.cli.progress import progress
 
 IncludeOption = Annotated[
     list[Path] | None,
@@ -80,9 +83,6 @@ def report(
     """
     from actuator_lti.design.loader import design_text
     from reports import build
-    from reports.cli.errors import leave_with
-    from reports.cli.output import print_line
-    from reports.cli.progress import progress
     from reports.document import dumps
     from reports.terminal import print_verdict
     from reports.verdict_summary import open_items, verdict_words

@@ -1,7 +1,5 @@
 """The empty figures of the live page: axes and curves that the page's script fills."""
 
-from typing import Any
-
 from actuator_lti.design.model import Axis
 from actuator_lti.drive.signals import LIMITERS, SIGNALS
 from nonlinear.export.page import line_of
@@ -10,8 +8,9 @@ from reports.charts.style import Chart, Panel
 from reports.charts.svg import page_svg
 from reports.sections.limits import COLOURS
 
-NOW = {"colour": style.BLUE, "width": 2.0}
-BEFORE = {"colour": style.MUTED, "width": 1.6, "dash": 1}
+EMPTY = (), ()  # what the script fills
+NOW: style.Style = {"colour": style.BLUE, "width": 2.0}
+BEFORE: style.Style = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
 HERTZ = (1.0, 1000.0)
 FOLLOWED = "live"  # the loop whose figures share a cursor
@@ -33,19 +32,14 @@ def live_charts(unit: str, axis: Axis = "rotary", *, electrical: bool = True) ->
     return {name: page_svg(made, f"live-{name}", words) for name, (made, words) in drawn.items()}
 
 
-def _empty(panel: Panel, label: str, **look: Any) -> None:
-    """Put in a curve that the script fills."""
-    panel.curve((), (), label, **look)
-
-
 def _both(panel: Panel, *, pinned: bool = True, measured: bool = False) -> None:
     """Put in a curve as designed and one as changed, with pinned variants and a measured response."""
     if measured:
-        _empty(panel, "measured", colour=style.ORANGE, width=2.6, opacity=0.6)
+        panel.curve(*EMPTY, "measured", colour=style.ORANGE, width=2.6, opacity=0.6)
     for letter, colour in PINNED if pinned else ():
-        _empty(panel, letter, colour=colour, width=1.5)
-    _empty(panel, "as designed", **BEFORE)
-    _empty(panel, "as changed", **NOW)
+        panel.curve(*EMPTY, letter, colour=colour, width=1.5)
+    panel.curve(*EMPTY, "as designed", **BEFORE)
+    panel.curve(*EMPTY, "as changed", **NOW)
 
 
 def _bode() -> Chart:
@@ -76,9 +70,9 @@ def _sensitivity() -> Chart:
     panel = chart.panel(y="magnitude, dB")
     for name, colour, dash in (("S", style.ORANGE, 0), ("T", style.GREEN, 4)):
         for letter, pinned in PINNED:
-            _empty(panel, f"{name} {letter}", colour=pinned, width=1.5, dash=dash)
-        _empty(panel, f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
-        _empty(panel, f"{name} as changed", colour=colour, width=2.0)
+            panel.curve(*EMPTY, f"{name} {letter}", colour=pinned, width=1.5, dash=dash)
+        panel.curve(*EMPTY, f"{name} as designed", **{**BEFORE, "colour": colour, "opacity": 0.6})
+        panel.curve(*EMPTY, f"{name} as changed", colour=colour, width=2.0)
     style.frequency(panel, HERTZ)
     panel.y.limits(-40.0, 15.0)
     return chart
@@ -88,7 +82,7 @@ def _difference() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     top, bottom = chart.column(1.0, 1.0)
     for panel, label in ((top, "magnitude, dB"), (bottom, "phase, deg")):
-        _empty(panel, "measured over model", colour=style.ORANGE, width=1.6)
+        panel.curve(*EMPTY, "measured over model", colour=style.ORANGE, width=1.6)
         panel.rule_y(0.0, colour=style.INK)
         panel.y.label = label
         panel.y.limits(-10.0, 10.0)
@@ -99,7 +93,7 @@ def _difference() -> Chart:
 def _step() -> Chart:
     chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
     panel = chart.panel("time, ms", "linear response to a unit step")
-    _empty(panel, "command", colour=style.INK, width=1.0)
+    panel.curve(*EMPTY, "command", colour=style.INK, width=1.0)
     _both(panel)
     panel.x.limits(0.0, 1.0)
     panel.y.limits(-0.1, 1.5)
@@ -112,9 +106,9 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
     labels += [f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()]
     chart = Chart(width=style.HALF, height=170.0 + 105.0 * len(traces))
     panels = chart.column(*([1.5] + [1.0] * len(traces)))
-    _empty(panels[0], "command", colour=style.INK, width=1.0)
-    _empty(panels[0], "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
-    _empty(panels[0], "residual", colour=style.RED, width=1.2)
+    panels[0].curve(*EMPTY, "command", colour=style.INK, width=1.0)
+    panels[0].curve(*EMPTY, "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
+    panels[0].curve(*EMPTY, "residual", colour=style.RED, width=1.2)
     for panel, label in zip(panels, labels, strict=True):
         _both(panel, pinned=False)
         panel.y.label = label
@@ -127,10 +121,10 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
 def _border(unit: str) -> Chart:
     chart = Chart(width=style.HALF, height=265.0)
     panel = chart.panel(y=f"command amplitude, {unit}", log="y")
-    _empty(panel, "lowest, as designed", **BEFORE)
-    _empty(panel, "lowest, as changed", **{**NOW, "width": 2.6})
+    panel.curve(*EMPTY, "lowest, as designed", **BEFORE)
+    panel.curve(*EMPTY, "lowest, as changed", **{**NOW, "width": 2.6})
     for name, colour in BORDERS.items():
-        _empty(panel, name, colour=colour, width=1.1)
+        panel.curve(*EMPTY, name, colour=colour, width=1.1)
     style.frequency(panel, HERTZ)
     panel.y.limits(1e-3, 1e3)
     return chart

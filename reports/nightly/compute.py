@@ -9,9 +9,21 @@ from actuator_lti.design.loader import read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
+from analyses.comparison.variants import compare
+from analyses.isolation import drain
+from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
+from analyses.slugs import slug
+from analyses.studies.engine import Engine
+from analyses.studies.study import Study, Variant
 from reports import document as doc
+from reports.build import design_report, validation_sections
 from reports.document_schema import Document
+from reports.html import page
 from reports.nightly.figures import digest
+from reports.pdf import pdf_bytes
+from reports.sections import compare as compare_section
+from reports.sections import monte_carlo as monte_carlo_section
+from reports.study_pages import study_document
 
 
 def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
@@ -21,9 +33,6 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     design file's text, or ``study``, all designs of a study, for their comparison (figures are kept of the
     designs alone), or ``refused``, why there is none.
     """
-    from analyses.isolation import drain
-    from reports.html import page
-
     drain()
     if "refused" in payload:
         raise InputError(str(payload["refused"]))
@@ -32,8 +41,6 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     plain = doc.loads(doc.dumps(made))
     files = {"report.html": page(plain).encode(), "report.json": doc.dumps(plain).encode()}
     if settings.get("pdf"):
-        from reports.pdf import pdf_bytes
-
         files["report.pdf"] = pdf_bytes(plain)
     meta = digest({**plain, "sections": []} if comparison else plain)
     lacking = [one.part for one in drain() if one.part.startswith("figure ")]  # sections say so themselves
@@ -46,29 +53,17 @@ def _design(payload: Mapping[str, Any]) -> Design:
 
 
 def _report(design: Design, settings: Mapping[str, Any]) -> Document:
-    from reports.build import design_report, validation_sections
-
     sections = validation_sections(design) if settings.get("validation") else []
     plan = settings.get("monte_carlo")
     if plan and any(one.tolerance is not None for one in design.parameters.values()):
-        from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo
-        from analyses.studies.engine import Engine
-        from reports.sections.monte_carlo import section
-
         sampled = MonteCarloSettings(samples=plan["samples"], seed=plan["seed"])
         with TemporaryDirectory(prefix="nightly-") as folder:
             found = monte_carlo(design, Path(folder), sampled, engine=Engine(threads=1))
-            sections = [*sections, section(found)]
+            sections = [*sections, monte_carlo_section.section(found)]
     return design_report(design, validation=sections)
 
 
 def _comparison(payload: Mapping[str, Any]) -> Document:
-    from analyses.comparison.variants import compare
-    from analyses.slugs import slug
-    from analyses.studies.study import Study, Variant
-    from reports.sections.compare import section
-    from reports.study_pages import study_document
-
     def variant(one: Mapping[str, Any]) -> Variant:
         design = _design(one) if "design" in one else None
         return Variant(one["name"], slug(one["name"]), design, one["overrides"], one.get("refused", ""))
@@ -76,6 +71,7 @@ def _comparison(payload: Mapping[str, Any]) -> Document:
     base, *others = map(variant, payload["study"]["designs"])
     assert base.design is not None
     title = payload["study"]["title"]
-    parts = section(compare(Study(payload["name"], title, "", title, base, tuple(others))))
+    study = Study(payload["name"], title, "", title, base, tuple(others))
+    parts = compare_section.section(compare(study))
     subtitle = f"{base.name} and {len(others)} variants"
     return study_document(base.design, parts, title=title, subtitle=subtitle, kind="compare")

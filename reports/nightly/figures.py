@@ -17,7 +17,6 @@ from reports.verdict_summary import role, verdict_words, walk, why
 MAX_FIGURES = 5_000
 MAX_TABLE_ROWS = 200
 REQUIREMENTS = "requirements"  # verdicts on the design's own requirements; others are checks and odds
-_NO_RESULTS = ("Where the time went",)  # tables that differ from run to run
 _INPUT_SECTIONS = ("parameters", "provenance")
 _AS_THEY_ARE = ("value", "unit", "distance", "verdict", "waiver", "source", "reason")
 
@@ -124,8 +123,6 @@ def _of_block(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
 
 def _of_table(section: str, block: Mapping[str, Any]) -> Iterator[Figure]:
     """Name each number by caption, row and column; a row by its texts in front of the first number."""
-    if block["caption"] in _NO_RESULTS:
-        return
     columns, rows = block["columns"], block["rows"]
     numeric = [c for c in columns if any(_is_number(r.get(c["key"])) for r in rows)]
     first = columns.index(numeric[0]) if numeric else 0

@@ -111,7 +111,6 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
 
     Examples
     --------
-    >>> import numpy as np
     >>> [p.index for p in change_points(np.array([1.0, 1.0, np.nan, 1.0, 2.0, 2.0]), 0.1)]
     [4]
     """
@@ -140,7 +139,6 @@ def flaps(values: np.ndarray, tolerance: float) -> bool:
 
     Examples
     --------
-    >>> import numpy as np
     >>> flaps(np.array([1.0, 2.0, 1.0, 2.0]), 0.1), flaps(np.array([1.0, 1.0, 2.0, 2.0]), 0.1)
     (True, False)
     """

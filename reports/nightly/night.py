@@ -8,8 +8,12 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
+import typer
+
 from actuator_lti.errors import InputError
 from actuator_lti.start.extras import need
+from reports.cli.errors import VERDICT_FAILED
+from reports.cli.output import print_note
 from reports.nightly import site as site_files
 from reports.nightly.asked import Asked, Settings
 from reports.nightly.cache import Cache, CorruptEntry
@@ -33,10 +37,6 @@ def _nobody(*_said: object) -> None:
 
 def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     """Build a night, or approve the last one, and publish the site."""
-    import typer
-
-    from reports.cli.errors import VERDICT_FAILED
-    from reports.cli.output import print_note
 
     def say(line: str) -> None:
         print_note(f"actuator-lti: {line}")

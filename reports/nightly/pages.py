@@ -111,9 +111,8 @@ def _nights(
         folder = report_folder(result) if result is not None and result.key else ""
         row: Tree = {"gap": 0, "run": run, "result": result, "status": states.get(run.id, "absent")}
         row |= {"moved": course.moved.get(run.id, 0), "marks": course.marks.get(run.id, [])}
-        row["report"] = folder if folder in available else ""
-        row["approved"] = design.approval is not None and design.approval.run == run.id
-        rows.append(row)
+        approved = design.approval is not None and design.approval.run == run.id
+        rows.append({**row, "report": folder if folder in available else "", "approved": approved})
     return rows
 
 

@@ -29,8 +29,6 @@ from reports.nightly.text import one_line
 
 START_LIMIT_S = 180.0
 END_S = 10.0
-# A process that hangs in compiled code without its parent is ended by the system this long after its limit.
-GRACE_S = 15
 READY = b"ready"
 _CHILD = "import sys; from reports.nightly.processes import main; main(sys.argv[1], int(sys.argv[2]))"
 
@@ -147,7 +145,7 @@ class _Child:
                     return Answer("crash", why, self._last_words(0))
             said, start = os.fstat(self._said.fileno()).st_size, time.monotonic()
             limit_s = self._limits.time_limit_s * task.limits
-            answer = self._answer(limit_s, (task.key, dict(task.payload), limit_s))
+            answer = self._answer(limit_s, (task.key, dict(task.payload)))
             if answer is None:
                 last = "" if self._late else self._last_words(said)
                 answer = Answer("timeout" if self._late else "crash", self._end(limit_s), last)
@@ -202,7 +200,7 @@ class _Child:
 
 
 def main(build: str, memory_bytes: int) -> None:
-    """Read ``(key, payload, limit)`` from standard input, build, answer on standard output; never returns."""
+    """Read ``(key, payload)`` from standard input, build, answer on standard output; never returns."""
     if sys.platform == "linux":  # the system ends this process with its parent, in whatever build it is
         import ctypes
 
@@ -211,7 +209,7 @@ def main(build: str, memory_bytes: int) -> None:
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a build prints is no answer
     _limit_memory(memory_bytes)
-    questions: SimpleQueue[tuple[str, Mapping[str, Any], float]] = SimpleQueue()
+    questions: SimpleQueue[tuple[str, Mapping[str, Any]]] = SimpleQueue()
     source = os.fdopen(os.dup(0), "rb")
 
     def listen() -> None:
@@ -226,10 +224,7 @@ def main(build: str, memory_bytes: int) -> None:
     function = resolve_name(build)
     _say(answers, READY)
     while True:
-        key, payload, time_limit_s = questions.get()
-        _alarm(time_limit_s + GRACE_S)
-        _say(answers, execute(function, key, payload))
-        _alarm(0)
+        _say(answers, execute(function, *questions.get()))
 
 
 def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) -> Answer:
@@ -255,12 +250,6 @@ def execute(function: Callable[..., Any], key: str, payload: Mapping[str, Any]) 
 def _say(pipe: Any, what: Any) -> None:
     pickle.dump(what, pipe)
     pipe.flush()
-
-
-def _alarm(seconds: float) -> None:
-    if hasattr(signal, "setitimer"):
-        signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, seconds)
 
 
 def _limit_memory(limit_bytes: int) -> None:

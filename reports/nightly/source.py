@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import Any
 
 from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
-from actuator_lti.design import design_hash, load_design, write_design
+from actuator_lti.design import design_hash, write_design
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_toml, shown_path
+from actuator_lti.files.reading import shown_path
 from actuator_lti.files.tree import Tree
 from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
-from analyses.studies.study import Variant, is_study, load_study, study_of
+from analyses.studies.study import Variant, study_of, study_or_design
 from analyses.toml_tables import Table
 from reports.nightly.moves import Tolerances, read_tolerances
 from reports.nightly.text import one_line, sha256
@@ -141,12 +141,9 @@ def read_study(path: str, *, pdf: bool = False, validation: bool | None = None) 
     ``pdf`` and ``validation`` are as the study says where left out. The comparison of several comes first, as
     it takes longest.
     """
-    table = Table({}, "nightly", shown_path(path))
-    if is_study(path):
-        table = replace(table, data=read_toml(path, "study file").get("nightly", {}))
-        file = load_study(path, keep_going=True)
-    else:
-        file = replace(study_of(load_design(path)), validation=True)
+    found = study_or_design(path, keep_going=True)
+    file = found if isinstance(found, StudyFile) else replace(study_of(found), validation=True)
+    table = Table(file.nightly, "nightly", shown_path(path))
     plan = table.read(_Nightly, beside=("tolerance",))
     check = file.validation if validation is None else validation
     settings: Tree = {"pdf": pdf or plan.pdf, "validation": check}

@@ -63,9 +63,7 @@ def residual_figure(fit: SurfaceFit) -> doc.Block:
 
 def region_figure(fit: SurfaceFit) -> doc.Block:
     """Joint 95 % regions of pairs of coefficients, in percent of their values."""
-    from scipy.stats import chi2
-
-    radius = float(np.sqrt(chi2.ppf(0.95, 2)))
+    radius = float(np.sqrt(-2.0 * np.log(0.05)))  # chi-squared of two degrees of freedom
     chart = style.Chart(width=style.WIDE, height=300.0)
     for i, j in combinations(fit.told, 2):
         scale = 100.0 / fit.values[[i, j]]

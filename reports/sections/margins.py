@@ -110,7 +110,7 @@ def section(result: Margins) -> list[doc.Section]:
 
 def brief(result: Margins) -> Brief:
     (first, judged), known = section(result), _named(result)
-    every, own = with_held(known), with_own_margins(with_held(known))
+    every, own = with_held(known), with_held(known, of_margins=True)
     head = f"{result.design.name}: {result.asked.form}, {_where(result)}"
     tables = [margin_table(own), spread_table(result.operating_points, known), response_table(every)]
     counts = [len(one.margins.gain_margins) + len(one.margins.phase_margins) for one in known.values()]
@@ -187,10 +187,10 @@ def place_words(place: str) -> str:
 
 
 def _cogging(result: Margins) -> str:
-    """What a data sheet leaves open, where a loop is not stable: where in its cogging the rotor stands."""
-    away = float(result.design.motor.over_angle.slope_at(0.0, moving=False)) > 0.0
-    words = " (at angle 0 cogging drives the rotor away: motor.cogging_phase says where it stands)"
-    return words * (away and any(one.sound is False for one in result.loops.values()))
+    """What a data sheet leaves open, where a loop is unstable by it: where in its cogging the rotor is."""
+    names = ", ".join(LOOPS[name].lower() for name in result.by_cogging)
+    away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
+    return f" ({names}: by cogging alone, {away})" if names else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
@@ -201,8 +201,7 @@ def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPoint
 def _loops(
     loops: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures], how: str
 ) -> doc.Section:
-    named = with_held(loops)
-    own = with_own_margins(named)
+    named, own = with_held(loops), with_held(loops, of_margins=True)
     blocks = [
         *(doc.text(note) for note in by_itself_notes(loops)),
         margin_table(own),
@@ -361,11 +360,12 @@ def margin_row(figures: LoopFigures) -> Tree:
     return {key: row[key] if key in ("stable", "evidence") else None for key in row}
 
 
-def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
+def with_held(named: Mapping[str, LoopFigures], *, of_margins: bool = False) -> dict[str, LoopFigures]:
     """Put the other row of a loop behind it, under names that say which is which.
 
     Of a current loop that with the rotor locked; of an inner loop that is unstable only by itself, the held
-    one; of a position loop behind a mean or filter of the command, its response to the reference.
+    one; of a position loop behind a mean or filter of the command, its response to the reference, which has
+    no margins of its own (``of_margins``: without it).
     """
     every: dict[str, LoopFigures] = {}
     for label, figures in named.items():
@@ -373,15 +373,9 @@ def with_held(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
         every[f"{label}, rotor free" if free else label] = figures
         if other := free or figures.held:
             every[f"{label}, {'rotor locked' if free else HELD[figures.loop.name]}"] = other
-        if figures.reference is not None:
+        if figures.reference is not None and not of_margins:
             every[f"{label}, to the reference"] = figures.reference
     return every
-
-
-def with_own_margins(named: Mapping[str, LoopFigures]) -> dict[str, LoopFigures]:
-    """Without the rows that are another response of the same loop."""
-    others = [id(figures.reference) for figures in named.values() if figures.reference is not None]
-    return {label: figures for label, figures in named.items() if id(figures) not in others}
 
 
 def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:

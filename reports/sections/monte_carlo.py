@@ -21,7 +21,7 @@ from reports.charts import style
 from reports.charts.axis import linear_ticks
 from reports.numbers import capital, or_none
 from reports.sections.margins import finite
-from reports.sections.names import in_shown, unit_words
+from reports.sections.names import in_shown
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
 from reports.verdict_summary import why
@@ -163,16 +163,19 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
 
 def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
     def quantile(percent: int, c: ColumnStatistics) -> float | None:
-        return dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100)
+        return in_shown(dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100), c.unit)
+
+    def value(name: str, c: ColumnStatistics) -> float | None:
+        return in_shown(getattr(c, name), c.unit)
 
     shown = [
         doc.of(lambda c: _words(c.name), "figure", "Figure"),
-        doc.of(lambda c: unit_words(c.unit), "unit", "Unit"),
-        doc.of("minimum", "minimum", "Min", format="sig:4"),
+        doc.of(lambda c: shown_unit(c.unit)[0], "unit", "Unit"),
+        doc.of(partial(value, "minimum"), "minimum", "Min", format="sig:4"),
         *(doc.of(partial(quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
-        doc.of("maximum", "maximum", "Max", format="sig:4"),
-        doc.of("mean", "mean", "Mean", format="sig:4"),
-        doc.of("std", "std", "Std", format="sig:3"),
+        doc.of(partial(value, "maximum"), "maximum", "Max", format="sig:4"),
+        doc.of(partial(value, "mean"), "mean", "Mean", format="sig:4"),
+        doc.of(partial(value, "std"), "std", "Std", format="sig:3"),
         doc.of("missing", "missing", "Missing", align="right"),
     ]
     note = (
@@ -246,15 +249,16 @@ def _driver_table(result: MonteCarloResult) -> doc.Block:
     def driver(place: int, item: tuple[str, list[Driver]]) -> str:
         if place >= len(item[1]):
             return ""
-        one = item[1][place]
-        told = ([or_none(value, digits) for value in (one.low, one.high)] for digits in range(3, 7))
+        one, unit = item[1][place], result.columns[item[0]].unit
+        ends = [in_shown(value, unit) for value in (one.low, one.high)]
+        told = ([or_none(value, digits) for value in ends] for digits in range(3, 7))
         return next((f"{one.path}: {low} to {high}" for low, high in told if low != high), "")
 
     places = enumerate((("first", "Driven most by"), ("second", "then by"), ("third", "then by")))
     columns = [
         doc.of(lambda item: _words(item[0]), "figure", "Figure"),
         *(doc.of(partial(driver, k), key, label) for k, (key, label) in places),
-        doc.of(lambda item: unit_words(result.columns[item[0]].unit), "unit", "Unit"),
+        doc.of(lambda item: shown_unit(result.columns[item[0]].unit)[0], "unit", "Unit"),
     ]
     note = "The figure with that parameter alone at the low and the high end of its tolerance."
     return doc.listing("Which tolerance drives which figure", strongest.items(), columns, note)

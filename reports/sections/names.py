@@ -74,8 +74,8 @@ def push_words(design: Design) -> str:
 
 
 def unit_words(unit: str) -> str:
-    """A unit as it is printed: of a ratio none."""
-    return "" if unit == "1" else unit
+    """A unit as it is printed: of a ratio none, and N m where a file has N*m."""
+    return "" if unit == "1" else unit.replace("*", " ")
 
 
 def in_shown(value: float | None, unit: str) -> float | None:

@@ -154,7 +154,6 @@ def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> lis
 
     Examples
     --------
-    >>> import numpy as np
     >>> spans(np.array([False, True, True, False]), np.arange(4.0))
     [[1.0, 3.0]]
     """

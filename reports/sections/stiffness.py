@@ -106,7 +106,7 @@ def _lost_motion(result: Stiffness) -> doc.Block:
     rows = [("play", lost.play_rad, None), ("lost motion", lost.foreseen_rad, lost.seen_rad)]
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
-        f"the largest load {push_words(result.design)}, which goes slowly to either side."
+        f"the largest load {push_words(result.design)}, without the load's friction."
     )
     return doc.listing("Lost motion at the output", rows, columns, note)
 

@@ -12,7 +12,9 @@ from actuator_lti.design import design_hash, parameter_value, read_design_text
 from analyses import (
     amplitude_map,
     compare,
+    correlate_record,
     evaluate_requirements,
+    import_campaign,
     large_signals,
     load_campaign,
     open_record,
@@ -109,6 +111,8 @@ BAD = {
     "a report's folder": lambda: report(DESIGN, out=3),
     "a record's path": lambda: open_record(3),
     "a campaign's path": lambda: load_campaign(3),
+    "a record": lambda: correlate_record(DESIGN, "record.csv"),
+    "a campaign": lambda: import_campaign("campaign.toml"),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
 }
 

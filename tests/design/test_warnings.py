@@ -24,6 +24,7 @@ LOW = {"friction.load_coefficient": 0.9 / 2376}
 PLAY = {"coupling": {"stiffness": "100 N*m/rad", "play": "2 mrad", "damping": "0.1 N*m*s/rad"}, **BACK, **LOW}
 RUBBING = PLAY | {"load.friction.dry_torque": "0.1 N*m"}
 CLAMPED = {"limits.speed": "100 rad/s", "limits.peak_current": "1 A"}
+COGGING = {"motor.cogging": "1 mN*m", "motor.cogging_periods": 12}
 FEELS, ASSUMED = 'load.path = "back-drivable"?', "load.path: self-locking is assumed"
 
 
@@ -39,6 +40,12 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("ilr33-amber", {"limits.peak_current": 300.0}, "\nlimits.peak_current", True),
     ("ilr33-amber", {"load.moment_max": 4.0}, "\nvalidation.loads", True),
     ("ilr33-amber", {"encoder.speed": "difference"}, "\nencoder.counts_per_rev", True),
+    # counts of a sheet are a fact; who sets them wants them to act
+    ("ilr33-amber", {"encoder.counts_per_rev": 4096}, "\nencoder.counts_per_rev: acts on nothing", True),
+    ("ilr33-amber", {"output_encoder.counts_per_rev": 4096}, "\noutput_encoder.counts_per_rev: acts", True),
+    ("joint", {"encoder.counts_per_rev": 4096, "output_encoder.counts_per_rev": 4096}, "acts on", False),
+    ("joint", COGGING, "\nmotor.cogging_phase: not given, 0 assumed", True),
+    ("joint", {**COGGING, "motor.cogging_phase": 0.0}, "\nmotor.cogging_phase", False),
     (
         "ilr33-amber",
         {"motor.resistance": {"value": "50 mohm", "grade": "Z"}},

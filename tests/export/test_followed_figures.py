@@ -1,7 +1,6 @@
 """Figures of the whole drive, followed from the keys into statements, against the same figures asked anew."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from executed import executed
 from actuator_lti import load_design
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.design.access import parameter_value, paths_of, stacked
-from actuator_lti.design.model import Design, FrictionPoint, Supply
+from actuator_lti.design.model import Design
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
 from tests.validation.rich_drives import rich_drive
 
@@ -18,17 +17,8 @@ NAMES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_
 
 
 def drives() -> list[Design]:
-    amber, Tc = load_design("ilr33-amber"), load_design("ilr33-amber").friction.dry_torque_Nm
-    curve = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 9e-3))
-    points = tuple(FrictionPoint(speed_rad_s=w, torque_Nm=T) for w, T in curve)
-    changed = (
-        {"friction": replace(amber.friction, points=points)},
-        {"friction": replace(amber.friction, dry_torque_reverse_Nm=2.0 * Tc)},
-        {"supply": Supply(resistance_ohm=0.02)},
-        {"load": replace(amber.load, path="self-locking")},
-    )
-    made = [*map(rich_drive, range(20)), *(replace(amber, **each) for each in changed)]
-    return made + [load_design(name) for name in ("fin", "emps", "joint")]
+    """Random ones, friction maps, uneven friction, supplies and stages that lock themselves among them."""
+    return [*map(rich_drive, range(24)), *map(load_design, ("ilr33-amber", "fin", "emps", "joint"))]
 
 
 def scattered(keys: dict[str, float], spread: float, rng: np.random.Generator) -> list[float]:

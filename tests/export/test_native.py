@@ -41,7 +41,8 @@ def same_as_written(work: Callable[[], Trajectory]) -> Trajectory:
 def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
     design = rich_drive(200 + seed)
     (size, load), period_s = sizes(design), design.controller.period_s
-    probe = Probe(point="u", injection=commands.sine(0.1 * design.limits.voltage_V, 0.1 / period_s))
+    point = "i_ref" if design.controller.current else "u"
+    probe = Probe(point=point, injection=commands.sine(0.01 * design.limits.voltage_V, 0.1 / period_s))
 
     def work() -> Trajectory:
         return simulate(

@@ -88,7 +88,7 @@ def test_local_clusters_open_no_door_and_do_not_ask_for_the_same_port() -> None:
         assert address.startswith("tls://")
         with pytest.raises((OSError, TimeoutError)):
             distributed.Client(address.replace("tls://", "tcp://"), timeout=2)
-        gc.collect()  # as in `fails`
+        gc.collect()  # its client is closed now, not while another one starts: that would wait for ever
         assert not answers(address)
 
 
@@ -197,7 +197,6 @@ def deadly(number: int) -> int:
 def test_a_part_that_kills_its_workers_is_one_line(monkeypatch) -> None:
     import dask
 
-    monkeypatch.setattr(clusters, "_RETRIES", 0)
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 0}),
         pytest.raises(NumericalError, match="workers keep dying over one part"),
@@ -285,7 +284,6 @@ def test_an_engine_that_cannot_be_is_refused(options, words) -> None:
 def fails(kind, words: str | None, **options: object) -> None:
     with pytest.raises(kind, match=words):
         Engine(**options).map(doubled, [1], lambda *_: None)
-    gc.collect()  # its client is closed now, and not while another one starts: that would wait for ever
 
 
 def test_a_scheduler_that_is_not_there_or_left_and_certificates_that_are_none(monkeypatch, tmp_path) -> None:
@@ -293,12 +291,17 @@ def test_a_scheduler_that_is_not_there_or_left_and_certificates_that_are_none(mo
     from distributed.client import ClosedClientError
 
     monkeypatch.setattr(clusters, "CONNECT_S", 0.5)
+    monkeypatch.setattr("distributed.Client.__del__", lambda client: states.append(client.status))
+    states = list[str]()
     here, tls = {"scheduler": "tcp://127.0.0.1:9"}, {"scheduler": "tls://127.0.0.1:9", "tls": tmp_path}
     fails(NumericalError, "127", **here)
+    fails(InputError, "tcp://host:8786", scheduler="nowhere")
     for name in clusters.TLS_FILES.values():
         fails(InputError, r"\.pem", **tls)
         (tmp_path / name).write_text("no certificate")
     fails((InputError, NumericalError), None, **tls)
+    gc.collect()
+    assert set(states) == {"closed", "newly-created"}  # none is left to wait where it is collected
 
     class Left:
         def __getattr__(self, name: str) -> object:

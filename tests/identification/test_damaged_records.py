@@ -214,6 +214,18 @@ def test_a_filtered_current_tells_no_inductance(columns: Columns) -> None:
     assert item.passed is None
 
 
+def test_clipped_rows_count_in_no_check(columns: Columns) -> None:
+    """Three rows in ten stand at the end of the sensor's range; so in a record that the fit does not see."""
+    level = np.quantile(np.abs(columns["current"]), 0.7)
+    cut = {**columns, "current": np.clip(columns["current"], -level, level)}
+    result = identify_bench(BASE, [_record(columns)], validation=[replace(_record(cut), name="cut")])
+    items = {item.id: item for item in result.items}
+    assert result.passed
+    assert items["written-cut"].value < 0.03
+    assert any("clipped" in one.text for one in result.findings["cut"])
+    assert next(one for one in identify_bench(BASE, [_record(cut)]).items if one.id == "written-r").passed
+
+
 def _stepped(stage: str, later: int = 0) -> tuple[Design, Columns]:
     """A command that steps at random ticks between the rows, logged some ticks later than it is written."""
     rng = np.random.default_rng(1)

@@ -79,7 +79,14 @@ def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: boo
 
 def _found(folder: Path, *measured: object, **options: object) -> ResponseResult:
     file = _measured(folder, *measured, stated=bool(options.pop("stated", True)))  # type: ignore[arg-type]
-    return identify_response(_design(OFF), file, of=measured[0], **options)  # type: ignore[arg-type]
+    off = options.pop("off", OFF)
+    return identify_response(_design(off), file, of=measured[0], **options)  # type: ignore[arg-type]
+
+
+def _far(seed: int) -> dict[str, float]:
+    """A start whose values are off by up to a factor 3 each; the delay stays within a tick."""
+    off = dict(zip(TRUTH, 3.0 ** np.random.default_rng(seed).uniform(-1.0, 1.0, len(TRUTH)), strict=True))
+    return {**off, "control.computing_delay": min(off["control.computing_delay"], 1.6)}
 
 
 @pytest.mark.parametrize("of", ["L", "T", "S"])
@@ -93,7 +100,7 @@ def test_a_response_without_noise_gives_the_truth(of: str, tmp_path) -> None:
 
 def test_intervals_hold_what_they_say(tmp_path) -> None:
     """Errors over their standard errors: mean square 1 within 3 sigma of chi-square, misfit as well."""
-    results = [_found(tmp_path, of, 0.01, seed) for seed, of in enumerate("LLLTTS")]
+    results = [_found(tmp_path, of, 0.01, seed, off=_far(seed)) for seed, of in enumerate("LLLTTS")]
     shares = [(one.fit[key] - TRUTH[key]) / one.fit.std(key) for one in results for key in one.fit.names]
     assert len(shares) == 6 * len(TRUTH)
     assert abs(np.mean(np.square(shares)) - 1.0) < 3.0 * np.sqrt(2.0 / len(shares))
@@ -131,6 +138,28 @@ def test_no_more_numbers_than_unknowns_are_refused(count: int, tmp_path) -> None
     hertz = HERTZ[10 : 10 + count]
     with pytest.raises(InputError, match="allowed: 4 frequencies or more"):
         identify_response(_design({}), _written(tmp_path, hertz, open_loop(hertz)))
+
+
+def test_a_delay_that_is_not_told_is_the_design_s_and_the_others_hang_on_it(tmp_path) -> None:
+    """Below the antiresonance a delay of 0.5 ms turns the phase by less than its noise of 5 %."""
+    hertz = HERTZ[HERTZ < 10.0]
+    rng = np.random.default_rng(1)
+    noise = 0.05 * np.exp(2j * np.pi * rng.uniform(size=len(hertz)))
+    held = {key: TRUTH[key] for key in ("coupling.stiffness", "coupling.damping", "load.inertia")}
+    file = _written(tmp_path, hertz, open_loop(hertz) * (1.0 + noise), 0.05)
+    fit = identify_response(_design({"control.computing_delay": 0.1}), file, fixed=held).fit
+    kept = fit.fixed["control.computing_delay"]
+    assert kept.value == pytest.approx(0.06e-3)
+    assert "its standard error is larger than the design's value: not determined" in kept.reason
+
+
+def test_a_value_that_would_be_negative_ends_at_zero_and_is_named(tmp_path) -> None:
+    """The truth leads by 0.1 ms where the model may only lag: 0 s exactly, and the check fails."""
+    seen = open_loop(HERTZ, {**TRUTH, "control.computing_delay": 0.0}) * np.exp(2e-4j * np.pi * HERTZ)
+    result = identify_response(_design(OFF), _written(tmp_path, HERTZ, seen, 0.01))
+    assert result.fit["control.computing_delay"] == 0.0
+    assert result.fit.at_bound == ("control.computing_delay",)
+    assert not result.passed
 
 
 def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> None:
@@ -181,8 +210,9 @@ def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
     ):
         assert reason in cli.refused(*words, *more)
     _written(tmp_path, HERTZ, 10.0 * open_loop(HERTZ))
-    said = cli.refused(*words, "--fix", "motor.rotor_inertia=2e-5")
-    assert "has it as a response of position, --of L; allowed: --loop position" in said
+    said = cli(*words, "--out", tmp_path / "o", "--fix", "motor.rotor_inertia=2e-5")
+    assert said.status == 1
+    assert "the written design does not drive as the record does" in said.out
 
 
 def test_coherence_weighs_with_its_averages_and_is_said_to_be_unread_without(tmp_path) -> None:

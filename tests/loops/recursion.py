@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import inf
 
 import numpy as np
-from scipy.linalg import expm
+from scipy.linalg import expm, matrix_balance
 
 from actuator_lti.design.model import Design, Limits
 from tests.nonlinear.controller_reference import Controller
@@ -74,7 +74,9 @@ def run(design, command, torque_Nm=0.0, moment_Nm=0.0, contact=1.0, initial=(0.0
     f = f if f > 1e-9 else 0.0  # the rule of `split_delay`: an unstable drive would show the difference
     pieces = []
     for h in (f * Ts, (1 - f) * Ts):
-        E = expm(np.block([[A * h, B * h], [np.zeros((3, 8))]]))
+        whole = np.block([[A * h, B * h], [np.zeros((3, 8))]])
+        whole, (size, _) = matrix_balance(whole, permute=False, separate=True)
+        E = size[:, None] * expm(whole) / size  # without the balance a stiff one loses seven digits
         pieces.append((E[:5, :5], E[:5, 5:]))
     plain = Unlimited(design, inject or {})
     plain.speed.angles = [initial[2]] * len(plain.speed.angles)

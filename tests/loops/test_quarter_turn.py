@@ -1,4 +1,7 @@
-"""A pendulum that stands out level has no slope: cos of a quarter turn is 0, whatever its rounding leaves."""
+"""A pendulum that stands out level has no slope: cos of a quarter turn is 0, whatever its rounding leaves.
+
+In the linear loops, and in the linear drive of the page.
+"""
 
 from dataclasses import replace
 from math import cos, pi, radians
@@ -8,11 +11,15 @@ import numpy as np
 import pytest
 from loop_designs import sprung
 
-from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins
+from actuator_lti import assemble_loops, closed_loop_bandwidth, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Gravity
 from actuator_lti.drive.operating import Operating, moment_slope
 from analyses.linear.loop_figures import all_loop_figures
+from nonlinear._kernels import layout
+from nonlinear.export.c_files import exported_row
+from nonlinear.export.linear_row import linear_row
+from tests.changed import changed
 
 QUARTERS = (radians(90), radians(270), radians(-90), -3 * pi / 2, 5 * pi / 2)
 SLOPES = (-1e-14, -1e-10, -1e-6, -1e-2, 1e-14, 1e-10, 1e-6)
@@ -83,3 +90,18 @@ def test_no_resonance_over_nothing(slope: float) -> None:
         assert any("at zero frequency" in note for note in figures["velocity"].notes)
     many = linear_figures(Population(design, {}, 1))
     assert not many.quantity("resonance_peak", "velocity")[0] > 20.0
+
+
+@pytest.mark.parametrize("degrees", [0.0, 90.0, 90.01, 180.0, 270.0, -90.0])
+@pytest.mark.parametrize("spring", [0.0, -1e-9, -2.0])
+def test_slope_of_the_linear_row(degrees: float, spring: float) -> None:
+    """k + m g l cos(angle), with cos of a quarter turn 0."""
+    load = {"gravity": level(radians(degrees)), "moment_slope_Nm_rad": spring}
+    row = exported_row(changed(load_design("joint"), load=load))
+    linear = np.zeros_like(row)
+    linear_row(row, linear)
+    flat = degrees % 180.0 == 90.0
+    expected = spring + (0.0 if flat else 3.5 * 9.80665 * 0.28 * cos(radians(degrees)))
+    assert linear[layout.LOAD_SLOPE] == pytest.approx(expected, rel=1e-5)
+    if flat and spring == 0.0:
+        assert linear[layout.LOAD_SLOPE] == 0.0

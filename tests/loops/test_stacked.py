@@ -8,10 +8,12 @@ import pytest
 from loop_designs import controlled, sprung
 from two_mass import drive_d, drive_e
 
-from actuator_lti import assemble_loops, stability_margins
-from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch._figures import DC_GAIN
-from actuator_lti.design import load_design, parameter_value, with_overrides
+from actuator_lti.design import load_design, parameter_value
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Command, Design, Encoder, Filter, PositionLoop
 from actuator_lti.drive.operating import Operating
@@ -20,6 +22,7 @@ from actuator_lti.loops.periodic import fundamental
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import TickProgram
 from tests.validation.random_drives import drives
+from tests.validation.rich_drives import rich_drive
 
 FILTERS = (
     Filter(kind="lowpass", frequency_rad_s=2000.0, order=2),
@@ -45,30 +48,8 @@ def everything() -> Design:
     return replace(filled, encoder=encoder, command=command, load=load)
 
 
-def bent() -> Design:
-    """A spring of three pieces, on whose second the load lies."""
-    base = drive_e()
-    k = base.coupling.stiffness_Nm_rad
-    bends = {"torque_1_Nm": 1.0, "stiffness_2_Nm_rad": 2 * k, "torque_2_Nm": 4.0, "stiffness_3_Nm_rad": 3 * k}
-    return replace(base, coupling=replace(base.coupling, **bends))
-
-
-def rich() -> Design:
-    """The joint, with everything that a joint may have besides."""
-    return with_overrides(load_design("joint"), {
-        "temperature.winding": "80 degC", "temperature.magnet": "60 degC", "supply.resistance": "0.05 ohm",
-        "load.moment_slope": "-20 N*m/rad", "load.friction.offset_torque": "0.1 N*m",
-        "coupling.play": "0.2 mrad", "load.moment_damping": "0.5 N*m*s/rad",
-        "load.gear_error": "0.3 N*m", "load.gear_error_periods": 3, "load.gear_error_phase": "40 deg",
-        "motor.cogging": "4 mN*m", "motor.cogging_periods": 12, "motor.cogging_phase": "70 deg",
-        "control.position.derivative_time": "2 ms", "control.position.derivative_filter": "1 ms",
-        "control.position.acceleration_feedforward": 0.5, "control.current.back_emf_feedforward": 0.5,
-        "control.current.resistance_feedforward": 0.3, "command.filter_time": "3 ms",
-        "friction.offset_torque": "1 mN*m",
-    })  # fmt: skip
-
-
-KINDS = (everything(), replace(bent(), name="bent"), rich(), *drives(90_310, 10))
+RICH = (7, 9, 13, 18, 20, 23, 29, 51, 54)  # each with at least five of what is rare
+KINDS = (everything(), *(rich_drive(seed, own_law=False) for seed in RICH), *drives(90_310, 10))
 DRIVES = {one.name: one for one in KINDS}
 
 
@@ -161,3 +142,29 @@ def test_behind_a_soft_spring_the_gain_at_zero_frequency_keeps_its_digits(slope:
     A, b, c = (np.asarray(part, dtype=float) for part in (response.A, response.B, response.C))
     closed = float((c @ np.linalg.solve(np.eye(len(A)) - A + b @ c, b))[0, 0])
     assert figures.raw[0, figures._index("velocity"), DC_GAIN] == pytest.approx(closed, rel=1e-12)
+
+
+@pytest.mark.parametrize("load_Nm", [0.0, 3.0, -20.0])
+def test_drive_figures(load_Nm: float) -> None:
+    """Speed, current, acceleration, torque margin, stiffness, lost motion."""
+    for design in drives(90_100, 12):
+        many = Population(design, {}, 2)
+        for name in DRIVE_QUANTITIES:
+            one = drive_figure(design, name, load_Nm)
+            truth = np.nan if one is None else float(one)
+            if name == "motor_current" and not design.motor.has_electrical_dynamics:
+                continue
+            found = drive_figures(many, name, load_Nm)
+            assert found == pytest.approx([truth] * 2, rel=1e-9, nan_ok=True), (design.name, name)
+
+
+def test_figures_of_the_response_to_the_command() -> None:
+    """Of a drive with every slot of the controller filled."""
+    figures = linear_figures(Population(everything(), {}, 1))
+    response = assemble_loops(everything()).reference_to_output
+    width, step = closed_loop_bandwidth(response), step_figures(response)
+    pairs = {"bandwidth": width.minus3db_hz, "resonance_peak": width.resonance_peak_db,
+             "overshoot": step.overshoot_percent, "rise_time": step.rise_time_s}  # fmt: skip
+    for quantity, expected in pairs.items():
+        found = figures.quantity(quantity, "position")[0]
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-6), quantity

@@ -248,3 +248,14 @@ def test_top_speed_is_that_of_the_run(path: str) -> None:
     assert capability(design).output_rate_rad_s == pytest.approx(expected, rel=1e-12)
     run = simulate(design, commands.step(design.limits.voltage_V), 0.5)
     assert run.motor_speed_rad_s[-1] / N == pytest.approx(expected, rel=1e-9)
+
+
+def test_cogging_is_blamed_for_the_loops_alone_that_are_stable_without_it(cli) -> None:
+    """A position gain of 6000/s is unstable with and without; what cogging drives away is the others."""
+    cogging = ("--set", "motor.cogging=0.1 N*m", "--set", "motor.cogging_periods=12")
+    fast = ("--set", "control.position.gain=6000 1/s")
+    blamed = cli.text("margins", "joint", *cogging, status=1)
+    assert "(current loop, velocity loop, position loop: by cogging alone" in " ".join(blamed.split())
+    both = cli.text("margins", "joint", *cogging, *fast, status=1)
+    assert "(current loop, velocity loop: by cogging alone" in " ".join(both.split())
+    assert "by cogging" not in cli.text("margins", "joint", *fast, status=1)

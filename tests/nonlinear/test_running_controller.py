@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from controller_reference import Controller
-from elastic_drive import two_mass
 
 from actuator_lti import load_design
 from actuator_lti.design import model, shipped_designs
@@ -52,28 +51,18 @@ def test_random_controllers(part: int) -> None:
         expected = np.array([plain.tick(*row) for row in rows])
         scale = np.abs(expected).max()
         assert np.abs(result - expected).max() <= 1e-9 * scale, (case, design)
-        assert drive.value("speed_command") == pytest.approx(
-            plain.w_ref, rel=1e-9, abs=1e-9 * np.ptp(rows[:, 2])
-        )
+        assert drive.value("speed_command") == pytest.approx(plain.w_ref, rel=1e-9, abs=1e-9)
         at_limit = np.abs(result) == design.limits.voltage_V
         limited += bool(at_limit.any()) and not at_limit.all()
     assert limited > CASES / 16  # the limits and what follows them were seen
 
 
 STATE_TICKS, MORE_THAN_A_BLOCK = 60, layout.BLOCK + 44
-NOISE = {"current_noise_A": 0.01, "angle_noise_rad": 1e-4, "output_angle_noise_rad": 1e-6, "jitter_s": 1e-6}
 
 
 def drives() -> list[model.Design]:
-    """Every shipped drive, random cascades, two masses with play, stick on both sides, a supply, noise."""
-    rubbing = {"dry_torque_Nm": 0.02, "load_coefficient": 0.01}
-    play = two_mass(friction=rubbing, load_friction={"dry_torque_Nm": 0.1})
-    play = changed(play, load={"moment_damping_Nms_rad": 0.01})
-    supply = model.Supply(resistance_ohm=0.05, regenerative=False, capacitance_F=1e-3)
-    feeding = {"position": {"acceleration_feedforward": 0.5}}
-    weak = changed(load_design("ilr33-amber"), supply=supply, controller=feeding)
-    noisy = changed(weak, instruments=NOISE, controller={"computing_delay_s": 1.3e-4})
-    return [*map(load_design, shipped_designs()), *map(rich_drive, range(60)), play, weak, noisy]
+    """Every shipped drive, and random ones: play with stick on both sides, supplies, noise among them."""
+    return [*map(load_design, shipped_designs()), *map(rich_drive, range(60))]
 
 
 def command(tick: int) -> float:

@@ -10,7 +10,7 @@ from actuator_lti import assemble_loops, load_design, onset
 from analyses.comparison.found import LargeSignal, figure_names
 from analyses.comparison.variants import compare
 from analyses.specification.sensitivity import sensitivities
-from analyses.studies.study import is_study, load_study, study_of
+from analyses.studies.study import load_study, study_of, study_or_design
 from reports.sections.compare import batches, brief, ledger, section
 from reports.sections.compare_best import section as best_section
 from tests.refusals import refused
@@ -42,7 +42,8 @@ axes = [{ parameter = "limits.voltage", values = ["11 V", "13 V"] },
 samples = 50
 """)  # fmt: skip
     result = load_study(path)
-    assert is_study(path)
+    assert study_or_design(path) == result
+    assert study_or_design("emps") == load_design("emps")
     assert [v.name for v in result.variants][:2] == ["slow", "motor.resistance = 0.05 ohm"]
     assert [v.design.motor.resistance_ohm for v in result.variants[1:4]] == [0.05, 0.055, 0.06]
     assert [(v.design.limits.voltage_V, v.design.total_ratio) for v in result.variants[4:]] == [

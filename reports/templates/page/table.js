@@ -18,8 +18,8 @@ const rowOf = (name, bad) => {
   row.append(...data.figures.map(({ name: figure, unit, factor, timed, response }) => {
     if (name in desk.now.points && response) return html("td"); // of a break point it says nothing
     if (own.waits && timed) return html("td", "right", "…");
-    // of a loop that is not stable no figure is shown
-    const value = own.figures[PLACE[figure]], [words, was] = [stable ? value : NaN, old.figures[PLACE[figure]]].map((each) => digits(calm(each * factor, unit), 4));
+    // of a loop that is not stable no figure is shown, neither what it is nor what it was
+    const value = own.figures[PLACE[figure]], [words, was] = [own, old].map(({ figures }) => digits(calm(figures[STABLE] === 1 ? figures[PLACE[figure]] * factor : NaN, unit), 4));
     const cell = html("td", { className: bad(name, figure) ? "right bad" : "right", dataset: { loop: name, figure, value } }, html("b", {}, words));
     if (words !== was) cell.append(html("span", "was", `was ${was}`));
     return cell;
