@@ -40,8 +40,3 @@ def series(time_s: npt.ArrayLike, moment_Nm: npt.ArrayLike, where: str = "load s
     Times count from the beginning of the run: before the first of them there is no load.
     """
     return LoadMoment(series=on_its_clock(time_s, moment_Nm, where=where))
-
-
-def as_load(load: float | LoadMoment) -> LoadMoment:
-    """A plain number is a constant moment."""
-    return load if isinstance(load, LoadMoment) else constant(load)

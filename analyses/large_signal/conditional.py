@@ -29,7 +29,7 @@ from actuator_lti.loops.periodic import PeriodicLoop
 from actuator_lti.types import Floats
 from analyses.large_signal.tones import full_range
 from analyses.motion.settling import accepted_rad
-from nonlinear import LIMITERS, Rows, commands, simulate
+from nonlinear import LIMITERS, Rows
 from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
 
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
@@ -311,10 +311,7 @@ def _end(design: Design, size_rad: float, settle_ticks: int) -> dict[str, Any]:
 
 def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    seconds = (
-        step_rows(design, np.array([size_rad]), settle_ticks).value("ticks") * design.controller.period_s
-    )
-    run = simulate(design, commands.step(size_rad), seconds, raise_on_failure=False)
+    run = step_rows(design, np.array([size_rad]), settle_ticks).trajectory()
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))

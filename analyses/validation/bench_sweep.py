@@ -9,16 +9,17 @@ from math import ceil
 
 import numpy as np
 
+from actuator_lti.errors import NumericalError
 from actuator_lti.types import Complexes, Floats
+from analyses.validation.in_time import agreed
 from analyses.validation.places import Bench
-from analyses.validation.small_signal import Place
+from analyses.validation.row import WITHIN
+from analyses.validation.small_signal import SURE, Place
 from nonlinear.bench.loop_setup import LoopSetup
-from nonlinear.runs.running import Running
 
 FREQUENCIES = 24
 LOWEST, HIGHEST = 2e-3, 0.9  # of Nyquist
 SAMPLES = 240  # of a run, about
-SIZES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-6, 1e-8)  # of a large signal
 
 
 @dataclass(frozen=True)
@@ -49,61 +50,29 @@ def bench_sweep(bench: Bench, place: Place) -> BenchSweep:
     )
 
 
-def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> complex:
-    """The open loop, from the size of sine that the next smaller one confirms best.
-
-    What bends smoothly (a smoothed friction, a torque over the angle) shows in a large sine without any
-    event, rounding in a small one: from size to size the answer changes least where neither does.
-    """
-    best, change, last = complex(np.nan, np.nan), np.inf, None
-    run = _Sines(setup, place, angle, samples)
-    turn = np.exp(-1j * angle * np.arange(samples))
-    for size in SIZES:
-        back = run.returned(size)
-        if back is None:
-            continue
-        closed = 2.0 / samples * np.sum(back * turn)
-        now = closed / (1.0 - closed)
-        if last is None:
-            best = now
-        elif abs(now - last) >= change:
-            break
-        else:
-            best, change = last, abs(now - last)
-        last = now
-    return best
-
-
 def _turns(share: float) -> tuple[int, int]:
     """Whole cycles and samples of a run at about a share of Nyquist."""
     cycles = max(1, round(0.5 * share * SAMPLES))
     return cycles, ceil(2.0 * cycles / share)
 
 
-class _Sines:
-    """Cosines of one frequency and several sizes, and the run without one that they are told from."""
+def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> complex:
+    """The open loop at an angle a sample, by a cosine."""
+    t, rows = place.tangent, setup.rows()
+    turn, updates = np.exp(1j * angle * np.arange(samples)), t.B.shape[1]
+    around = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
+    begin = np.linalg.solve(around, t.B @ np.exp(1j * angle * np.arange(updates))).real
 
-    def __init__(self, setup: LoopSetup, place: Place, angle: float, samples: int) -> None:
-        self.setup, self.tangent, self.samples, self.rows = setup, place.tangent, samples, setup.rows()
-        self.frequency_hz = angle / (2.0 * np.pi * place.tangent.hold_s)
-        self.calm = self.rows.running()
-        self.steady = self._advanced(self.calm)
-        t = place.tangent
-        updates = t.B.shape[1]
-        turned = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
-        held = np.exp(1j * angle * np.arange(updates))
-        self.begin = np.linalg.solve(turned, t.B @ held).real  # of a cosine of size 1
-
-    def _advanced(self, drive: Running) -> Floats:
-        hold = self.setup.hold_ticks
-        return drive.returned(drive.advance(self.samples * hold, hold), self.setup.point)
-
-    def returned(self, part: float) -> Floats | None:
-        """What comes back from a cosine of a part of a large signal, over its size; None after an event."""
-        size = part * (self.setup.range if np.isfinite(self.setup.range) else 1.0)
-        rows = self.rows.copy()
-        rows.sine(self.setup.point, size, self.frequency_hz, 0.5 * np.pi)
+    def course(size: float) -> Complexes | None:
+        rows.sine(setup.point, size, angle / (2.0 * np.pi * t.hold_s), 0.5 * np.pi)
         drive = rows.running()
-        drive.s[self.tangent.places] += size * self.begin
-        back = self._advanced(drive)
-        return (self.steady - back) / size if drive.happened == self.calm.happened else None
+        drive.s[t.places] += size * begin
+        back = drive.returned(drive.advance(samples * setup.hold_ticks, setup.hold_ticks), setup.point)
+        return -2.0 / samples * (back @ turn.conj())[None] if drive.happened == (0.0, 0.0) else None
+
+    size = abs(complex(t.closed(np.exp(1j * angle))))
+    try:
+        closed = complex(agreed(course, setup, WITHIN / SURE**2 * size)[0][0])
+    except NumericalError:
+        return complex(np.nan, np.nan)
+    return closed / (1.0 - closed)

@@ -87,7 +87,7 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
     samples = int(min(max(SETTLINGS * figures.step.settling_time_s / closed.dt, 20.0), MOST_SAMPLES))
     linear = _linear_step(closed, samples)
     largest = float(np.max(np.abs(linear)))
-    simulated, own = _agreed(partial(_step, setup, samples), setup, WITHIN / SURE * largest)
+    simulated, own = agreed(partial(_step, setup, samples), setup, WITHIN / SURE * largest)
     off = np.abs(simulated - linear) / largest
     k = int(np.argmax(off))
     allowed = max(WITHIN, SURE * own / largest)
@@ -109,7 +109,7 @@ def _linear_step(closed: PlainSystem, samples: int) -> Floats:
     return out
 
 
-def _agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: float) -> tuple[Numbers, float]:
+def agreed(run: Callable[[float], Numbers | None], setup: LoopSetup, enough: float) -> tuple[Numbers, float]:
     """What a run by its size comes to, over that of none, and what two successive sizes differ in.
 
     The largest size of which two agree well enough, else where they agree best; a size that ends in an event
@@ -191,7 +191,7 @@ def _beside(bench: Bench, place: Place, gain: float, w: float) -> MarginRun:
         return np.array(seen) if drive.happened == (0.0, 0.0) else None
 
     last = rate ** (count * stride)
-    seen, own = _agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
+    seen, own = agreed(course, setup, WITHIN / SURE**2 * abs(begins) * last)
     amplitude = np.abs(np.concatenate([[1.0], seen / begins]))
     error = SURE * (own / abs(begins) / last + t.stated_error)
     time_s: Floats = stride * t.period_s * np.arange(count + 1.0)

@@ -204,7 +204,7 @@ class Bench:
             name=name, condition=setup.condition, tangent=found, predicted=loop.closed, poles=loop.modes(),
             exact=exact_margins(loops, name) if own.periodic or name == "u" else None, critical=loop.modes,
             figures=None if own.periodic else loop_figures(own, bandwidth=False, step=False),
-            delayed=(lambda delay_s: self._delayed(delay_s)) if name == "u" else None,
+            delayed=self._delayed if name == "u" else None,
         )  # fmt: skip
 
     def _delayed(self, more_s: float) -> tuple[Tangent, Callable[[], Complexes]]:

@@ -135,11 +135,10 @@ def _predicted(model: Design, speed_rad_s: float, load_Nm: float) -> _Balance:
     motion = operating_motion_at(mechanics(model), speed_rad_s, moment)
     torque, friction = motion.voltage_V, model.friction
     sense = int(copysign(1.0, speed_rad_s))
-    if friction.law == "tanh":
-        felt = moment - model.load.moment_damping_Nms_rad * speed_rad_s / model.total_ratio
-        smooth = tanh(abs(speed_rad_s) / friction.smoothing_speed_rad_s)
-        torque -= sense * (1.0 - smooth) * float(dry_torque(model, felt, sense))
     damped = model.load.moment_damping_Nms_rad * speed_rad_s / model.total_ratio
+    if friction.law == "tanh":
+        smooth = tanh(abs(speed_rad_s) / friction.smoothing_speed_rad_s)
+        torque -= sense * (1.0 - smooth) * float(dry_torque(model, moment - damped, sense))
     parts = (torque, moment / model.total_ratio, damped / model.total_ratio, friction.offset_torque_Nm,
              motion.coupling_Nm / model.ratio_to_coupling)  # fmt: skip
     return _Balance(torque, motion, max(map(abs, parts)))

@@ -21,16 +21,11 @@ from nonlinear.export.trace import KeyTrace, trace_keys
 from nonlinear.native import parameters
 
 Version = Literal[2, 3]
-PLATFORMS = ("linux64", "win64")
-_FOLDERS = {
-    2: {"linux64": "linux64", "win64": "win64"},
-    3: {"linux64": "x86_64-linux", "win64": "x86_64-windows"},
+_BUILDS = {  # folder of FMI 3.0 (that of FMI 2.0 is the platform), library, flags of the compiler
+    "linux64": ("x86_64-linux", f"{MODEL}.so", ("-shared", "-fPIC", "-fvisibility=hidden", "-s")),
+    "win64": ("x86_64-windows", f"{MODEL}.dll", ("-shared", "-fvisibility=hidden")),
 }
-_SUFFIX = {"linux64": "so", "win64": "dll"}
-_SHARED = {
-    "linux64": ("-shared", "-fPIC", "-fvisibility=hidden", "-s"),
-    "win64": ("-shared", "-fvisibility=hidden"),
-}
+PLATFORMS = (*_BUILDS,)
 
 
 def fmu_bytes(
@@ -73,9 +68,9 @@ def fmu_bytes(
     files = {"modelDescription.xml": description(design, variables, token, version, names, tool)}
     texts["fmu_design.h"] = texts["fmu_design.h"].replace("@TOKEN@", token)
     for platform in platforms:
-        library = f"{MODEL}.{_SUFFIX[platform]}"
-        place = f"binaries/{_FOLDERS[version][platform]}/{library}"
-        files[place] = compile_files(texts, library, platform, _SHARED[platform])
+        folder, library, flags = _BUILDS[platform]
+        place = f"binaries/{platform if version == 2 else folder}/{library}"
+        files[place] = compile_files(texts, library, platform, flags)
     files |= {f"sources/{name}": text.encode() for name, text in texts.items()}
     if version == 3:
         files["sources/buildDescription.xml"] = build_description(names)

@@ -44,12 +44,8 @@ def _coupling(design: Design, row: Floats) -> None:
     row[at.LOAD_INERTIA] = design.load_side_inertia_kgm2
     row[at.STIFFNESS], row[at.COUPLING_DAMPING] = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
     row[at.HALF_PLAY] = 0.5 * coupling.play_rad
-    row[at.BEND_TORQUE], row[at.BEND_STIFFNESS] = (
-        coupling.torque_1_Nm or 0.0,
-        coupling.stiffness_2_Nm_rad or 0.0,
-    )
-    row[at.BEND_TORQUE_2] = coupling.torque_2_Nm or 0.0
-    row[at.BEND_STIFFNESS_2] = coupling.stiffness_3_Nm_rad or 0.0
+    for k, (torque, stiffness) in enumerate(coupling.bends):
+        row[at.BEND_TORQUE + 2 * k], row[at.BEND_STIFFNESS + 2 * k] = torque or 0.0, stiffness or 0.0
 
 
 def _friction_map(design: Design, row: Floats) -> None:

@@ -1,5 +1,6 @@
 """A design becomes the row of floats that the compiled kernel reads."""
 
+from collections.abc import Iterable
 from math import inf
 from typing import Any, get_args
 
@@ -13,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.row.elastic import put_drive_train
-from nonlinear.row.filters import Section, command_section, section
+from nonlinear.row.filters import command_section, section
 
 MAX_EVENTS_PER_TICK = 1000
 TANH_TOLERANCE = 1e-8
@@ -200,13 +201,11 @@ def _own_law(design: Design, row: Floats) -> None:
         row[at.POSITION_COUNTS] = row[at.OWN_COUNTS]
     columns = [LAW_INPUTS.index(name) for name in law.inputs]
     for k, (own_row, driven) in enumerate(zip(law.A, law.B, strict=True)):
-        for j, value in enumerate(own_row):
-            row[at.OWN_A + k * at.MOST_STATES + j] = value
+        _put(row, at.OWN_A + k * at.MOST_STATES, own_row)
         for j, value in zip(columns, driven, strict=True):
             row[at.OWN_B + k * at.OWN_INPUTS + j] = value
-    for place, values in ((at.OWN_C, law.C), (at.OWN_L, law.L)):
-        for k, value in enumerate(values):
-            row[place + k] = value
+    _put(row, at.OWN_C, law.C)
+    _put(row, at.OWN_L, law.L)
     for j, value in zip(columns, law.D or (0.0,) * len(columns), strict=True):
         row[at.OWN_D + j] = value
 
@@ -235,10 +234,10 @@ def _filters(design: Design, row: Floats, place: FilterPlace, period_s: Any) -> 
         raise InputError(message, where=design.name)
     row[count_at] = len(chosen)
     for k, item in enumerate(chosen):
-        _put_section(row, chain_at + k * at.SECTION, section(item, period_s, where=design.name))
+        _put(row, chain_at + k * at.SECTION, section(item, period_s, where=design.name))
 
 
-def _put_section(row: Floats, begin: int, numbers: Section) -> None:
+def _put(row: Floats, begin: int, numbers: Iterable[Any]) -> None:
     for k, number in enumerate(numbers):
         row[begin + k] = number
 
@@ -315,7 +314,7 @@ def _command(design: Design, row: Floats) -> None:
         row[at.PROFILE_SAMPLES] = np.maximum(samples, 1.0)
     if _somewhere(command.filter_time_s > 0.0):
         row[at.COMMAND_FILTERS] = 1
-        _put_section(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
+        _put(row, at.COMMAND_CHAIN, command_section(command, period, design.name))
 
 
 def _supply(design: Design, row: Floats) -> None:

@@ -15,11 +15,12 @@ from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
-from nonlinear.loads import LoadMoment, as_load
+from nonlinear.loads import LoadMoment, constant
 from nonlinear.row.parameters import design_row
 from nonlinear.runs.trajectory import State
 
 CONTENT = 0.02  # of a command's range: so large a line above the Nyquist frequency is refused
+STAGE_OF = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}
 STATE_PLACES = {  # where a run begins with each number of a `State` (in the row), and ends with it
     "motor_angle_rad": (at.ANGLE_START, at.S_ANGLE),
     "motor_speed_rad_s": (at.SPEED_START, at.S_SPEED),
@@ -114,7 +115,7 @@ class Run:
             if signal is not None:
                 check_frequency(design, signal)
                 _put_signal(row, place, signal, tables)
-        _put_load(row, as_load(self.load_Nm), tables)
+        _put_load(row, self.load_Nm, tables)
         _put_probes(row, self.probes, tables)
         put_state(row, self.initial or State())
         if 2 * self.reducers.window_ticks > row[at.TICKS]:
@@ -183,8 +184,9 @@ def check_frequency(design: Design, command: Command) -> None:
         raise InputError(f"{message}: it would come back at a lower one; filter it first", where=design.name)
 
 
-def _put_load(row: Floats, load: LoadMoment, tables: Tables) -> None:
-    """Write the load torque."""
+def _put_load(row: Floats, given: float | LoadMoment, tables: Tables) -> None:
+    """Write the load torque; a plain number is a constant one."""
+    load = given if isinstance(given, LoadMoment) else constant(given)
     row[at.LOAD] = load.constant_Nm
     row[at.LOAD_SLOPE] += load.slope_Nm_rad
     if load.series is not None:
@@ -224,10 +226,7 @@ def _put_probes(row: Floats, probes: Sequence[Probe], tables: Tables) -> None:
         if probe.point in seen:
             raise InputError(f"two probes at {probe.point}: one a point is allowed")
         seen.add(probe.point)
-        stage = {"w_ref": at.HAS_VELOCITY, "i_ref": at.HAS_CURRENT, "output": at.HAS_POSITION}.get(
-            probe.point
-        )
-        if stage is not None and not row[stage]:
+        if probe.point in STAGE_OF and not row[STAGE_OF[probe.point]]:
             raise InputError(f"probe point = {probe.point!r}: this design has no such stage")
         place = write_probe(probe, row)
         if isinstance(probe.injection, Command):
