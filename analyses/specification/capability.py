@@ -250,9 +250,9 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
 
 
 def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:
-    """Largest mean acceleration over a tenth of the run-up after a step far away (of a very slow one less)."""
+    """Largest mean acceleration over a tenth of a run-up after a step far away (less of a very slow one)"""
     Ts = design.controller.period_s
-    stretch = max(2, int(min(0.1 * rate / push / Ts, RUN_UP_TICKS / 14) + 0.5))
+    stretch = max(2, round(min(0.1 * rate / push / Ts, RUN_UP_TICKS / 14)))
     command = commands.step(direction * 1e3 * (rate * Ts + design.validation.full_deflection_rad))
     run = simulate(design, command, (14 * stretch + 20) * Ts, load_Nm)
     speed = direction * run.motor_speed_rad_s / design.total_ratio
