@@ -145,12 +145,12 @@ def answer(
     kinds = {name: option.kind for name, (_, option) in options(one.request).items()}
     loads = [values[name] for name, kind in kinds.items() if kind == "load" and values[name]]
     beyond = [line for load in loads for line in beyond_largest(drive, "--load", load)]
-    for warning in (*(warnings_of(drive) if one.warns else ()), *beyond):
-        print_warning(f"{drive.name}: {warning}")
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
         result = one.run(subject, *asked, **more)
+    for warning in (*(warnings_of(drive) if one.warns else ()), *beyond):
+        print_warning(f"{drive.name}: {warning}")
     if (text := one.shows("text", lambda _: None)(result)) is not None:
         print_line(text)
         return
