@@ -72,7 +72,7 @@ class Analysis:
 
     @property
     def warns(self) -> bool:
-        """Whether what is suspicious about the design is said with the result: where loops or runs are made of it."""
+        """Whether the result says what is suspicious about the design: where loops or runs are made of it."""
         return self.group in (LINEAR, NONLINEAR)
 
     def asked(self, design: Design | Study | None, chosen: Tree) -> tuple[Any, ...]:
