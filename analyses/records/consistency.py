@@ -249,7 +249,7 @@ def _clock(design: Design, record: Record) -> Finding | None:
     off = abs(ticks - round(ticks))
     subject = "sampling period against the drive's tick"
     if off <= TICK_TOLERANCE * ticks:
-        whole = f"{round(ticks)} ticks; a clock that is off by a whole number of them is not seen here"
+        whole = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
         return Finding(subject, True, whole)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
