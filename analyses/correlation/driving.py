@@ -176,15 +176,6 @@ def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats
     return np.array(found)
 
 
-def jump_share(design: Design, record: Record) -> float:
-    """Share of the command's change that is jumps, at times between two samples that none of them tells."""
-    driven = command_of(design, record)
-    change = np.zeros(1) if driven is None else np.diff(driven.values)
-    if driven is None or not np.any(change):
-        return 0.0
-    return float(np.linalg.norm(change[steps_of(driven.values)]) / np.linalg.norm(change))
-
-
 def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:
     """The recorded supply as `simulate` takes it; nothing without one, or for an ideal source.
 
