@@ -84,7 +84,8 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
-        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}; the intervals hold it"
+        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
+        told += "; the intervals hold it"
         return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
     weighed = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
