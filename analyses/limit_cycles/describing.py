@@ -44,6 +44,7 @@ MOST_GAIN, GAINS = 1e3, 73  # of a speed made of counts
 SPEEDS, DECADES = 36, 6.0  # of the motor, that friction is looked at with
 RESOLVED = 1e-9  # of the radius
 _TURNS = 1e-6  # least angle of an eigenvalue that oscillates
+_GONE = 0.01  # in one period: no oscillation; eigenvalues of what is late are zero, and rounding turns them
 _STEPS = 60  # of the fixed point between the amplitudes of both speeds
 
 
@@ -159,11 +160,14 @@ def _changes(a: float, b: float) -> bool:
 def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mode | None:
     """The least damped oscillation at a twist of amplitude A, the speeds in it being its own.
 
-    With friction a fixed point, begun with the shape of an oscillation ``near``.
+    With friction a fixed point, begun with the shape of an oscillation ``near``, or where that leads to none
+    with speeds at which friction is small.
     """
-    speeds = _speeds(near, A)
+    speeds, mode = _speeds(near, A), None
     for _ in range(_STEPS):
         mode = mode_at(_equivalent(design, A, *speeds, friction), Operating())
+        if mode is None and near is not None:
+            return _at_twist(design, A, friction, None)
         if mode is None or not friction:
             return mode
         now = _speeds(mode, A)
@@ -298,7 +302,7 @@ def _oscillation(
 ) -> Mode | None:
     """The largest eigenvalue of ticks that turns, or that nearest to the unit circle; None without any."""
     values, vectors = np.linalg.eig(reduce(lambda A, tick: tick @ A, ticks))
-    turning = np.flatnonzero(np.angle(values) > _TURNS)
+    turning = np.flatnonzero((np.angle(values) > _TURNS) & (np.abs(values) > _GONE))
     if not turning.size:
         return None
     size = np.abs(values[turning])
