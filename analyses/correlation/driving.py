@@ -15,6 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints, Mask
+from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.record import Record
 
 if TYPE_CHECKING:
@@ -160,29 +161,17 @@ def steps_at(values: Floats) -> Ints:
 def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats) -> Floats:
     """By how much each step of the command came earlier than it was modelled, by a signal that answers it, s.
 
-    From each step to the next one the answer moves with it, by its rate; a stretch of the answer (the gains,
-    the inertia, the clock) stands beside it, so that it is not taken for a time.
+    From each step to the next one the answer moves with it, by its rate; a stretch of all the answers (the
+    gains, the inertia, the clock) stands beside them, so that it is not taken for a time.
     """
-    rate, off, found = np.gradient(modelled, time_s), measured - modelled, []
-    later = steps_at(driven.values)
-    for start, end in zip(later, [*later[1:], len(time_s)], strict=True):
+    rate, off, later = np.gradient(modelled, time_s), measured - modelled, steps_at(driven.values)
+    table, rest = np.zeros((len(time_s), len(later) + 1)), np.zeros(len(time_s))
+    for k, (start, end) in enumerate(zip(later, [*later[1:], len(time_s)], strict=True)):
         part, before = slice(start, end), start - 1
-        moved = rate[part] - rate[before]
-        stretch = (time_s[part] - time_s[before]) * moved
-        table = np.column_stack([moved, stretch])
-        size = np.linalg.norm(table, axis=0)
-        told = np.linalg.lstsq(table / np.where(size > 0.0, size, 1.0), off[part] - off[before], rcond=None)
-        found.append(float(told[0][0] / size[0]) if size[0] > 0.0 else 0.0)
-    return np.array(found)
-
-
-def jump_share(design: Design, record: Record) -> float:
-    """Share of the command's change that is jumps, at times between two samples that none of them tells."""
-    driven = command_of(design, record)
-    change = np.zeros(1) if driven is None else np.diff(driven.values)
-    if driven is None or not np.any(change):
-        return 0.0
-    return float(np.linalg.norm(change[steps_of(driven.values)]) / np.linalg.norm(change))
+        table[part, k] = moved = rate[part] - rate[before]
+        table[part, -1] = (time_s[part] - time_s[before]) * moved
+        rest[part] = off[part] - off[before]
+    return scaled_lstsq(table, rest)[:-1]
 
 
 def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:

@@ -85,45 +85,86 @@ def identify_bench(
         If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
     """
     settings = Settings() if settings is None else settings
+    limit = settings.residual_limit / 100.0
     used, unseen = (tuple(prepared(record) for record in these) for these in (records, validation))
-    names = ", ".join(record.name for record in records)
-    start = plain = with_values(design, fixed_values(design, settings.fix))
-    electrical, told = None, f"voltage equation of {names}"
-    both: Fit | None = None
-    cutoff, decimation = settings.cutoff_hz, settings.decimation
-    usual = cutoff is None and decimation is None
-    recipe = None if usual else recipe_for(used[0], cutoff, decimation)
-    findings = {record.name: check_record(start, record) for record in (*used, *unseen)}
+    plain = with_values(design, fixed_values(design, settings.fix))
+    usual = settings.cutoff_hz is None and settings.decimation is None
+    recipe = None if usual else recipe_for(used[0], settings.cutoff_hz, settings.decimation)
+    findings = {record.name: check_record(plain, record) for record in (*used, *unseen)}
+    start, electrical = plain, None
     if settings.electrical:
         with because(findings):
-            electrical = fit_electrical(plain, used, recipe)
-            start = design_with_fit(plain, electrical_values(plain, electrical), told)
+            start, electrical = _by_voltage(plain, used, recipe)
         judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
         findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
-    limit = settings.residual_limit / 100.0
     held = _held(design, start, settings)
     with because(findings):
         right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
     if electrical is not None and "inductance" in electrical.names:
-        electrical = fit_electrical(plain, used, recipe, right.late_s)
-        start = design_with_fit(plain, electrical_values(plain, electrical), told)
-    used, model = right.records, right.model
-    compared = design_values(design, model, used, start)  # at the constant that made the torques
+        start, electrical = _by_voltage(plain, used, recipe, right.late_s)
+    compared = design_values(design, right.model, right.records, start)
+    model, both = _with_constant(start, right, compared, electrical)
+    whole = [without_flat_tops(start, record, recipe) for record in unseen]
+    told = {**right.findings, **{record.name: tuple(clipped) for record, clipped in whole}}
+    findings = {name: (*each, *told[name]) for name, each in findings.items()}
+    right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
+    items = list(_items(design, settings, findings, right, compared, held))
+    made, refined = _made(start, right, both, settings, items, progress)
+    again = tuple(resimulate(made, record, model.form) for record in (*right.records, *unseen))
+    items += _unseen_items(start, model, unseen, limit)
+    items += [verdict.simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
+    return BenchResult(
+        records=right.records,
+        validation=unseen,
+        findings=findings,
+        model=model,
+        refined=refined,
+        design=made,
+        resimulated=again,
+        items=tuple(items),
+        settings=settings,
+        design_values=compared,
+        laws=model.laws,
+        electrical=electrical,
+    )
+
+
+def _by_voltage(
+    plain: Design, records: Sequence[Record], recipe: Recipe | None, late_s: float = 0.0
+) -> tuple[Design, ElectricalFit]:
+    """The design with what the voltage equation tells of its motor, and that fit."""
+    found = fit_electrical(plain, records, recipe, late_s)
+    told = f"voltage equation of {_names(records)}"
+    return design_with_fit(plain, electrical_values(plain, found), told), found
+
+
+def _names(records: Sequence[Record]) -> str:
+    return ", ".join(record.name for record in records)
+
+
+def _with_constant(
+    start: Design, right: Diagnosed, compared: Sequence[DesignValue], electrical: ElectricalFit | None
+) -> tuple[JointModel, Fit | None]:
+    """The model with the error of the constant that makes torques, and the fit of both where it was found."""
     if electrical is None:
-        model = with_given_constant(start, model, used, compared)
-    else:
-        model, both = with_found_constant(start, model, used, electrical_values(start, electrical))
-    others = [without_flat_tops(start, record, recipe) for record in unseen]
-    unseen = tuple(record for record, _ in others)
-    told_of = {**right.findings, **{record.name: tuple(clipped) for record, clipped in others}}
-    findings |= {name: (*findings[name], *more) for name, more in told_of.items()}
-    source = f"identified from {names}{at_constant(model)}"
-    loaded = any(is_loaded(record) for record in used)
-    size = verdict.size_item(design, compared, kept_constants=electrical is None, loaded=loaded)
-    items = list(_items(design, findings, size, right, model, held, limit))
+        return with_given_constant(start, right.model, right.records, compared), None
+    return with_found_constant(start, right.model, right.records, electrical_values(start, electrical))
+
+
+def _made(
+    start: Design,
+    right: Diagnosed,
+    both: Fit | None,
+    settings: Settings,
+    items: Sequence[verdict.Item],
+    progress: Callable[[int, int], None] | None,
+) -> tuple[Design, OutputErrorResult | None]:
+    """The design with what was found, as its file gives it, and the refinement where one was asked for."""
+    model, records = right.model, right.records
+    source = f"identified from {_names(records)}{at_constant(model)}"
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
-        for record in used:
+        for record in records:
             for key in record.settings.keys() & set(values.names):
                 told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
                 raise InputError(f"settings.{key}: {told}", where=record.name)
@@ -136,35 +177,14 @@ def identify_bench(
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
     refined = None
     if settings.refine:
-        refined = refine_records(made, used, values.names, progress=progress)
+        refined = refine_records(made, records, values.names, progress=progress)
         if both is not None:  # its values are those at the constants that the voltage tells
             both = both.refined(refined)
             own = both.renamed({name: name for name in refined.names})
             refined = replace(refined, covariance=own.covariance)
         made = design_with_fit(made, refined, f"{source}, refined by simulation")
         made = made if both is None else with_correlations(made, both)
-    written = read_design_text(write_design(made))
-    again = tuple(resimulate(written, record, model.form) for record in (*used, *unseen))
-    allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
-    for record in unseen:
-        label = f"Relative residual of {record.name}, not seen by the fit"
-        residual, why = held_out_residual(start, model, record), "the fit does not carry over to it"
-        items.append(verdict.share_item(f"held-out-{record.name}", label, residual, allowed, why))
-    items += [verdict.simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
-    return BenchResult(
-        records=used,
-        validation=unseen,
-        findings=findings,
-        model=model,
-        refined=refined,
-        design=written,
-        resimulated=again,
-        items=tuple(items),
-        settings=settings,
-        design_values=compared,
-        laws=model.laws,
-        electrical=electrical,
-    )
+    return read_design_text(write_design(made)), refined
 
 
 def _held(design: Design, start: Design, settings: Settings) -> dict[str, float]:
@@ -204,25 +224,37 @@ def _fitted(
 
 def _items(
     design: Design,
+    settings: Settings,
     findings: Mapping[str, tuple[Finding, ...]],
-    size: verdict.Item,
     right: Diagnosed,
-    model: JointModel,
+    compared: Sequence[DesignValue],
     held: Mapping[str, float],
-    limit: float,
 ) -> Iterator[verdict.Item]:
     """What must hold before a design is made, and what is kept of the old one."""
+    model, records = right.model, right.records
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
-    yield size
+    loaded = any(is_loaded(record) for record in records)
+    yield verdict.size_item(design, compared, kept_constants=not settings.electrical, loaded=loaded)
     rows, least = model.rows_used, verdict.ROWS_EACH * len(model.names)
     why = f"{rows} rows for {len(model.names)} parameters, {least} wanted: take a longer record"
     yield verdict.Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
-    yield verdict.residual_item(model.relative_residual, limit)
+    yield verdict.residual_item(model.relative_residual, settings.residual_limit / 100.0)
     yield from verdict.offset_items(design, model)
     yield from verdict.kept_items(model, held, design.axis)
-    yield from verdict.lag_items(right.late_s, max(record.period_s for record in right.records))
-    for record in right.records:
+    yield from verdict.lag_items(right.late_s, max(record.period_s for record in records))
+    for record in records:
         yield from verdict.sampling_items(record)
     for name, one in right.followed.items():
         yield verdict.following_item(name, one)
+
+
+def _unseen_items(
+    start: Design, model: JointModel, unseen: Sequence[Record], limit: float
+) -> Iterator[verdict.Item]:
+    """Whether the fit carries over to records that it has not seen."""
+    allowed = min(HELD_OUT_FACTOR * model.relative_residual + HELD_OUT_EXTRA, limit)
+    for record in unseen:
+        label = f"Relative residual of {record.name}, not seen by the fit"
+        residual, why = held_out_residual(start, model, record), "the fit does not carry over to it"
+        yield verdict.share_item(f"held-out-{record.name}", label, residual, allowed, why)

@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
-from analyses.correlation.driving import command_of, jump_share
+from analyses.correlation.driving import command_of
 from analyses.estimation.arrays import lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
@@ -93,12 +93,10 @@ def diagnosed(
     for k, (record, like) in enumerate(zip(used, model.simulated, strict=False)):
         own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
-            between = record.period_s * jump_share(start, record) / np.sqrt(12.0)
-            error = float(np.linalg.norm([own.standard_error, other.standard_error, between]))
-            lag = Lag(own.seconds - other.seconds, error)
+            lag = Lag(own.seconds - other.seconds, float(np.hypot(own.standard_error, other.standard_error)))
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
             sure |= {k: lag} if lag.is_sure else {}
-            late = max(late, abs(lag.seconds), error)
+            late = max(late, abs(lag.seconds), lag.standard_error)
     if sure:
         for k, lag in sure.items():
             used[k] = shifted(start, used[k], lag.seconds)

@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
-from analyses.correlation.driving import command_of, jump_share
+from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
 from analyses.identification.inverse import fit_records, with_scatter
@@ -22,7 +22,6 @@ from analyses.records.record import Record
 
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
-JUMPS = "the command jumps between the samples, at times that they do not tell"
 ROUNDS = 3
 SETTLED = 0.1
 """Standard errors within which a bias that was found again is the one that was found before."""
@@ -68,8 +67,7 @@ def without_bias(
             again = fit([_as_used(*each) for each in zip(less.simulated, model.records, strict=True)])
         except (InputError, NumericalError) as error:
             return replace(less, bias_told=f"not taken off: {error}")
-        jumps = any(jump_share(made, record) > 0.0 for record in records)
-        before, less = less, replace(_corrected(start, made, model, again, jumps), simulated=less.simulated)
+        before, less = less, replace(_corrected(start, made, model, again), simulated=less.simulated)
         if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
             break
     return less
@@ -81,15 +79,14 @@ def _as_used(simulated: Record, measured: RecordFit) -> Record:
     return replace(simulated, signals={n: v for n, v in simulated.signals.items() if n not in unused})
 
 
-def _corrected(start: Design, made: Design, model: JointModel, again: JointModel, jumps: bool) -> JointModel:
+def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:
     found = {name: again[name] - default_value(made, name) for name in model.names if name in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
-    if wild or jumps:
-        why = f"more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}" if wild else JUMPS
-        told = f"not taken off: {why}"
-        covariance = model.covariance + np.outer(bias, bias)
-        return replace(model, bias_told=f"{told}; the intervals hold it", covariance=covariance)
+    if wild:
+        told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
+        told += "; the intervals hold it"
+        return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
     weighed = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
     moved = _by_direction(model, again)
