@@ -22,8 +22,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _asked_for, _pedigree,
-        _encoder, elastic_warnings,
+        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _asked_for,
+        _pedigree, _encoder, elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
