@@ -22,8 +22,8 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _pedigree,
-        _encoder, elastic_warnings,
+        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _asked_for,
+        _pedigree, _encoder, elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
@@ -192,6 +192,18 @@ def elastic_warnings(design: Design) -> Iterator[str]:
             if design.gears or "load.path" in design.written
             else f"load.path: self-locking is assumed, {bare}"
         )
+
+
+def _asked_for(design: Design) -> Iterator[str]:
+    """Requirements on what the drive can do, of more than the profile of its command asks for."""
+    command, turned = design.command, 180.0 / pi if design.axis == "rotary" else 1.0
+    rate, acceleration = command.rate_rad_s * turned, command.acceleration_rad_s2 * turned
+    most = {"output_rate": ("rate", rate), "acceleration": ("acceleration", acceleration)}
+    for one in design.requirements:
+        key, asked = most.get(one.quantity, ("", inf))
+        if one.minimum is not None and one.minimum > asked:
+            told = f"command.{key} lets no command ask for more than {asked:.4g} {one.unit}"
+            yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {told}"
 
 
 def _pedigree(design: Design) -> Iterator[str]:

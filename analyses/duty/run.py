@@ -102,7 +102,7 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
         held = float(np.sqrt(np.mean(still[still.size // 2 :] ** 2)))
     moving = float(np.sqrt(np.mean(current**2)))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
-    acts = [name for name in run.limits if name != "profile" and run.limit_active(name)[-ticks:].any()]
+    acts = [name for name in run.limits if run.limit_active(name)[-ticks:].any()]
     return Duty(
         design, asked, rms, moving, held, float(np.abs(run.current_A).max()),
         design.limits.continuous_current_A, tuple(acts),

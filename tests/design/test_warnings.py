@@ -95,6 +95,9 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("direct", BACK, FEELS, False),
     ("direct", {"friction.load_coefficient": 1}, ASSUMED, False),
     ("direct", {"friction.load_coefficient": 1}, FEELS, False),
+    # the drive can do 22.7 deg/s, its command asks for less than the 20 that are required
+    ("ilr33-amber", {"command.rate": "19 deg/s"}, "ask for more than 19 deg/s", True),
+    ("ilr33-amber", {"command.rate": "21 deg/s"}, "ask for more than", False),
     # what its file writes itself is not assumed, whatever else is changed
     ("locked", {"limits.voltage": "13 V"}, ASSUMED, False),
     ("locked", {}, FEELS, True),

@@ -89,7 +89,9 @@ def test_a_soft_spring_is_no_mode_at_rest() -> None:
     """Time constants of 1e9 ticks and more, in closed form from the equations of motor and PI at 60 digits.
 
     The integral moves by 6e-12 a period where it holds the spring: a rest once, and margins 1.7 deg apart.
+    Four ulp of an entry near one are 3e-4 of the slowest motion, 2.6e-12: no more of it is determined.
     """
+    known = 4.0 * np.finfo(float).eps / 2.6e-12
     design = full_drive(2_100_068)
     loops = assemble_loops(on_its_stand(on_the_bench(design)))
     period_s = 10.0 * design.controller.period_s
@@ -97,7 +99,7 @@ def test_a_soft_spring_is_no_mode_at_rest() -> None:
         for loop in (loops.position.open_loop, loops.break_points["u"].open_loop):
             for omega in (1.17e-6, 5e-6, 1.0):
                 exact = complex(slow_loop(design, mp.expj(omega * mp.mpf(period_s))))
-                assert loop(np.exp(1j * omega * period_s)) == pytest.approx(exact, rel=1e-6)
+                assert loop(np.exp(1j * omega * period_s)) == pytest.approx(exact, rel=known)
         slowest = mp.findroot(lambda change: 1 / slow_loop(design, 1 + change) + 1, -2.6e-12)
     found = exact_margins(loops, "u")
     assert found.delay_s == np.inf

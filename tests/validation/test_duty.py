@@ -123,6 +123,9 @@ def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
     made = section(duty(AMBER, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
     assert "it is not followed as asked, limited by" in made["result"]
     assert made["status"] == "warn"
+    slow = with_overrides(AMBER, {"command.rate": "7 deg/s"})  # 0.02 rad at 1 Hz are 7.2 deg/s
+    assert duty(slow, asked).limited == ("profile",)
+    assert duty(with_overrides(AMBER, {"command.rate": "8 deg/s"}), asked).limited == ()
 
 
 def test_the_current_of_an_ac_motor_is_told_in_the_model_s_amperes(cli) -> None:
