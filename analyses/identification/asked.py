@@ -34,7 +34,7 @@ class Settings:
     inertia_to: Annotated[
         str,
         Option(
-            "Where the inertia goes, less the design's others: motor.rotor_inertia (default) or "
+            "Of records: where the inertia goes, less the design's others: motor.rotor_inertia (default) or "
             "load.inertia.",
             "KEY",
         ),
@@ -161,6 +161,9 @@ class Asked(Settings):
             raise InputError("--response takes one file; allowed: CSV or .mat of a frequency response")
         if not self.response and (self.loop is not None or self.response_of != "L" or self.averages):
             raise InputError("--loop, --of and --averages go with --response")
+        if (self.response or self.frequency_response) and self.inertia_to != Settings.inertia_to:
+            hold = "hold the other one (--fix motor.rotor_inertia=VALUE)"
+            raise InputError(f"--inertia-to goes with records; a response writes each inertia itself: {hold}")
         if self.is_campaign and (self.validate or self.refine):
             raise InputError("--validate and --refine go with records, not with a campaign")
 

@@ -20,13 +20,14 @@ from actuator_lti.loops import sampled
 from actuator_lti.types import Complexes, Floats
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, told_apart
-from analyses.estimation.parameters import own_share, parameter
+from analyses.estimation.parameters import own_share, own_std, parameter
 from analyses.identification.asked import Of
 from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
 from analyses.identification.output_error import Moved, box_of, fit_output
-from analyses.identification.to_design import design_with_fit
+from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 from analyses.records.consistency import SURE
+from analyses.studies.sampling import correlation_of
 
 KEYS = (
     "motor.rotor_inertia",
@@ -153,8 +154,12 @@ def identify_response(
     _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(start, names, seen, known, progress)
     given = _given(start, fit, seen) if CONSTANT_KEYS.isdisjoint(held) else {}
-    fit = replace(fit, covariance=_widened(start, fit, given), fixed={**held, **fit.fixed, **given})
-    made = design_with_fit(start, fit, f"frequency response {measured.name}{at_constant(fit)}")
+    hanging, told = fit.fixed.keys() & given.keys(), replace(fit, fixed={**held, **given})
+    made = _written(start, fit, given, f"frequency response {measured.name}{at_constant(told)}")
+    given |= {key: _told(start, key, given[key]) for key in hanging}
+    size = len(fit.names)
+    covariance = _hanging(start, fit, given, hanging).covariance[:size, :size]
+    fit = replace(fit, covariance=covariance, fixed={**held, **fit.fixed, **given})
     modelled = model(read_design_text(write_design(made)))
     error = float(np.sqrt(np.mean(np.abs(modelled / measured.response - 1.0) ** 2)))
     items = [simulated_item(measured.name, error, limit, "its response, rms over the frequencies")]
@@ -200,14 +205,35 @@ def _given(start: Design, fit: ResponseFit, seen: _Seen) -> dict[str, Fixed]:
     return given
 
 
-def _widened(start: Design, fit: ResponseFit, given: Mapping[str, Fixed]) -> Floats:
-    """The covariance with what the design's tolerances of the values that are not determined make of it."""
-    covariance = fit.covariance
-    for key in fit.fixed.keys() & given.keys():
-        moves = np.array([given[key].moves[name] for name in fit.names])
-        std = own_share(start, key, given[key].value) * given[key].value
-        covariance = covariance + std**2 * np.outer(moves, moves)
-    return np.asarray(covariance)
+def _hanging(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], keys: Collection[str]) -> Fit:
+    """The fit with some values that are not determined beside it: their own errors, and what those move."""
+    kept = [key for key in fit.fixed if key in keys]
+    moves = np.array([[given[key].moves[name] for key in kept] for name in fit.names])
+    moves = moves.reshape(len(fit.names), len(kept))
+    std = np.array([own_share(start, key, given[key].value) * given[key].value for key in kept])
+    own = np.outer(std, std) * correlation_of(start, kept)
+    beside, more = -moves @ own, np.array([given[key].value for key in kept])
+    covariance = np.block([[fit.covariance + moves @ own @ moves.T, beside], [beside.T, own]])
+    return Fit(names=(*fit.names, *kept), values=np.append(fit.values, more), covariance=covariance)
+
+
+def _written(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], source: str) -> Design:
+    """The design of a fit before it is widened: what hangs on a toleranced value is correlated with it.
+
+    Where no tolerance is stated, the values' own are those at the kept value.
+    """
+    joint = _hanging(start, fit, given, {key for key in given if own_std(start, key) > 0.0})
+    made = design_with_fit(start, joint.renamed({name: name for name in fit.names}), source)
+    return with_correlations(made, joint)
+
+
+def _told(start: Design, key: str, kept: Fixed) -> Fixed:
+    """What is kept, with what its own error is in the errors of the others."""
+    share = f"{100.0 * own_share(start, key, kept.value):.3g} % of it (one standard deviation"
+    words = f"{share}, no tolerance is stated); the written tolerances are those at this value"
+    if own_std(start, key) > 0.0:
+        words = f"{share}, by its tolerance); the written design has them correlated with it"
+    return replace(kept, reason=f"{kept.reason}; the standard errors hold {words}")
 
 
 def _model(

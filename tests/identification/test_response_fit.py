@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from actuator_lti.design import model, parameter_value, write_design
+from actuator_lti.design import model, parameter_value, read_design_text, write_design
 from actuator_lti.errors import InputError
+from analyses.estimation.parameters import own_std
 from analyses.identification.measured_response import ResponseResult, identify_response
 from reports.charts.chart import Curve
 from reports.charts.data import chart_of
@@ -43,17 +44,29 @@ def open_loop(hertz: np.ndarray, values: dict[str, float] = TRUTH) -> np.ndarray
     a[0, 1] = a[2, 3] = 1.0
     a[1] = (-spring / N - C * np.eye(4)[1]) / J
     a[3] = spring / Jl
-    b = np.array([0.0, 1.0 / J, 0.0, 0.0])
+    return _sampled(hertz, a, np.array([0.0, 1.0 / J, 0.0, 0.0]), d)
+
+
+def _rigid(hertz: np.ndarray) -> np.ndarray:
+    """The same of one inertia, J + J_l/N^2."""
+    J, Jl, _, _, C, d = TRUTH.values()
+    J += Jl / N**2
+    return _sampled(hertz, np.array([[0.0, 1.0], [0.0, -C / J]]), np.array([0.0, 1.0 / J]), d)
+
+
+def _sampled(hertz: np.ndarray, a: np.ndarray, b: np.ndarray, d: float) -> np.ndarray:
+    """P control of the first state of dx/dt = a x + b u."""
+    n = len(b)
 
     def held(span: float) -> tuple[np.ndarray, np.ndarray]:
-        whole = expm(np.block([[a, b[:, None]], [np.zeros((1, 5))]]) * span)
-        return whole[:4, :4], whole[:4, 4]
+        whole = expm(np.block([[a, b[:, None]], [np.zeros((1, n + 1))]]) * span)
+        return whole[:n, :n], whole[:n, n]
 
     whole, _ = held(TICK)
     rest, new = held(TICK - d)
     old = rest @ held(d)[1]
     z = np.exp(2j * np.pi * hertz * TICK)
-    return np.array([GAIN * np.linalg.solve(s * np.eye(4) - whole, new + old / s)[0] for s in z])
+    return np.array([GAIN * np.linalg.solve(s * np.eye(n) - whole, new + old / s)[0] for s in z])
 
 
 HERTZ = np.geomspace(0.5, 400.0, 60)
@@ -191,6 +204,31 @@ def test_what_a_rigid_drive_s_response_does_not_determine_is_kept_and_said(J, Jl
     assert Jl > 0.0 or fit.fixed["load.inertia"].value == 0.0
 
 
+@pytest.mark.parametrize("stated", [True, False])
+def test_what_hangs_on_a_kept_value_is_counted_once_in_the_written_design(stated: bool, tmp_path) -> None:
+    """The spread of J + J_l/N^2 as written is that of the response alone, where one of both is held."""
+    design = changed(_design({}), coupling=None)
+    if stated:
+        text = write_design(design).replace(
+            'inertia = "0.04 kg*m^2"', 'inertia = { value = "0.04 kg*m^2", tolerance = "20 %" }'
+        )
+        design = read_design_text(text)
+        assert design.parameters["load.inertia"].tolerance is not None
+    file = _written(tmp_path, HERTZ, _rigid(HERTZ), 0.001)
+    held = identify_response(design, file, fixed={"load.inertia": TRUTH["load.inertia"]}).fit
+    result = identify_response(design, file)
+    J, Jl = "motor.rotor_inertia", "load.inertia"
+    assert (result.fit.names[0], Jl in result.fit.fixed) == (J, True)
+    made = result.design
+    pairs = {frozenset((one.first, one.second)): one.coefficient for one in made.correlations}
+    one, other = own_std(made, J), own_std(made, Jl) / N**2
+    total = one**2 + other**2 + 2.0 * pairs.get(frozenset((J, Jl)), 0.0) * one * other
+    assert np.sqrt(total) == pytest.approx(held.std(J), rel=0.05)
+    share = 0.2 / np.sqrt(3.0) if stated else 0.05
+    assert result.fit.std(J) == pytest.approx(share * TRUTH[Jl] / N**2, rel=0.05)
+    assert ("correlated with it" in result.fit.fixed[Jl].reason) == stated
+
+
 def test_another_drive_than_the_model_fails(tmp_path, cli) -> None:
     """A stiffness that is held at half: no other values make up for it, and the page says so.
 
@@ -241,3 +279,9 @@ def test_a_fit_is_drawn_in_decibels_with_a_phase_that_does_not_wrap(tmp_path) ->
         assert curve == pytest.approx(20.0 * np.log10(np.abs(loop)), abs=1e-2)
     for curve in drawn["phase, deg"]:
         assert curve == pytest.approx(turned, abs=0.1)
+
+
+def test_where_the_inertia_goes_is_no_question_to_a_response(tmp_path, cli) -> None:
+    file = _written(tmp_path, HERTZ, open_loop(HERTZ))
+    words = ("identify", "--response", file, "--design", "ilr33-amber", "--inertia-to", "load.inertia")
+    assert "a response writes each inertia itself" in cli.refused(*words)
