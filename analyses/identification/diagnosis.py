@@ -88,21 +88,20 @@ def diagnosed(
     whole = [without_flat_tops(start, record, recipe) for record in records]
     used, found = [record for record, _ in whole], {record.name: clipped for record, clipped in whole}
     model = fit(used)
-    sure: dict[int, Lag] = {}
-    late = 0.0
-    for k, (record, like) in enumerate(zip(used, model.simulated, strict=False)):
+    late, sure = 0.0, list[Lag]()
+    for k, (record, like) in enumerate(zip(tuple(used), model.simulated, strict=False)):
         own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
             lag = Lag(own.seconds - other.seconds, float(np.hypot(own.standard_error, other.standard_error)))
             found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
-            sure |= {k: lag} if lag.is_sure else {}
             late = max(late, abs(lag.seconds), lag.standard_error)
+            if lag.is_sure:
+                sure.append(lag)
+                used[k] = shifted(start, record, lag.seconds)
     if sure:
-        for k, lag in sure.items():
-            used[k] = shifted(start, used[k], lag.seconds)
         before, model = model, fit(used)
         if before.names == model.names:
-            share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure.values()])
+            share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure])
             model = _widened(model, np.sqrt(share) * (model.values - before.values))
     pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
     seen = {record.name: followed(start, record, like) for record, like in pairs}
