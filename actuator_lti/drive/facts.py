@@ -97,7 +97,7 @@ def _through_train(design: Design, ratio: Any = 1.0) -> Any:
 
 
 def driven_inertia_kgm2(design: Design) -> Any:
-    """Inertia that the motor speeds up, at its shaft: behind a coupling with the friction that its torque brings.
+    """Inertia that the motor speeds up, at its shaft; behind a coupling with the friction of its torque.
 
     ``T_s = J_l dW/dt + …`` is carried as ``T_s (1/N_c + CM')`` (model.md section 6); a rigid train rubs with
     the load's moment alone.
