@@ -62,7 +62,7 @@ class DesignValue:
     @property
     def agrees(self) -> bool:
         """Whether chance explains the difference, with the error of both."""
-        size = log(self.ratio) / float(np.hypot(self.error / self.ratio, self.allowed))
+        size = (self.ratio - 1.0) / float(np.hypot(self.error, self.allowed))
         return bool(chi2.sf(size**2, 1) > NO_CHANCE)
 
 

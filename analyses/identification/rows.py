@@ -148,6 +148,8 @@ def record_rows(
     used = {place: "motion", driven_by: f"drive: {told}"}
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
+    if design.motor.over_angle.bends:
+        told, drive = f"{told} with the design's cogging", drive + design.motor.over_angle.at(motion.position)
     if free:
         drive = drive + known / design.total_ratio
     if sides is not None:

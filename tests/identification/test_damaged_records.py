@@ -450,6 +450,11 @@ def _off(**found: tuple[float, float]) -> list[DesignValue]:
     return [DesignValue(name=n, found=r, ratio=r, error=e, **given) for n, (r, e) in found.items()]
 
 
+def test_a_value_agrees_by_its_difference_over_both_errors() -> None:
+    """0.1054 +- 0.13 of a number known to 5 % is 6.4 deviations off; 0.75 +- 0.1 is 2.2."""
+    assert [one.agrees for one in _off(viscous=(0.1054, 0.13), dry=(0.75, 0.1))] == [False, True]
+
+
 def test_one_value_that_is_off_names_no_cause() -> None:
     """Of an inertia alone any scale could be the cause; a second value that is as far off tells."""
     rough = {"dry": (1.1, 0.6), "viscous": (1.1, 0.6)}

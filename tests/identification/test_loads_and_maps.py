@@ -19,7 +19,7 @@ from analyses.identification.rows import recipe_for
 from analyses.identification.to_design import design_with_fit, joint_values, with_structure
 from analyses.records.record import Record
 from analyses.studies.sampling import sampler_of
-from tests.identification.bench_records import record_of
+from tests.identification.bench_records import bare, record_of
 
 PERIOD = 1e-3
 TIME = np.arange(0.0, 20.0, PERIOD)
@@ -102,6 +102,19 @@ def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(
     made = design_with_fit(with_structure(design, fit), joint_values(design, fit), "record").load.gravity
     assert made is not None
     assert (made.mass_kg, made.arm_m, made.offset_rad) == pytest.approx((mass_kg, 1.0, offset_rad), rel=1e-6)
+
+
+def test_a_cogging_that_the_design_knows_is_none_of_the_friction() -> None:
+    """Inertia, viscous and dry friction of a torque in closed form, half as much cogging as friction."""
+    motor = {"motor.cogging": 0.015, "motor.cogging_periods": 12.0, "motor.cogging_phase": 0.7}
+    inertia, viscous, dry = 7.5e-4, 8.6e-5, 0.03
+    angle, speed = _waves(0), _waves(1)
+    torque = inertia * _waves(2) + viscous * speed + dry * np.sign(speed) - 0.015 * np.sin(12.0 * angle + 0.7)
+    design = with_values(bare("ilr33-amber"), {**motor, "limits.speed": 200.0})
+    model = fit_records(design, [_record(angle=angle, torque_reference=torque)])
+    assert model["inertia"] == pytest.approx(inertia, rel=1e-3)
+    assert model["viscous"] == pytest.approx(viscous, rel=2e-2)
+    assert model["dry"] == pytest.approx(dry, rel=2e-3)
 
 
 def test_a_value_below_zero_within_its_error_is_the_design_s_own() -> None:
