@@ -94,13 +94,13 @@ def _table(result: Stiffness, unit: str) -> doc.Block:
 
 
 def _state(result: Stiffness, curve: StiffnessCurve) -> str:
-    """With the load where there are several."""
+    """With the load, where one is not 0."""
     return STATES[curve.state] + _at_load(result, curve)
 
 
 def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
-    several = len({one.load_Nm for one in result.curves}) > 1
-    return f", {curve.load_Nm:g} {load_unit(result.design)}" * several
+    loaded = any(one.load_Nm for one in result.curves)
+    return f", {curve.load_Nm:g} {load_unit(result.design)}" * loaded
 
 
 def _or_infinite(stiffness: float) -> float | str:
