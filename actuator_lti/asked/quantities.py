@@ -193,7 +193,7 @@ MOST_RESONANCE_DB = 100.0
 
 
 def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:
-    """Every figure of the whole drive with the loads at which it differs: stiffness is that of no load.
+    """Every figure of the whole drive with the loads at which it is told: stiffness at none.
 
     Examples
     --------

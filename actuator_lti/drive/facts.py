@@ -96,6 +96,18 @@ def _through_train(design: Design, ratio: Any = 1.0) -> Any:
     return passed + ratio * design.friction.load_coefficient * design.ratio_behind_coupling
 
 
+def driven_inertia_kgm2(design: Design) -> Any:
+    """Inertia that the motor speeds up, at its shaft; behind a coupling with the friction of its torque.
+
+    ``T_s = J_l dW/dt + …`` is carried as ``T_s (1/N_c + CM')`` (model.md section 6); a rigid train rubs with
+    the load's moment alone.
+    """
+    if design.coupling is None:
+        return design.inertia_kgm2
+    behind = design.load_side_inertia_kgm2 / design.ratio_to_coupling
+    return design.motor_side_inertia_kgm2 + _through_train(design) * behind
+
+
 def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
     """Constant torque at the motor against motion: dry friction, offset, load where it passes."""
     friction, behind = design.friction, design.load.friction
@@ -187,7 +199,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
     needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
     starts = (stall > needed) & (stall > against)
-    gain = where(starts, (stall - against) / design.inertia_kgm2, 0.0)
+    gain = where(starts, (stall - against) / driven_inertia_kgm2(design), 0.0)
     held = larger(needed, against)
     holds = held > 0.0
     margin = where(holds, stall / where(holds, held, 1.0), math.inf)

@@ -36,7 +36,7 @@ _AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-7 by on
 class StiffnessFigures:
     """What a requirement may limit, each worked out where it is read; floats, or arrays of stacked designs.
 
-    No load changes them, as friction slides.
+    A load changes them only by the piece of a spring that bends: friction slides.
     """
 
     design: Design
@@ -44,7 +44,7 @@ class StiffnessFigures:
 
     @cached_property
     def static_stiffness_Nm_rad(self) -> Any:
-        """Powered, at zero frequency: 0 of an output that runs away, inf of one that comes back."""
+        """Powered, at zero frequency; see `static_stiffness`."""
         return static_stiffness(self._response)
 
     @cached_property
@@ -60,7 +60,7 @@ class StiffnessFigures:
 
     @cached_property
     def _response(self) -> Compliance:
-        return compliance(self.design)
+        return compliance(self.design, Operating(load_Nm=self.load_Nm))
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
@@ -79,11 +79,14 @@ def stiffness_at(response: Compliance, frequency_hz: npt.ArrayLike) -> npt.NDArr
 
 
 def static_stiffness(response: Compliance) -> Any:
-    """|K| at zero frequency, by its slope near there: 0 of a drive that runs away, inf with an integral."""
+    """K at zero frequency, by its slope near there: below 0 of a drive that pushes away, 0 of a free one, inf
+    with an integral.
+    """
     hertz = [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]
-    rest, low, high = np.moveaxis(np.abs(stiffness_at(response, hertz)), -1, 0)
+    K = np.moveaxis(stiffness_at(response, hertz), -1, 0)
+    rest, low, high = np.abs(K)
     gone = ~np.isfinite(low) | (high < 0.5 * low)
-    return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, rest)))
+    return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, np.copysign(rest, K[0].real))))
 
 
 def lost_motion_rad(design: Design) -> Any:

@@ -40,7 +40,7 @@ class Duty:
 
     design: Design
     asked: Asked
-    # Current: of the whole cycle, in motion (steady), at rest, largest
+    # Current: of the whole cycle, in motion, at rest, largest; both steady
     rms_A: float
     moving_rms_A: float
     holding_A: float
@@ -96,15 +96,16 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     asked = Asked.of(design) if asked is None else asked
     free = replace(design, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)
-    current, held = run.current_A[-ticks:], 0.0
+    current, still = run.current_A[-ticks:], np.zeros(1)
     if asked.share < 1.0:
-        still = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
-        held = float(np.sqrt(np.mean(still[still.size // 2 :] ** 2)))
-    moving = float(np.sqrt(np.mean(current**2)))
+        resting = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
+        still = resting[resting.size // 2 :]
+    moving, held = (float(np.sqrt(np.mean(part**2))) for part in (current, still))
+    peak = max(float(np.abs(part).max()) for part in (current, still))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
     acts = [name for name in run.limits if run.limit_active(name)[-ticks:].any()]
     return Duty(
-        design, asked, rms, moving, held, float(np.abs(run.current_A).max()),
+        design, asked, rms, moving, held, peak,
         design.limits.continuous_current_A, tuple(acts),
         run.time_s[:ticks].copy(), current.copy(),
         _overload(design, asked, current, held), heating(design, rms),

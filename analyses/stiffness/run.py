@@ -5,6 +5,7 @@ It is put to the simulator: by its own derivative, and by a moment injected at t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from math import ceil, sqrt
 from os import PathLike
 from typing import Literal
@@ -14,7 +15,8 @@ import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design, LoadFriction, Motor
+from actuator_lti.design.model import Design, LoadFriction
+from actuator_lti.drive.operating import Operating
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops.stiffness import (
     LOST_MOTION_SHARE,
@@ -42,7 +44,9 @@ class StiffnessCurve:
     frequency_hz: npt.NDArray[np.float64]
     # N m/rad (linear axis: N/m); inf where the output does not move
     stiffness_Nm_rad: npt.NDArray[np.complex128]
-    static_Nm_rad: float  # limit at zero frequency: 0 of an output that runs away, inf of one that comes back
+    # Limit at zero frequency: below 0 of a drive that pushes away, 0 of a free one, inf of one that returns
+    static_Nm_rad: float
+    load_Nm: float = 0.0  # at the output: which piece of a spring that bends is used
 
     @property
     def least(self) -> tuple[float, float]:
@@ -249,12 +253,26 @@ def unpowered(design: Design, winding: State) -> Design:
     bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
     if winding == "shorted" and design.motor.has_electrical_dynamics:
         return bare
-    idle = Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0)
+    none = replace(design.motor, resistance_ohm=None, inductance_H=None, torque_constant_Nm_A=None)
+    idle = replace(none, back_emf_constant_Vs_rad=None, source_gain_Nm_V=1.0)  # its cogging stays
     return replace(bare, motor=idle, supply=None, temperature=None)
+
+
+def _telling_loads(design: Design) -> tuple[float, ...]:
+    """The first load of the validation on each piece of the spring; 0 where it does not bend."""
+    coupling, reached = design.coupling, dict[float, float]()
+    if coupling is None or len(coupling.pieces) == 1:
+        return (0.0,)
+    for load in design.validation.loads_Nm:
+        twist = coupling.twist_rad(load / design.ratio_behind_coupling)
+        reached.setdefault(float(coupling.stiffness_at(twist)), load)
+    return tuple(reached.values())
 
 
 def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     """Powered and unpowered stiffness, friction sliding (its share by load as where the motor drives).
+
+    A spring that bends has them at each of its pieces that a load of ``validation.loads`` reaches.
 
     Examples
     --------
@@ -263,10 +281,11 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     ['powered 1324', 'shorted 30', 'open 30']
     """
     curves = []
-    for state in STATES:
+    for load, state in product(_telling_loads(design), STATES):
         if state != "shorted" or design.motor.has_electrical_dynamics:
-            response = compliance(design if state == "powered" else unpowered(design, state))
+            seen = design if state == "powered" else unpowered(design, state)
+            response = compliance(seen, Operating(load_Nm=load))
             hertz = frequencies_hz(response)
             K, static = stiffness_at(response, hertz), static_stiffness(response)
-            curves.append(StiffnessCurve(state, hertz, K, static))
+            curves.append(StiffnessCurve(state, hertz, K, static, load))
     return tuple(curves)

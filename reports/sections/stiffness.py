@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.stiffness import Stiffness, stiffness
+from analyses.stiffness import Stiffness, StiffnessCurve, stiffness
 from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
@@ -47,7 +47,7 @@ def _result(result: Stiffness, unit: str) -> str:
     if np.isfinite(powered.stiffness_Nm_rad).any():
         (least, at), static = powered.least, powered.static_Nm_rad
         words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-        words = f"Powered, the static stiffness is {words}"
+        words = f"Powered{_at_load(result, powered)}, the static stiffness is {words}"
         words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz"
     if result.checks:
         most, lost = max(check.difference for check in result.checks), result.lost_motion_difference
@@ -68,8 +68,9 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
     top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
     phases = [style.phases(curve.stiffness_Nm_rad) for curve in shown]
     for k, (curve, phase) in enumerate(zip(shown, phases, strict=True)):
-        top.curve(curve.frequency_hz, np.abs(curve.stiffness_Nm_rad), STATES[curve.state], **style.series(k))
-        bottom.curve(curve.frequency_hz, phase, STATES[curve.state], **style.series(k))
+        name = _state(result, curve)
+        top.curve(curve.frequency_hz, np.abs(curve.stiffness_Nm_rad), name, **style.series(k))
+        bottom.curve(curve.frequency_hz, phase, name, **style.series(k))
     style.frequency(bottom, shown[0].frequency_hz)
     style.phase_axis(bottom, np.concatenate(phases))
     caption = "Dynamic stiffness of the output, powered and unpowered."
@@ -78,16 +79,28 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
 
 def _table(result: Stiffness, unit: str) -> doc.Block:
     infinite = any(math.isinf(value) for one in result.curves for value in (one.static_Nm_rad, one.least[0]))
-    note = "Infinite: the output comes back to its place, or does not move at all." if infinite else ""
+    notes = ["Infinite: the output comes back to its place, or does not move at all."] * infinite
+    pushed = any(one.static_Nm_rad < 0.0 for one in result.curves)
+    notes += ["Below 0: the drive pushes the output away from its place."] * pushed
     static: dict[str, Any] = {"unit": unit, "format": "sig:4", "better": 1}
     hertz: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
     columns = [
-        doc.of(lambda one: STATES[one.state], "state", "State"),
+        doc.of(lambda one: _state(result, one), "state", "State"),
         doc.of(lambda one: _or_infinite(one.static_Nm_rad), "static", "Static", **static),
         doc.of(lambda one: _or_infinite(one.least[0]), "least", "Least", **static),
         doc.of(lambda one: one.least[1] if one.least[0] < math.inf else None, "at", "at", **hertz),
     ]
-    return doc.listing("Stiffness by state", result.curves, columns, note)
+    return doc.listing("Stiffness by state", result.curves, columns, " ".join(notes))
+
+
+def _state(result: Stiffness, curve: StiffnessCurve) -> str:
+    """With the load, where one is not 0."""
+    return STATES[curve.state] + _at_load(result, curve)
+
+
+def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
+    loaded = any(one.load_Nm for one in result.curves)
+    return f", {curve.load_Nm:g} {load_unit(result.design)}" * loaded
 
 
 def _or_infinite(stiffness: float) -> float | str:

@@ -54,6 +54,29 @@ def test_friction_behind_the_coupling_counts() -> None:
     assert 0.5 * needed / 0.05 + 0.05 * w == pytest.approx(48.0, rel=1e-12)
 
 
+def test_the_torque_that_speeds_up_the_load_brings_friction_too() -> None:
+    """J_m dw/dt = T - T0 - (1/N_c + CM') T_s with T_s = J_l dW/dt + C0_l + M, by hand and simulated."""
+    behind, load = model.LoadFriction(dry_torque_Nm=0.3), model.Load(inertia_kgm2=2e-3, path="back-drivable")
+    design = replace(
+        drive_e(),
+        motor=model.Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=0.01),
+        controller=model.Controller(
+            period_s=1e-4, position=model.PositionLoop(gain=1e6), computing_delay_s=0.0
+        ),
+        friction=model.Friction(dry_torque_Nm=0.01, load_coefficient=0.02, law="coulomb"),
+        load=replace(load, friction=behind),
+        coupling=model.Coupling(stiffness_Nm_rad=400.0, damping_Nms_rad=1.0),
+    )
+    by_hand = (0.48 - 0.01 - 0.12 * (0.3 + 0.5)) / (2e-5 + 0.12 * 2e-3 / 10) / 10
+    assert drive_figures(design, 0.5).acceleration_rad_s2 == pytest.approx(by_hand, rel=1e-12)
+    run = simulate(design, commands.step(1e3), duration_s=0.08, load_Nm=-0.5)
+    speed, half = run.motor_speed_rad_s / 10, len(run.time_s) // 2
+    assert (speed[-1] - speed[half]) / (run.time_s[-1] - run.time_s[half]) == pytest.approx(by_hand, rel=1e-6)
+    rigid = replace(design, coupling=None)  # rubs with the load's moment alone (equation 9)
+    by_hand = (0.48 - 0.01 - 0.12 * 0.5) / 4e-5 / 10
+    assert drive_figures(rigid, 0.5).acceleration_rad_s2 == pytest.approx(by_hand, rel=1e-12)
+
+
 def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
     design = controlled(drive_e(), current={"integral_time_s": None, "resistance_feedforward": 0.6})

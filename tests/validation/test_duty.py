@@ -39,6 +39,14 @@ def test_rms_current_of_a_slow_sine_is_friction_and_inertia() -> None:
     assert result.verdict == ("met" if result.rms_A <= 4.0 else "not met")
 
 
+def test_the_peak_is_that_of_the_motion_repeated_without_its_start() -> None:
+    """A symmetric drive: turned about, the load asks the same; the start, against it or with it, does not."""
+    design = load_design("ballscrew")
+    there, back = (duty(design, Asked.of(design, load_Nm=load)) for load in (300.0, -300.0))
+    assert there.peak_A == pytest.approx(back.peak_A, rel=1e-3)
+    assert there.peak_A == np.abs(there.current_A).max()
+
+
 def test_without_any_rating_nothing_is_proven() -> None:
     assert duty(FIN).verdict == "not proven"
 

@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_lti.asked.drive_figure import drive_figure
+from actuator_lti.batch import Population
+from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design, with_overrides, write_design
 from actuator_lti.design.model import Load
 from actuator_lti.loops import assemble_loops
@@ -139,6 +142,40 @@ def test_the_least_stiffness_is_never_above_the_static_one() -> None:
     curves = stiffness_curves(drive_e())  # a velocity integral holds the motor, or nothing does
     assert [curve.static_Nm_rad for curve in curves] == [pytest.approx(400.0, rel=1e-6), 0.0, 0.0]
     assert all(curve.least[0] <= curve.static_Nm_rad for curve in curves)
+
+
+@pytest.mark.parametrize("phase", [0.0, np.pi])
+@pytest.mark.parametrize("slope", [-5.0, 0.0, 5.0])
+def test_unpowered_cogging_and_the_moment_push_away_or_hold(phase: float, slope: float) -> None:
+    """At angle 0: -N^2 tau Z cos(phase) - slope of a rigid drive, shorted and open."""
+    motor = {"cogging_Nm": 0.02, "cogging_periods": 12.0, "cogging_phase_rad": phase}
+    load = Load(inertia_kgm2=1e-3, path="back-drivable", moment_slope_Nm_rad=slope)
+    design = changed(drive_e(), motor=motor, load=load, coupling=None)
+    by_hand = -(10.0**2) * 0.02 * 12 * np.cos(phase) - slope
+    _, shorted, open_winding = stiffness_curves(design)
+    assert [shorted.static_Nm_rad, open_winding.static_Nm_rad] == pytest.approx(2 * [by_hand], rel=1e-6)
+    if by_hand < 0.0:
+        assert open_winding.least == (open_winding.static_Nm_rad, 0.0)
+        (table,) = [one for one in section(stiffness(design, simulated=False))["blocks"] if "rows" in one]
+        assert "Below 0" in table["note"]
+
+
+def test_a_load_chooses_the_piece_of_a_spring_that_bends() -> None:
+    """A velocity integral holds the motor: K1 at rest, K3 beyond torque_2, less the slope of the moment."""
+    bends = {"torque_1_Nm": 2.0, "stiffness_2_Nm_rad": 600.0, "torque_2_Nm": 5.0, "stiffness_3_Nm_rad": 900.0}
+    validation, load = {"loads_Nm": (0.0, 1.0, -8.0)}, {"moment_slope_Nm_rad": 30.0}
+    design = changed(drive_e(), coupling=bends, validation=validation, load=load)
+    powered = [curve for curve in stiffness_curves(design) if curve.state == "powered"]
+    assert [curve.load_Nm for curve in powered] == [0.0, -8.0]
+    assert [curve.static_Nm_rad for curve in powered] == pytest.approx([370.0, 870.0], rel=1e-6)
+    made = section(stiffness(design, simulated=False))
+    assert made["result"].startswith("Powered, 0 N m, the static stiffness is 370")
+    for load_Nm, value in ((0.0, 370.0), (8.0, 870.0)):
+        assert drive_figure(design, "static_stiffness", load_Nm) == pytest.approx(value, rel=1e-6)
+        K = np.array([300.0, 420.0])  # of many at once
+        path = {0.0: "coupling.stiffness", 8.0: "coupling.stiffness_3"}[load_Nm]
+        found = many(Population(design, {path: K}, 2), "static_stiffness", load_Nm)
+        assert found == pytest.approx(K - 30.0, rel=1e-6)
 
 
 def test_a_slow_tick_ends_the_curve_below_nyquist() -> None:
