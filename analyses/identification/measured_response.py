@@ -154,8 +154,8 @@ def identify_response(
     _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(start, names, seen, known, progress)
     given = _given(start, fit, seen) if CONSTANT_KEYS.isdisjoint(held) else {}
-    hanging, told = fit.fixed.keys() & given.keys(), replace(fit, fixed={**held, **given})
-    made = _written(start, fit, given, f"frequency response {measured.name}{at_constant(told)}")
+    hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given))
+    made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
     size = len(fit.names)
     covariance = _hanging(start, fit, given, hanging).covariance[:size, :size]
