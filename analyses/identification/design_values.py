@@ -18,7 +18,7 @@ from analyses.estimation.parameters import own_share, parameter
 from analyses.identification.electrical import fit_electrical
 from analyses.identification.joint_model import JointModel, default_value
 from analyses.identification.rows import drive_of, rows_under
-from analyses.records.consistency import SURE
+from analyses.records.consistency import SURE, one_phase
 from analyses.records.record import Record
 
 NO_CHANCE = 1e-3
@@ -92,6 +92,8 @@ def design_values(
     if whole and known.resistance_ohm is not None and known.back_emf_constant_Vs_rad:
         with suppress(InputError):  # R and kE are not told apart
             electrical = fit_electrical(start, whole, model.asked)
+            if any(one_phase(start, record) for record in whole):  # R hangs on the voltage in between
+                del own["resistance"]
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]
     return tuple(one for one in found if one is not None)
 

@@ -20,6 +20,10 @@ RATE_TOLERANCE = 0.02
 SURE = 4.0
 """Standard errors beyond which noise explains no difference: by chance in one record of 16 000."""
 TICK_TOLERANCE = 1e-3
+ONE_PHASE = (
+    "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
+    "between them it is not known, nor whether R or the scale of the current is off"
+)
 ALIKE = 0.9
 OVER = 1.2
 SMOOTH_HZ = 20.0
@@ -377,6 +381,8 @@ def _electrical(design: Design, record: Record) -> Finding | None:
             return Finding("voltage against R i + kE w", False, f"{words}: {cause}")
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
+    elif passed is not True and one_phase(design, record):
+        passed, words = None, f"{words}; {ONE_PHASE}"
     return Finding("voltage against R i + kE w", passed, words)
 
 
@@ -388,6 +394,19 @@ def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | N
     each = [one for one, _ in told]
     passed = False if False in each else None if None in each else True
     return (passed, "; ".join(words for _, words in told)) if told else None
+
+
+def one_phase(design: Design, record: Record) -> bool:
+    """Whether all samples are at one phase of a loop that runs every so many ticks, where the voltage kicks.
+
+    What the winding had between two samples is then not the voltage at them.
+    """
+    ticks = record.period_s / design.controller.period_s
+    loops = design.controller.velocity, design.controller.position
+    rates = [loop.every for loop in loops if loop is not None and loop.every > 1]
+    if record.averaged > 1 or abs(ticks - round(ticks)) >= TICK_TOLERANCE * ticks:
+        return False
+    return any(round(ticks) % n == 0 for n in rates)
 
 
 def _standing_current(design: Design, record: Record) -> str:
@@ -406,6 +425,8 @@ def resistance_doubt(design: Design, record: Record) -> float:
 
     A warmer winding or a wrong scale of the current: the record cannot tell.
     """
+    if one_phase(design, record):
+        return 0.0
     low, high = electrical_parts(design, record).get("R i", (1.0, 1.0))
     agrees = not isfinite(low) or _counted(design, "R i", low, high)[0] is True
     return 0.0 if agrees else 0.5 * (low + high) - 1.0
