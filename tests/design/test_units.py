@@ -24,7 +24,7 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     # powers of ten as the heads of columns have them
     ("kg*m^2", 1.18e-4, ("1.18 10^-4 kg·m²", "1.18 10⁻⁴ kg m2", "1.18 (10^-4 kg·m²)", "1.18 (x10^-4 kg·m²)")),
     ("kg*m^2", 1.18e-4, ("1.18 kg-m² ×10⁻⁴", "1.18 kgm2 10-4")),
-    ("kg*m^2", 3e-5, ("3×10^-5 kg m²", "3 x 10⁻⁵ kg m2")),
+    ("kg*m^2", 3e-5, ("3×10^-5 kg m²", "3 x 10⁻⁵ kg m2", "300 kgm2*1e-7")),
     ("kg*m^2", 5e-6, ("5.0 E-6 kg.m2",)),
     ("kg", 3.0, ("3 kilograms",)),
     ("kg", 150 * LB, ("150 lbm",)),
