@@ -45,7 +45,7 @@ _SPELLINGS = (
     (re.compile(r"\b(k?g)([cm]?m\^2)"), r"\1*\2"),  # gcm2
 )
 _POWER_OF_TEN = re.compile(r"(?<=[0-9.])\s*(?:[x×·*]|(?<=\s)\.)\s*10\s*(?:\^|(?=[+-]))\s*([+-]?[0-9]{1,3})\b")
-# A column's power of ten, before its unit or behind it: "1.18 (10^-4 kg m2)", "0.1 kg-m2 x 10^-3", "71 kgm2*1e-7".
+# A column's power of ten, before or behind its unit: "1.18 (10^-4 kg m2)", "0.1 kg-m2 x 10^-3", "7 kgm2*1e-7"
 _COLUMN = (
     (re.compile(r"\A(\s*[+-]?[0-9.]+)\s*([^0-9\s].*?)\s*[x×·*]\s*1[eE]([+-]?[0-9]{1,2})\s*\Z"), r"\1e\3 \2"),
     (re.compile(r"\A(\s*[+-]?[0-9.]+)\s+\(?\s*[x×]?\s*10\^([+-]?[0-9]{1,2})\s+(.*?)\)?\s*\Z"), r"\1e\2 \3"),

@@ -25,7 +25,8 @@ class Parameter:
 UNSTATED = 0.05
 """Relative standard deviation of a number of a design that states no tolerance."""
 TORQUE, VISCOUS, INERTIA = "N m", "N m s/rad", "kg m²"
-ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N", "N m/A": "N/A", "N m/V": "N/V"}
+ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N"}
+ON_A_LINE |= {"N m/A": "N/A", "N m/V": "N/V", "N m/rad": "N/m"}
 
 PARAMETERS = {
     "inertia": Parameter("Inertia, all at the motor", INERTIA, linear="Mass"),

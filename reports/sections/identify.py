@@ -136,7 +136,7 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
         f"sampled loop, {noise}."
     )
-    blocks: list[doc.Block] = [identified.parameter_table("Identified values", fit)]
+    blocks: list[doc.Block] = [identified.parameter_table("Identified values", fit, axis=result.design.axis)]
     both = decibels_and_degrees(measured.response, result.modelled)
     for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
         chart = style.Chart(width=style.WIDE, height=280.0)
@@ -146,8 +146,10 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
-    values = "; ".join(f"{parameter(name).key} {identified.value_words(fit, name)}" for name in fit.names)
-    values += identified.constant_words(fit)
+    values = "; ".join(
+        f"{parameter(name).key} {identified.value_words(fit, name, result.design.axis)}" for name in fit.names
+    )
+    values += identified.constant_words(fit, result.design.axis)
     return identified.judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )

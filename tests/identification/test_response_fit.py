@@ -1,12 +1,14 @@
 """A design fitted to measured responses: the truth is the exact sampled loop from matrix exponentials."""
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from actuator_lti.design import model, parameter_value, read_design_text, write_design
+from actuator_lti.design import load_design, model, parameter_value, read_design_text, write_design
 from actuator_lti.errors import InputError
 from analyses.estimation.parameters import own_std
 from analyses.identification.measured_response import ResponseResult, identify_response
@@ -285,3 +287,13 @@ def test_where_the_inertia_goes_is_no_question_to_a_response(tmp_path, cli) -> N
     file = _written(tmp_path, HERTZ, open_loop(HERTZ))
     words = ("identify", "--response", file, "--design", "ilr33-amber", "--inertia-to", "load.inertia")
     assert "a response writes each inertia itself" in cli.refused(*words)
+
+
+def test_a_linear_axis_reads_its_values_in_newtons_and_metres(tmp_path) -> None:
+    found = replace(_found(tmp_path, "L", 1e-7, 0, stated=False), design=load_design("ballscrew"))
+    shown = str(section(found))
+    units = {"rotor_inertia": "kg", "coupling.stiffness": "N/m", "coupling.damping": "N s/m"}
+    for key, unit in units.items():  # force over position, over speed, over acceleration
+        assert re.search(rf"{key} [^;]*± \S+ {unit}[;,.]", shown), key
+    assert "N m" not in shown
+    assert "kg m" not in shown
