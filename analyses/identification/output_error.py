@@ -12,6 +12,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
+from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
@@ -187,8 +188,8 @@ def refine_records(
         parts = [model_signals(tried, one, measured)[0][name] / size for one, name, measured, size in seen]
         return np.concatenate(parts)
 
-    found = fit_output(design, paths, output, wanted, progress)
-    dead = np.flatnonzero(np.linalg.norm(found.slopes, axis=0) == 0.0)
+    found, (size, _) = fit_output(design, paths, output, wanted, progress), box_of(design, paths)
+    dead = np.flatnonzero(np.linalg.norm(found.slopes * size, axis=0) <= 1e-12 * np.linalg.norm(found.rest))
     if len(dead):
         raise NumericalError(f"the output does not depend on {paths[int(dead[0])]}; leave it out")
     norm, ends = float(np.linalg.norm(wanted)), np.cumsum([len(record) for record in records]).tolist()
@@ -218,9 +219,10 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
         try:
             name, part = output_name(design, record), simulated_part(design, record)
             signal = correlate_record(design, part)[name]
-            kept = np.full(len(part), True) if part.left_out is None else ~part.left_out
-            off = np.linalg.norm((signal.modelled - signal.measured)[kept])
-            error = float(off / np.linalg.norm(signal.measured[kept]))
+            if part.left_out is not None:
+                columns = (each[~part.left_out] for each in (signal.time_s, signal.measured, signal.modelled))
+                signal = compare_signals(name, signal.unit, *columns)
+            error = signal.relative_error
             first = "" if len(part) == len(record) else f"its first {len(part)} rows "
             how = f"{name}, {first}simulated"
             return Resimulated(record=record.name, signal=name, relative_error=error, how=how)

@@ -17,9 +17,10 @@ def told_if_slow(text: str, patience_s: float = PATIENCE_S) -> Iterator[None]:
     """
 
     def tell() -> None:
-        _told.add(text)
-        sys.stderr.write(f"{text}\n")
-        sys.stderr.flush()
+        if text not in _told:
+            _told.add(text)
+            sys.stderr.write(f"{text}\n")
+            sys.stderr.flush()
 
     timer = threading.Timer(patience_s, tell)
     timer.daemon = True

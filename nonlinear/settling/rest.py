@@ -339,8 +339,13 @@ class _Watch:
 
     def _late(self) -> list[tuple[int, int, int]]:
         """What acted in the last half of the entries."""
-        behind = np.cumsum([entries for entries, _, _ in reversed(self.acted)])
-        return self.acted[-1 - int(np.searchsorted(behind, behind[-1] // 2)) :][::-1]
+        left, result = sum(one[0] for one in self.acted) // 2, []
+        for one in reversed(self.acted):
+            if left <= 0:
+                break
+            result.append(one)
+            left -= one[0]
+        return result
 
     def _swing(self) -> _Swing:
         """The swings of the last half of the entries, of whatever moves most."""
