@@ -61,7 +61,7 @@ def shown(exact: ExactLoop, loop: RationalLoop) -> ExactLoop:
             above = divided(above - residues[-1] * beside, p)
         below = flint.acb_poly.from_roots(others)
         most = (
-            _UNSEEN * slowest * abs(complex(above(0) / below(0))) * (0.5 if loop.in_z else 1.0)
+            _UNSEEN * slowest * abs(complex(above(0) / below(0))) / (2.0 if loop.in_z else 1.0)
         )  # dz = 2 ds
         if any(abs(complex(r)) > most for r in residues):
             return exact

@@ -62,7 +62,11 @@ class DesignValue:
     @property
     def agrees(self) -> bool:
         """Whether chance explains the difference, with the error of both."""
-        size = (self.ratio - 1.0) / float(np.hypot(self.error, self.allowed))
+        return self.within(self.allowed)
+
+    def within(self, own: float) -> bool:
+        """The same, the design's own number known to this share."""
+        size = (self.ratio - 1.0) / float(np.hypot(self.error, own))
         return bool(chi2.sf(size**2, 1) > NO_CHANCE)
 
 
@@ -152,8 +156,7 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     std = np.array([float(np.hypot(one.error / one.ratio, one.allowed)) for one in values])
     if len(values) < LEAST_VALUES or chi2.sf(float(np.sum((x / std) ** 2)), len(x)) > NO_CHANCE:
         return None
-    sizes = [(one.ratio - 1.0) / float(np.hypot(one.error, ALIKE)) for one in values]
-    off = chi2.sf(np.square(sizes), 1) < NO_CHANCE
+    off = np.array([not one.within(ALIKE) for one in values])
     fitting: list[tuple[float, str, float, float]] = []
     for words, powers in CAUSES.items():
         g = np.array([powers.get(one.name.partition("_")[0], 0.0) for one in values])

@@ -16,7 +16,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
 from analyses.identification.diagnosis import Followed
-from analyses.records.consistency import ALIKE, ONE_PHASE, RATE_TOLERANCE, Finding, wrong_of
+from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
@@ -81,10 +81,9 @@ def inputs_item(record: str, findings: Sequence[Finding]) -> Item:
     id, label = f"inputs-{record}", f"{record} agrees with itself and the design"
     if not findings:
         return Item(id=id, label=label, passed=None, reason="nothing to hold it against")
-    if not (wrong := wrong_of(findings)):
-        for one in findings:
-            if one.text.endswith(ONE_PHASE):
-                return Item(id=id, label=label, passed=None, reason=f"{one.subject}: {one.text}")
+    wrong, doubt = wrong_of(findings), next((one for one in findings if one.unproven), None)
+    if doubt is not None and not wrong:
+        return Item(id=id, label=label, passed=None, reason=f"{doubt.subject}: {doubt.text}")
     return Item.of(id, label, wrong)
 
 

@@ -163,7 +163,7 @@ def _at_twist(design: Design, A: float, friction: bool, near: Mode | None) -> Mo
     With friction a fixed point, begun with the shape of an oscillation ``near``, or where that leads to none
     with speeds at which friction is small.
     """
-    speeds, mode = _speeds(near, A), None
+    speeds = _speeds(near, A)
     for _ in range(_STEPS):
         mode = mode_at(_equivalent(design, A, *speeds, friction), Operating())
         if mode is None and near is not None:

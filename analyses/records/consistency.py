@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
@@ -51,11 +51,15 @@ FOLLOWED = (
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what, whether it agrees (None: not determined), and in words."""
+    """One thing that was looked at: what, whether it agrees (None: not determined), and in words.
+
+    ``unproven``: what is not determined leaves it open whether the record agrees.
+    """
 
     subject: str
     passed: bool | None
     text: str
+    unproven: bool = field(default=False, repr=False)
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
@@ -243,18 +247,23 @@ def clock_doubt(design: Design, record: Record) -> float:
     return off if TICK_TOLERANCE < abs(off) <= RATE_TOLERANCE and record.averaged == 1 else 0.0
 
 
+def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
+    """Ticks of the drive from row to row, and whether they are a whole number."""
+    ticks = record.period_s / design.controller.period_s
+    return ticks, abs(ticks - round(ticks)) <= TICK_TOLERANCE * ticks
+
+
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
     if place_of(design, record) is not None and _rate_name(design) in record.signals:
         return None
-    ticks = record.period_s / design.controller.period_s
+    ticks, whole = _ticks_a_row(design, record)
     if ticks < 1.0 - TICK_TOLERANCE or record.averaged > 1:
         return None
-    off = abs(ticks - round(ticks))
     subject = "sampling period against the drive's tick"
-    if off <= TICK_TOLERANCE * ticks:
-        whole = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
-        return Finding(subject, True, whole)
+    if whole:
+        told = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
+        return Finding(subject, True, told)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
 
@@ -382,7 +391,7 @@ def _electrical(design: Design, record: Record) -> Finding | None:
     if passed is None and (stands := _standing_current(design, record)):
         passed, words = False, stands
     elif passed is not True and one_phase(design, record):
-        passed, words = None, f"{words}; {ONE_PHASE}"
+        return Finding("voltage against R i + kE w", None, f"{words}; {ONE_PHASE}", unproven=True)
     return Finding("voltage against R i + kE w", passed, words)
 
 
@@ -401,12 +410,10 @@ def one_phase(design: Design, record: Record) -> bool:
 
     What the winding had between two samples is then not the voltage at them.
     """
-    ticks = record.period_s / design.controller.period_s
+    ticks, whole = _ticks_a_row(design, record)
     loops = design.controller.velocity, design.controller.position
     rates = [loop.every for loop in loops if loop is not None and loop.every > 1]
-    if record.averaged > 1 or abs(ticks - round(ticks)) >= TICK_TOLERANCE * ticks:
-        return False
-    return any(round(ticks) % n == 0 for n in rates)
+    return whole and record.averaged <= 1 and any(round(ticks) % n == 0 for n in rates)
 
 
 def _standing_current(design: Design, record: Record) -> str:

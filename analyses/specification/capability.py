@@ -250,7 +250,7 @@ def capability(design: Design, load_Nm: float, settling_s: float) -> Capability:
 
 
 def _acceleration(design: Design, load_Nm: float, direction: int, rate: float, push: float) -> float:
-    """Largest mean acceleration over a tenth of a run-up after a step far away (less of a very slow one)"""
+    """Largest mean acceleration over a tenth of a run-up after a step far away (less of a very slow one)."""
     Ts = design.controller.period_s
     stretch = max(2, round(min(0.1 * rate / push / Ts, RUN_UP_TICKS / 14)))
     command = commands.step(direction * 1e3 * (rate * Ts + design.validation.full_deflection_rad))

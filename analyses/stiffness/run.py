@@ -253,8 +253,10 @@ def unpowered(design: Design, winding: State) -> Design:
     bare = replace(design, controller=replace(design.controller, position=None, velocity=None, current=None))
     if winding == "shorted" and design.motor.has_electrical_dynamics:
         return bare
-    none = replace(design.motor, resistance_ohm=None, inductance_H=None, torque_constant_Nm_A=None)
-    idle = replace(none, back_emf_constant_Vs_rad=None, source_gain_Nm_V=1.0)  # its cogging stays
+    idle = replace(  # its cogging stays
+        design.motor, resistance_ohm=None, inductance_H=None, torque_constant_Nm_A=None,
+        back_emf_constant_Vs_rad=None, source_gain_Nm_V=1.0,
+    )  # fmt: skip
     return replace(bare, motor=idle, supply=None, temperature=None)
 
 
