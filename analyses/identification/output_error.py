@@ -27,6 +27,8 @@ AT_END = 1e-9
 """Part of the start within which a value is at the end of what its key allows."""
 LEAST_STEPPED = 0.1
 """Part of the start below which a value's own size is no measure of its step: it may go to zero."""
+LEAST_LOAD = 1e-6
+"""Part of its start that is left of an inertia behind a coupling."""
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
 MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
@@ -127,10 +129,15 @@ def fit_output(
 
 
 def box_of(design: Design, paths: Sequence[str]) -> tuple[Floats, Floats]:
-    """What each value is measured by, shape (p,), and the least and the largest of its key, shape (2, p)."""
+    """What each value is measured by, shape (p,), and the least and the largest of its key, shape (2, p).
+
+    A load behind a coupling has some inertia: none is no drive.
+    """
     fields = [field_of(path) for path in paths]
-    ends = [(-np.inf, np.inf) if field is None else (field.low, field.high) for field in fields]
-    return np.array([_scale(design, path, parameter_value(design, path)) for path in paths]), np.array(ends).T
+    low, high = np.array([(-np.inf, np.inf) if one is None else (one.low, one.high) for one in fields]).T
+    scale = np.array([_scale(design, path, parameter_value(design, path)) for path in paths])
+    coupled = np.array([path == "load.inertia" and design.coupling is not None for path in paths])
+    return scale, np.array([np.where(coupled, np.maximum(low, LEAST_LOAD * scale), low), high])
 
 
 def _scale(design: Design, path: str, start: float) -> float:
