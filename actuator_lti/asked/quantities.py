@@ -16,9 +16,14 @@ if TYPE_CHECKING:
     from actuator_lti.design.model import Axis
 
 
+def unit_words(unit: str) -> str:
+    """A unit as it is printed: of a ratio none, and N m where a file has N*m."""
+    return "" if unit == "1" else unit.replace("*", " ")
+
+
 def shown_unit(unit: str) -> tuple[str, float]:
     """The unit in which reports write figures and limits of a unit, and the factor to it: times are ms."""
-    return ("ms", 1e3) if unit == "s" else ("" if unit == "1" else unit.replace("*", " "), 1.0)
+    return ("ms", 1e3) if unit == "s" else (unit_words(unit), 1.0)
 
 
 def with_unit(value: float, unit: str, format: str = "g") -> str:

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.asked.quantities import shown_unit
+from actuator_lti.asked.quantities import shown_unit, unit_words
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
 from actuator_lti.files.tree import Tree
@@ -20,7 +20,7 @@ from reports.html import show_signed
 from reports.numbers import capital, row_time_unit, significant
 from reports.sections import compare_best, compare_figures
 from reports.sections.compare_best import SEEN, number, unstable_words
-from reports.sections.names import LOOPS, unit_words
+from reports.sections.names import LOOPS
 from reports.sections.requirements import item, label, limit_words
 from reports.sections.validation import loop_name, quantity_name
 from reports.terminal import Brief

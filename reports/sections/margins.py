@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity
+from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity, unit_words
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
 from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
@@ -15,7 +15,7 @@ from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
-from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words, unit_words
+from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words
 from reports.terminal import Brief, SideBySide
 
 STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}

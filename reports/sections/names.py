@@ -73,11 +73,6 @@ def push_words(design: Design) -> str:
     return "force" if design.axis == "linear" else "torque"
 
 
-def unit_words(unit: str) -> str:
-    """A unit as it is printed: of a ratio none, and N m where a file has N*m."""
-    return "" if unit == "1" else unit.replace("*", " ")
-
-
 def in_shown(value: float | None, unit: str) -> float | None:
     """A figure in the unit in which reports write those of a unit."""
     return None if value is None else shown_unit(unit)[1] * value

@@ -4,10 +4,10 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from actuator_lti.asked.quantities import unit_words
 from actuator_lti.design.model import Design, Parameter
 from reports import document as doc
 from reports.numbers import short
-from reports.sections.names import unit_words
 
 _ENDLESS = re.compile(r"-?\d*\.\d{12,}(e-?\d+)?")
 GRADES = (

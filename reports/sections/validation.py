@@ -6,6 +6,7 @@ from dataclasses import asdict, replace
 from decimal import ROUND_UP, Context
 from typing import Any, cast
 
+from actuator_lti.asked.quantities import unit_words
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.drive.signals import LIMITERS
@@ -15,7 +16,7 @@ from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.numbers import capital, gain_margin, prose, row_time_unit
 from reports.sections import beyond, friction_effects, in_time, large_signal, specification
-from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words, unit_words
+from reports.sections.names import LOOPS, POINTS, QUANTITIES, loop_words
 from reports.terminal import Brief
 
 MORE = {
