@@ -19,7 +19,7 @@ sys.dont_write_bytecode = True
 from actuator_lti.compiled.compiler import TARGETS, system_compiler  # noqa: E402
 
 TARGET = os.environ.get("ACTUATOR_LTI_TARGET", "")
-EMITTED = ["numpy>=2.0"]  # imported by the kernels that C is emitted from
+EMITTED = ["numpy>=2.0", "tomli-w>=1.1"]  # imported by the kernels that C is emitted from
 
 
 class WithKernels(build_py):

@@ -20,10 +20,27 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("actuator_lti", "nonlinear", "analyses", "reports")
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 (BACK_END,) = PROJECT["build-system"]["requires"]
-BUILD = (
-    "import os, sys; from setuptools import build_meta as b; source, dist = sys.argv[1:];"
-    "os.chdir(source); b.build_wheel(dist); b.build_sdist(dist)"
-)
+BUILD = """\
+import os, re, sys
+from importlib.machinery import PathFinder
+from importlib.metadata import packages_distributions
+from setuptools import build_meta
+
+class AsAsked(PathFinder):  # an environment made for the build holds what it asks for, and nothing else
+    asked, here = {"setuptools", "actuator-lti"}, packages_distributions()
+
+    @classmethod
+    def find_spec(cls, name, *how):
+        from_ = {each.replace("_", "-").lower() for each in cls.here.get(name, cls.asked)}
+        return super().find_spec(name, *how) if from_ & cls.asked else None
+
+source, dist = sys.argv[1:]
+os.chdir(source)
+AsAsked.asked |= {re.match(r"[\\w-]+", one)[0] for one in build_meta.get_requires_for_build_wheel()}
+sys.meta_path[sys.meta_path.index(PathFinder)] = AsAsked
+build_meta.build_wheel(dist)
+build_meta.build_sdist(dist)
+"""
 
 
 @pytest.fixture(scope="module")
