@@ -3,14 +3,14 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, isclose, log, pi
+from math import inf, isclose, log
 from typing import Any
 
 from actuator_lti.design.field import Structure
 from actuator_lti.design.fields import FIELDS, part_at
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import MotorConstants, no_load_speed
+from actuator_lti.design.plant import MotorConstants
 from actuator_lti.design.spellings import split_quantity
 
 MAX_MAP_POINTS = 16  # of each direction
@@ -262,17 +262,6 @@ def _friction_points(design: Design) -> Iterator[Refusal]:
             yield "friction.point", name, "allowed: not falling at the end, as the last slope continues"
 
 
-def _top_speed(design: Design) -> Iterator[Refusal]:
-    speed, top = design.limits.speed_rad_s, no_load_speed(design)
-    if top < speed < inf:
-        unit = "m/s" if design.axis == "linear" else "rad/s"
-        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.5g} rpm)"
-        volts, kE = design.limits.voltage_V, design.effective_motor.back_emf_constant_Vs_rad
-        most = f"U/kE = {volts:.4g} V/({kE:.4g} V/({unit})) = {top:.4g} {unit}{turns}"
-        allowed = f"the supply cannot reach it; allowed: at most {most}"
-        yield "limits.speed", f"{speed:.4g} {unit}", allowed
-
-
 _SOURCE = "not allowed with motor.source_gain, which "
 _PEAK_TIME = ("limits.peak_time", "{d.limits.peak_time_s:g} s")
 PLANT_CHECKS: tuple[Check, ...] = (
@@ -317,7 +306,7 @@ PLANT_CHECKS: tuple[Check, ...] = (
     _bends,
     Rule("friction.law", '"tanh"', 'allowed with a coupling: "coulomb"',
          lambda d: d.coupling is not None and d.friction.law == "tanh"),
-    _locking, _top_speed,
+    _locking,
     Rule("limits.continuous_current", "{d.limits.continuous_current_A:g} A",
          "allowed: at most limits.peak_current = {d.limits.peak_current_A:g} A",
          lambda d: d.limits.peak_current_A < d.limits.continuous_current_A < inf),

@@ -28,7 +28,6 @@ from typing import Any, Literal
 from actuator_lti.design.fields import FIELDS, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.objects import Imported
-from actuator_lti.design.plant import no_load_speed
 from actuator_lti.design.settings_file import parsed_xml, placed
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
@@ -276,11 +275,9 @@ def _overrides(
         used |= {*item.names}
         value = float(item.of(*numbers.values()))
         stated = ", ".join(f"{name} = {given[name]}" for name in item.names if name in given)
-        too_fast = item.key == "limits.speed" and no_load_speed(base) < value < inf
-        if too_fast or value == _none(item.key):
+        if value == _none(item.key):
             overrides[item.key] = None
-            why = "faster than the supply allows" if too_fast else "none"
-            notes.append(f"{stated}: {why}, {item.key} is left out")
+            notes.append(f"{stated}: none, {item.key} is left out")
         elif value > 0.0 and isfinite(value):
             text = value if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
             overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}

@@ -205,6 +205,11 @@ def no_load_speed(design: "Design") -> float:
     return inf if kE is None else design.limits.voltage_V / kE
 
 
+def reachable_speed(design: "Design") -> float:
+    """What limit and supply leave of the motor's speed in rad/s: the smaller of limits.speed and U/kE."""
+    return min(design.limits.speed_rad_s, no_load_speed(design))
+
+
 def torque_per_command(design: "Design") -> Any:
     """Torque per ampere of the current loop, or per volt where there is none."""
     motor = design.effective_motor
@@ -218,7 +223,7 @@ def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, 
     """Largest order of a wave over an angle that turns at the top speed of the motor over ``ratio``."""
     if not peak_Nm:
         return inf, ""
-    speed, Ts = min(design.limits.speed_rad_s, no_load_speed(design)) / ratio, design.controller.period_s
+    speed, Ts = reachable_speed(design) / ratio, design.controller.period_s
     if speed == inf:
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)

@@ -6,7 +6,7 @@ from math import inf, isfinite, pi, sqrt
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import torque_per_command
+from actuator_lti.design.plant import no_load_speed, torque_per_command
 
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
@@ -93,6 +93,13 @@ def _limits(design: Design) -> Iterator[str]:
         digits = next(n for n in range(3, 18) if float(f"{stall:.{n}g}") < float(f"{peak:.{n}g}"))
         only = f"the supply gives only {stall:.{digits}g} A at stall"
         yield f"limits.peak_current: {peak:.{max(digits, 6)}g} A, but {only}"
+    speed, top = design.limits.speed_rad_s, no_load_speed(design)
+    if top < speed < inf and design.controller.velocity is not None:
+        unit = "m/s" if design.axis == "linear" else "rad/s"
+        turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.5g} rpm)"
+        volts, kE = design.limits.voltage_V, design.effective_motor.back_emf_constant_Vs_rad
+        only = f"U/kE = {volts:.4g} V/({kE:.4g} V/({unit})) = {top:.4g} {unit}{turns}"
+        yield f"limits.speed: {speed:.4g} {unit}, but the supply reaches only {only}"
 
 
 def _unused(design: Design) -> Iterator[str]:

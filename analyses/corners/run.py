@@ -29,7 +29,7 @@ class Corner:
     design: Design
     figures: Mapping[str, LoopFigures]  # of its sampled, sliding loops
     verdicts: tuple[RequirementVerdict, ...]
-    # Keys whose values there contradict others, with why: a speed that the supply does not reach, say
+    # Keys whose values there contradict others, with why
     refused: Mapping[str, str] = field(default_factory=dict)
 
     @property

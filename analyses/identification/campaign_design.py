@@ -7,6 +7,7 @@ import numpy as np
 
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.identification.surface import PATHS, SurfaceFit
@@ -119,7 +120,7 @@ def _margins(design: Design) -> dict[tuple[str, str], float]:
     from actuator_lti import assemble_loops, stability_margins
 
     result: dict[tuple[str, str], float] = {}
-    slow = 0.02 * min(design.limits.speed_rad_s, 1e3)
+    slow = 0.02 * min(reachable_speed(design), 1e3)
     for load in sorted({0.0, design.load.moment_max_Nm}):
         loops = assemble_loops(
             design, operating_point="describing-function", load_Nm=load, speed_amplitude_rad_s=slow

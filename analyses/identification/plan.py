@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import model_signals
@@ -160,7 +161,7 @@ def _largest(design: Design, shape: str, cycles: int) -> tuple[Floats, Record]:
     wave = sum(size * np.sin(k * turn) for k, size in SHAPES[shape]) * np.sin(0.5 * np.pi * edge) ** 2
     wave = wave / np.max(np.abs(wave))
     rate = float(np.max(np.abs(np.gradient(wave, PERIOD_S)))) * design.total_ratio
-    amplitude = USED * min(design.validation.full_deflection_rad, design.limits.speed_rad_s / rate)
+    amplitude = USED * min(design.validation.full_deflection_rad, reachable_speed(design) / rate)
     own, name = design.limits, _drive(design)
     wanted, place = ("position_reference", "position") if design.axis == "linear" else ("reference", "angle")
     blank = dict.fromkeys((place, name), np.zeros(len(time)))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.types import Progress
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
@@ -91,7 +92,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
     simulated = steady_current_error(written, fit.points, progress=progress)
-    load, speed = design.load.moment_max_Nm, design.limits.speed_rad_s
+    load, speed = design.load.moment_max_Nm, reachable_speed(design)
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)
     suggestion = None

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.plant import no_load_speed, reachable_speed
 from actuator_lti.drive.facts import speed_torque_Nm
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.steady import steady_input
@@ -111,7 +111,7 @@ def triangle_start(design: Design, rows: Rows, amplitude_rad: np.ndarray, limite
     ``limited``, stay as they are.
     """
     limit = design.limits.speed_rad_s
-    if design.controller.velocity is None or not math.isfinite(limit):
+    if design.controller.velocity is None or not limit < no_load_speed(design):
         return
     rate, omega = limit / design.total_ratio, 2.0 * np.pi * rows.frequency_hz()
     x = omega * amplitude_rad / rate
@@ -278,7 +278,7 @@ def settling_ticks_of(closed_loop: Any, hold_ticks: int, where: str, longest: in
 def full_range(design: Design) -> dict[str, float]:
     """Full deflection (output), motor speed and motor current that a drive can reach."""
     limits, motor = design.limits, design.effective_motor
-    speed, current = min(limits.speed_rad_s, no_load_speed(design)), limits.peak_current_A
+    speed, current = reachable_speed(design), limits.peak_current_A
     if motor.resistance_ohm is not None:
         current = min(current, limits.voltage_V / motor.resistance_ohm)
     elif motor.source_gain_Nm_V is not None and design.friction.viscous() > 0.0:

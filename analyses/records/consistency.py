@@ -8,6 +8,7 @@ from math import inf, isfinite
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
@@ -518,9 +519,7 @@ def _limits(design: Design, record: Record) -> Iterator[Finding | None]:
         current = 2.0 * limits.voltage_V / motor.resistance_ohm
     yield _within("current against its limit", record, "current", current, "A")
     name, unit = ("velocity", "m/s") if linear else ("speed", "rad/s")
-    back = motor.back_emf_constant_Vs_rad
-    speed = min(limits.speed_rad_s, inf if back is None else limits.voltage_V / back)
-    yield _within(f"{name} against its limit", record, name, speed, unit)
+    yield _within(f"{name} against its limit", record, name, reachable_speed(design), unit)
     voltage = float(np.max(record["supply"])) if "supply" in record.signals else limits.voltage_V
     yield _within("voltage against the supply", record, "voltage", voltage, "V")
     name, unit = ("load_force", "N") if linear else ("torque", "N m")

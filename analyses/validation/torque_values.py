@@ -14,7 +14,7 @@ from math import copysign, isfinite, tanh
 import numpy as np
 
 from actuator_lti.design.model import Command, Controller, Design, Instruments, Limits, Motor
-from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.operating import dry_torque
 from analyses.validation.row import WITHIN, Row, judged
 from nonlinear.bench.operating_motion import OperatingMotion, full_torque_Nm, operating_motion_at
@@ -110,7 +110,7 @@ def _inertias(design: Design, model: Design) -> Iterator[Row]:
 
 def speeds_of(design: Design, direction: int) -> list[float]:
     """Speeds at which friction is read: fast, slow, one in each piece of a map, where a tanh bends."""
-    top = min(design.limits.speed_rad_s, no_load_speed(design))
+    top = reachable_speed(design)
     fast = FAST * top if isfinite(top) else 1.0
     points = [point.speed_rad_s for point in design.friction.map(direction)]
     if points:

@@ -13,6 +13,7 @@ from math import inf, lcm
 
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.wiring import Drive, wire
 from actuator_lti.errors import InputError
 from nonlinear._kernels import layout as at
@@ -206,7 +207,7 @@ class LoopSetup:
         """What would be a large signal at the place, in its unit."""
         design, limits = self.design, self.design.limits
         full = design.validation.full_deflection_rad
-        speed = min(limits.speed_rad_s, self.bias.speed_rad_s or inf)
+        speed = min(reachable_speed(design), self.bias.speed_rad_s or inf)
         ranges = {"u": limits.voltage_V, "i_ref": limits.peak_current_A, "w_ref": speed, "output": full}
         if self.loop == "load":
             return full_torque_Nm(design) * design.total_ratio

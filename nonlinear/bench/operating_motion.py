@@ -12,6 +12,7 @@ from math import copysign, cosh, inf, isfinite
 import numpy as np
 
 from actuator_lti.design.model import Command, Coupling, Design, Friction, Instruments, LoadFriction, Sensor
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
 from actuator_lti.drive.operating import (
     Operating,
@@ -204,7 +205,8 @@ def _torque_Nm(design: Design, current_A: float) -> float:
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:
     """The fastest motion within the limits; None where there is none."""
     limits = design.limits
-    speed = SHARE * limits.speed_rad_s if isfinite(limits.speed_rad_s) else FASTEST_RAD_S
+    top = reachable_speed(design)
+    speed = SHARE * top if isfinite(top) else FASTEST_RAD_S
     current = share * min(limits.peak_current_A, limits.continuous_current_A)
     while speed > SLOWEST * FASTEST_RAD_S:
         motion = operating_motion_at(design, speed, load_Nm)

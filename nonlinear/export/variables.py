@@ -8,7 +8,7 @@ from typing import Any, Literal
 from actuator_lti.design.field import BIG
 from actuator_lti.design.fields import fields_in, parts_of
 from actuator_lti.design.model import Design
-from actuator_lti.design.plant import no_load_speed
+from actuator_lti.design.plant import reachable_speed
 from nonlinear._kernels import layout as at
 from nonlinear.export.c_files import stage_words
 from nonlinear.export.trace import Key, KeyTrace
@@ -66,7 +66,7 @@ def _units(design: Design) -> tuple[str, str]:
 def sizes(design: Design) -> dict[str, float]:
     """Size in use of each quantity, on the output shaft and on the motor; ``inf`` where nothing bounds it."""
     ratio, angle, motor = design.total_ratio, design.validation.full_deflection_rad, design.effective_motor
-    speed, voltage = min(design.limits.speed_rad_s, no_load_speed(design)), design.limits.voltage_V
+    speed, voltage = reachable_speed(design), design.limits.voltage_V
     current = min(design.limits.peak_current_A, design.limits.continuous_current_A)
     if motor.resistance_ohm is not None:
         current = min(current, voltage / motor.resistance_ohm)

@@ -13,6 +13,7 @@ from actuator_lti.asked.quantities import (
     shown_unit,
 )
 from actuator_lti.design.model import Design, Requirement
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
@@ -145,7 +146,8 @@ def _step(design: Design) -> Tree:
         size = 0.1 * design.validation.full_deflection_rad
         return {"size": size, "unit": unit, "factor": factor, "of": "output"}
     if outermost == "velocity":
-        largest = limits.speed_rad_s if math.isfinite(limits.speed_rad_s) else 100.0
+        top = reachable_speed(design)
+        largest = top if math.isfinite(top) else 100.0
         unit, size = "m/s" if linear_axis else "rad/s", 0.1 * largest / design.total_ratio
         return {"size": size, "unit": unit, "factor": 1.0, "of": "speed"}
     size = 0.1 * (limits.peak_current_A if math.isfinite(limits.peak_current_A) else 10.0)

@@ -352,6 +352,7 @@ PLACES = {  # where a line is written into the sheet
 }
 GEARS = SHEET[SHEET.index("[[gear") : SHEET.index("[load]")]
 ONE_GEAR = '[gear]\nname = "first"\nratio = 2\nbacklash = "1 deg"\n'
+BRAKE = '[supply]\ncapacitance = "1 mF"\nregenerative = false\nbrake_voltage = "5 V"\n'
 COUNTS = '"1024 lines" (4096 counts) or "1024 counts"'
 BEHIND = "dry_torque of [load.friction]"
 WORDS: dict[str, list[tuple[str, ...]]] = {  # by place: a line, and what each line of the answer has
@@ -535,7 +536,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
     ('"142 g*cm^2"', '"142 ± 7.1 gcm²"', 'write "142 gcm²"; "± 7.1 gcm²" is one for tolerance = "5 %"'),
     ('"0.299 ohm"', '"0.299 Ω @25°C"', 'write "0.299 Ω"; "@25°C" is one for temperature.reference'),
     ("voltage = ", "dc_bus = ", "(it is voltage)"),
-    ("voltage = ", 'speed = "19 krpm"\nrated_voltage = ', "the supply cannot reach", "(it is voltage)"),
+    ("[limits]\n", f"{BRAKE}[limits]\nrated_", "at least limits.voltage = 48 V", "(it is voltage)"),
     ('computing_delay = "0 s"', 'computing_delay = "0.5 samples"', "; here 5e-05 s"),
     (
         'computing_delay = "0 s"\n',

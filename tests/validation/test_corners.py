@@ -91,16 +91,16 @@ def test_command_and_section(cli) -> None:
 
 
 def test_a_corner_that_contradicts_itself_fails_by_name_and_ends_nothing(cli) -> None:
-    """36 V over 0.12 V/(rad/s) is 300 rad/s, the speed limit; with kE 5 % higher it is 285.7."""
-    joint = with_overrides(load_design("joint"), {"limits.voltage": "36 V"})
-    found = {one.name: one for one in corners(joint, Asked.of(joint, supply_V=36.0)).corners}
-    assert [name for name, one in found.items() if one.refused] == ["cold", "worst gain margin"]
-    words = found["worst gain margin"].refused["limits.speed"]
-    assert "36 V/(0.126 V/(rad/s)) = 285.7 rad/s" in words
+    """A damping held over a tick of 62.5 us is at most J/Ts: 9600 N m s/rad, 6720 with J 30 % lower."""
+    joint = with_overrides(load_design("joint"), {"load.moment_damping": "8000 N*m*s/rad"})
+    found = {one.name: one for one in corners(joint).corners}
+    assert [name for name, one in found.items() if one.refused] == ["worst gain margin"]
+    words = found["worst gain margin"].refused["load.moment_damping"]
+    assert "allowed: at most 6720 N*m*s/rad" in words
     stiff = replace(joint, requirements=())
-    assert [one.passed for one in corners(stiff, Asked.of(stiff, supply_V=36.0)).corners].count(False) == 2
-    said = cli.text("corners", "joint", "--set", "limits.voltage=36 V", status=1)
-    assert "limits.speed not allowed there" in " ".join(said.split())
+    assert [one.name for one in corners(stiff).corners if not one.passed] == ["worst gain margin"]
+    said = cli.text("corners", "joint", "--set", "load.moment_damping=8000 N*m*s/rad", status=1)
+    assert "load.moment_damping not allowed there" in " ".join(said.split())
 
 
 def test_a_source_has_no_temperature() -> None:
