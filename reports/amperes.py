@@ -7,7 +7,8 @@ from typing import Any
 from actuator_lti.design.model import Design
 
 _OTHER = r"\bA\b(?! ?(?:dc|rms|pe?a?k|phase)|\()"
-_WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), r"(?<=\d )")}
+_BEFORE = r"(?:(?<=\d )|(?<=[Nm]/))"  # a number or a torque per
+_WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), _BEFORE)}
 _WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
 
 
@@ -17,8 +18,8 @@ def in_amperes(value: Any, design: Design | None, key: str = "") -> Any:
     Examples
     --------
     >>> from actuator_lti import load_design
-    >>> in_amperes({"result": "A limit of 2 A, 3 A rms", "unit": "A"}, load_design("ballscrew"))
-    {'result': 'A limit of 2 A dc, 3 A rms', 'unit': 'A dc'}
+    >>> in_amperes({"result": "A limit of 2 A, 3 A rms, kM 4 N/A", "unit": "A"}, load_design("ballscrew"))
+    {'result': 'A limit of 2 A dc, 3 A rms, kM 4 N/A dc', 'unit': 'A dc'}
     """
     if design is None or design.motor.constants == "dc":
         return value

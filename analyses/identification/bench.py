@@ -161,7 +161,7 @@ def _made(
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records
-    source = f"identified from {_names(records)}{at_constant(model)}"
+    source = f"identified from {_names(records)}{at_constant(model, start)}"
     try:
         values = joint_values(start, model, inertia_to=settings.inertia_to)
         for record in records:

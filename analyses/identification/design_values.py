@@ -10,7 +10,9 @@ import numpy as np
 from scipy.stats import chi2
 
 from actuator_lti.design import parameter_value
+from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.model import Design
+from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
@@ -188,10 +190,13 @@ def given_constant(fit: Fit) -> str | None:
     return next((name for name in CONSTANTS if name in fit.fixed), None)
 
 
-def at_constant(fit: Fit) -> str:
-    """That constant for the source of a written value: `` at key = value unit``; empty without one."""
-    name = given_constant(fit)
-    return "" if name is None else f" at {parameter(name).key} = {fit[name]:g} {parameter(name).unit}"
+def at_constant(fit: Fit, design: Design) -> str:
+    """That constant for the source of a written value: `` at kM = value unit``; empty without one."""
+    if (name := given_constant(fit)) is None:
+        return ""
+    one = parameter(name, design.axis)
+    unit = ampere_unit("limits.", one.unit, design.motor.constants)  # not those of the data sheet
+    return f" at {FIELDS[one.key].symbol} = {fit[name]:g} {unit}"
 
 
 def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str = "") -> dict[str, Fixed]:
@@ -212,11 +217,14 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())
     if len(each) == 1 and sum(map(len, each.values())) == len(fit.names):
         words = f"{next(iter(each))} of every value"
-    scale = ", nor the scale of the current (rms read as DC: 0.82 times)" * (name == "torque_constant")
+    read = "peak read as DC: 1.15" if design.motor.constants == "peak-phase" else "rms read as DC: 0.82"
+    scale = f", nor the scale of the current ({read} times)" * (name == "torque_constant")
     value = parameter_value(design, parameter(name).key)
     reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
     moves = {n: -part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
-    return {name: Fixed(value=value, reason=f"{reason}; {100.0 * STEP:+.2g} % of it is {words}", moves=moves)}
+    in_model = getattr(design.effective_motor, CONSTANTS.get(name, ""), value)  # an AC motor's: A dc
+    reason = f"{reason}; {100.0 * STEP:+.2g} % of it is {words}"
+    return {name: Fixed(value=in_model, reason=reason, moves=moves)}
 
 
 def with_given_constant(

@@ -244,4 +244,4 @@ def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Desig
     made = fit.mapped(slopes, values)
     if play is not None and play.told:
         made = made.beside("coupling.play", 2.0 * play.half_rad, 2.0 * play.half_std_rad)
-    return design_with_fit(base, made, f"frequency response of {record}{at_constant(fit)}")
+    return design_with_fit(base, made, f"frequency response of {record}{at_constant(fit, design)}")

@@ -154,7 +154,7 @@ def identify_response(
     _refuse_too_few(2 * len(size), len(names), measured.name)
     fit, rest = _determined(start, names, seen, known, progress)
     given = _given(start, fit, seen) if CONSTANT_KEYS.isdisjoint(held) else {}
-    hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given))
+    hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given), start)
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
     size = len(fit.names)

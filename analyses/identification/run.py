@@ -88,7 +88,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     held, imported = held_by_name(fixed, NAMES), import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)
     fit, count = result.fit, asked.suggest
-    source = f"identified from {len(fit.points)} runs, {listed.name}{at_constant(fit)}"
+    source = f"identified from {len(fit.points)} runs, {listed.name}{at_constant(fit, design)}"
     made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
     simulated = steady_current_error(written, fit.points, progress=progress)

@@ -15,7 +15,7 @@ from actuator_lti.errors import InputError
 from analyses.estimation.fit import Fit
 from analyses.identification.asked import Settings
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.identification.design_values import DesignValue, cause, kept_constant
+from analyses.identification.design_values import DesignValue, at_constant, cause, kept_constant
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES
 from analyses.records.open_record import open_record
@@ -163,7 +163,7 @@ def test_values_hang_on_the_torque_constant_as_stated(signals, held, columns) ->
     (item,) = (one for one in result.items if one.id == "kept-torque_constant")
     assert item.passed is None
     assert ("+10 % of every value" in item.reason) == (held == "nothing")
-    assert "at motor.torque_constant = 0.0059 N m/A" in result.text
+    assert "at kM = 0.0059 N m/A" in result.text
     more = with_values(BASE, {"motor.torque_constant": kept.value + 2e-4})
     held_at = {name: one.value for name, one in result.model.fixed.items() if name in NAMES["symmetric"]}
     own, other = (fit_records(design, [record], fixed=held_at) for design in (BASE, more))
@@ -471,3 +471,20 @@ def test_what_the_constant_moves_by_more_than_the_value_is_said_in_its_unit() ->
     fit = Fit(names=names, values=values, covariance=np.diag([1e-12, 1e-10]))
     reason = kept_constant(BASE, "torque_constant", fit, np.array([1.0, -110.0]))["torque_constant"].reason
     assert reason.endswith("+10 % of it is +10 % of dry and +0.00011 N m/(N m) of load_coefficient")
+
+
+@pytest.mark.parametrize(
+    ("constants", "ampere", "read"),
+    [("rms-line", 1.5**0.5, "rms read as DC: 0.82"), ("peak-phase", 0.75**0.5, "peak read as DC: 1.15")],
+)
+def test_a_constant_of_an_ac_motor_is_told_in_the_amperes_of_the_model(
+    constants: str, ampere: float, read: str
+) -> None:
+    """N m/A dc is N m/A rms over sqrt(3/2), N m/A peak over sqrt(3)/2; so is a current that one read so."""
+    motor = replace(BASE.motor, constants=constants)
+    design = replace(BASE, motor=motor)
+    fit = Fit(names=("dry", "viscous"), values=np.array([1e-3, 1e-6]), covariance=np.diag([1e-12, 1e-18]))
+    kept = kept_constant(design, "torque_constant", fit, np.array([1.0, 1.0]))
+    assert kept["torque_constant"].value == pytest.approx(5.9e-3 / ampere, rel=1e-12)
+    assert f"({read} times)" in kept["torque_constant"].reason
+    assert at_constant(replace(fit, fixed=kept), design) == f" at kM = {5.9e-3 / ampere:g} N m/A dc"
