@@ -9,6 +9,7 @@ from actuator_lti.design.model import Design
 _OTHER = r"\bA\b(?! ?(?:dc|rms|pe?a?k|phase)|\()"
 _BEFORE = r"(?:(?<=\d )|(?<=[Nm]/))"  # a number or a torque per
 _WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), _BEFORE)}
+_SHEETS = {"rms-line": "1 A rms is 1.225 A dc.", "peak-phase": "1 A peak of a phase is 0.8660 A dc."}
 _WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
 
 
@@ -26,5 +27,9 @@ def in_amperes(value: Any, design: Design | None, key: str = "") -> Any:
     if isinstance(value, str):
         return _WORDS[key].sub("A dc", value) if key in _WORDS else value
     if isinstance(value, Mapping):
-        return {name: in_amperes(one, design, name) for name, one in value.items()}
+        made = {name: in_amperes(one, design, name) for name, one in value.items()}
+        table = made.get("kind") == "table" and made != value
+        return (
+            {**made, "note": f"{made['note']} {_SHEETS[design.motor.constants]}".strip()} if table else made
+        )
     return [in_amperes(one, design, key) for one in value] if isinstance(value, list | tuple) else value

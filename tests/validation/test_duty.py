@@ -140,4 +140,5 @@ def test_the_current_of_an_ac_motor_is_told_in_the_model_s_amperes(cli) -> None:
     first, *rest = cli.text("duty", "ballscrew").splitlines()
     assert " A dc, rms over time, limit " in first
     assert any("current, rms over time" in line and " A dc " in line for line in rest)
+    assert f"1 A rms is {1.5**0.5:.4g} A dc." in " ".join(rest)
     assert " A dc" not in cli.text("duty", "joint")
