@@ -112,7 +112,6 @@ REFUSING: dict[str, Callable[[Any], object]] = {
         ("import", {"0x2348.01": 251}, "1 to 250"),
         ("import", {"0x2348.01": 0}, "1 to 250"),
         ("import", {"0x6083.00": -1}, "allowed"),
-        ("import", {"0x6080.00": 32767}, "limits.speed"),
         ("export", {"control.position.gain": 300.0}, r"gain = 300 1/s: object 0x2348.01.*1 to 250"),
         ("export", {"control.current.integral_time": 1e-4}, "150 to 2600"),
         ("export", {"control.velocity.integral_time": 1e-3}, "20 to 1000"),
