@@ -19,8 +19,11 @@ from actuator_lti.design.checks_plant import (
 from actuator_lti.design.fields import (
     ALL_FIELDS,
     FIELDS,
+    RECORDS,
+    SECTIONS,
     Field,
     Structure,
+    at_place,
     fields_in,
     part_at,
     parts_of,
@@ -39,6 +42,7 @@ def check_design(design: Design, where: str) -> None:
 
     The InputError names all at once: key, value and what is allowed.
     """
+    _refuse(misplaced(design), where)
     _refuse(out_of_range(design), where)  # the relations ask for numbers that are some
     check_relations(design, where)
 
@@ -52,6 +56,24 @@ def _refuse(refusals: Iterable[Refusal], where: str) -> None:
     findings = Findings(where)
     findings.extend(refusals)
     findings.refuse()
+
+
+def misplaced(design: Design) -> Iterator[Refusal]:
+    """Of a design made in Python: parts that are of another kind than what has to stand there."""
+    wrong = set[str]()
+    for section in (*SECTIONS, *RECORDS):
+        if section.parent in wrong:
+            wrong.add(section.path)
+            continue
+        part, kind = at_place(design, section.place), section.kind.__name__
+        absent = at_place(design, section.place.rpartition(".")[0]) is None if section.parent else False
+        if absent or (part is None and section.optional and not section.many):
+            continue
+        several = part if isinstance(part, tuple | list) else (None,)
+        if not all(isinstance(one, section.kind) for one in (several if section.many else (part,))):
+            wrong.add(section.path)
+            allowed = f"a tuple of {kind}" if section.many else f"{kind}{' or None' * section.optional}"
+            yield section.path, shown(part), f"allowed: {allowed}"
 
 
 def out_of_range(design: Design) -> Iterator[Refusal]:

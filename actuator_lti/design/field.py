@@ -126,8 +126,14 @@ class Field:
 
     def fits(self, value: Any) -> bool:
         """Whether an attribute of this key may have a value; any text and truth may stand for one."""
-        if isinstance(value, tuple | list):
-            return self.kind in ("quantities", "matrix", "names") and all(map(self.fits, value))
+        listed = self.kind in ("quantities", "matrix", "names")
+        if listed or isinstance(value, tuple | list):
+            return listed and isinstance(value, tuple | list) and all(map(self._fits_one, value))
+        return self._fits_one(value)
+
+    def _fits_one(self, value: Any) -> bool:
+        if isinstance(value, tuple | list):  # a row of a matrix
+            return all(map(self._fits_one, value))
         if self.kind in ("choice", "names"):
             return value in self.choices
         if self.kind in ("quantity", "integer", "quantities", "matrix"):

@@ -3,14 +3,16 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import log, nan, pi, sqrt
+from typing import Any
 
 import numpy as np
 import pytest
 
-from actuator_lti.design import check_design, design_tree, load_design, read_design_text, write_design
+from actuator_lti.design import check_design, design_tree, load_design, model, read_design_text, write_design
 from actuator_lti.design.access import stacked
+from actuator_lti.design.checks import misplaced
 from actuator_lti.design.checks_control import TRACKING_LIMIT
-from actuator_lti.design.fields import FIELDS, part_at, template_of, with_part
+from actuator_lti.design.fields import FIELDS, RECORDS, SECTIONS, at_place, part_at, template_of, with_part
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
@@ -220,6 +222,33 @@ def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(
     assert str(made.value).startswith(f"drive: {key} = ")
     if value == value:  # of nan the file says more
         assert str(made.value).rpartition("allowed: ")[2] == str(read.value).rpartition("allowed: ")[2]
+
+
+def _with(design: Any, place: str, part: object) -> Any:
+    """A design with something else at a dotted place."""
+    name, _, rest = place.partition(".")
+    return replace(design, **{name: _with(getattr(design, name), rest, part) if rest else part})
+
+
+@pytest.mark.parametrize("part", [None, 1e30, "x", (3.0,)])
+def test_a_part_of_another_kind_is_refused_by_name(part: object) -> None:
+    """At every place of a design, an own law's too; None only where a drive may be without it."""
+    law = model.Law(
+        inputs=("error",), continuous=model.StateSpace(A=((-1.0,),), B=((1.0,),), C=((1.0,),), D=((0.0,),))
+    )
+    design = _with(AMBER, "controller.velocity.law", law)
+    for section in (*SECTIONS, *RECORDS):
+        if "." in section.place and at_place(design, section.place.rpartition(".")[0]) is None:
+            continue
+        wrong = _with(design, section.place, part)
+        if part is None and section.optional:
+            assert not [*misplaced(wrong)]
+        else:
+            assert [path for path, *_ in misplaced(wrong)] == [section.path]
+            with pytest.raises(
+                InputError, match=rf"^drive: {section.path} = .*allowed: .*{section.kind.__name__}"
+            ):
+                check_design(wrong, "drive")
 
 
 def test_an_axis_that_is_none_is_refused_before_its_units_are_asked_and_a_linear_one_has_masses() -> None:
