@@ -28,9 +28,9 @@ def judged(
         otherwise = "No design is written, as a check fails; --accept writes it all the same"
         first.append(doc.remark(said if found.accepted else otherwise))
     if wrong := [item for item in found.items if item.passed is False]:
-        why = f": {wrong[0].reason}" if wrong[0].reason else ""
-        more = f" ({len(wrong) - 1} more of {len(found.items)} checks fail)" if len(wrong) > 1 else ""
-        result = f"{wrong[0].label} fails{why}{more}. {result}"
+        why = f" ({wrong[0].reason})" if wrong[0].reason else ""
+        more = f"; {len(wrong) - 1} more of {len(found.items)} checks fail" if len(wrong) > 1 else ""
+        result = f"Not met: {wrong[0].label}{why}{more}. {result}"
     return doc.section(id, title, [*first, *blocks], result=result, intro=intro, status=status)
 
 

@@ -111,7 +111,7 @@ def _limits(dice: Dice, motor: model.Motor, control: model.Controller) -> model.
     """Tight, loose, or hardly any."""
     volts = dice.decades(3.0, 600.0)
     short, fastest = volts / motor.resistance_ohm, volts / motor.back_emf_constant_Vs_rad
-    speed = fastest * dice.rng.uniform(0.2, 1.5) if control.velocity and dice.chance(0.7) else inf
+    speed = fastest * dice.rng.uniform(0.2, 1.0) if control.velocity and dice.chance(0.7) else inf
     limits = {"voltage_V": volts, "speed_rad_s": speed}
     if control.velocity is not None and dice.chance(0.3):
         limits["acceleration_rad_s2"] = fastest * control.position_loop.gain * dice.decades(0.3, 30.0)
