@@ -37,6 +37,9 @@ KEYS = (
     "friction.viscous",
     "control.computing_delay",
 )
+NEVER_ZERO = KEYS[:3]
+"""Inertias and a stiffness are above 0: a response that leaves 0 in the interval of one does not tell it."""
+TOO_WIDE = "its standard error is larger than the design's value", "its 95 % interval holds 0"
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
@@ -120,7 +123,7 @@ def identify_response(
     design : Design
         Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
         response does not determine (a standard error above the design's value, and above a quarter of what
-        it is off) is kept too, and said.
+        it is off; a 95 % interval of an inertia or a stiffness that holds 0) is kept too, and said.
     source : path or control.FrequencyResponseData
         See `actuator_lti.files.response.read_response`.
     loop : str, optional
@@ -339,18 +342,20 @@ def _determined(
             begin, factors = _from(start, values, left), STARTS[:1]
             continue
         size = np.linalg.norm(found.slopes, axis=0)
-        unit = found.slopes / size
+        spread = np.linalg.inv(np.linalg.qr(found.slopes / size, mode="r")) / size[:, None]
         freedom = len(found.rest) - len(size)
         variance = float(found.rest @ found.rest) / freedom
         student = float(stdtrit(freedom, 0.975)) / COVERAGE
         scale = max(variance, 1.0) if known else variance * student**2
-        covariance = np.asarray(scale * (np.linalg.inv(unit.T @ unit) / np.outer(size, size)))
+        covariance = np.asarray(scale * spread @ spread.T)
         std, own = np.sqrt(np.diag(covariance)), np.array([parameter_value(start, name) for name in names])
         share = std / np.maximum(np.maximum(np.abs(own), np.abs(found.values - own) / SURE), 1e-300)
+        never = np.isin(names, NEVER_ZERO)
+        share[never] = np.maximum(share, COVERAGE * std / np.maximum(found.values, 1e-300))[never]
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
             break
-        left[names[worst]] = "its standard error is larger than the design's value"
+        left[names[worst]] = TOO_WIDE[bool(never[worst])]
         begin, factors = _from(start, values, left), STARTS[:1]
     else:
         raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
