@@ -114,9 +114,10 @@ _WORDS: dict[str, dict[str, str]] = {
         "imbalance unbalance": "the table [load.gravity]",
         "self_locking": 'path = "self-locking"',
     },
+    ".gravity": {"m": "mass", "l length radius": "arm", "angle phase": "offset, 0 upright"},
     "friction": {
         "no_load_starting_torque starting_torque": "dry_torque, with breakaway_ratio",
-        "c0 co static_friction coulomb_friction friction_torque": "dry_torque",
+        "c0 co dry coulomb static_friction coulomb_friction friction_torque": "dry_torque",
         "cv viscous_friction damping": "viscous",
     },
     "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
@@ -199,7 +200,7 @@ def key_for(table: str, word: str, known: Iterable[str] = ()) -> str:
     first, *rest = re.split(r"[.\[]", table)
     plain = _AFTER.sub("", re.sub(r"[- ()]+", "_", word.lower()).strip("_"))
     tables = (f"{first}.",) if first == "control" and rest else (first, f"{first}.")
-    tables = (".law",) if "law" in rest else (".filter", *tables) if "filter" in rest else tables
+    tables = (".law",) if "law" in rest else (*(f".{one}" for one in rest), *tables)
     own = {key: key for key in known}
     words = plain.split("_")
     ends = ("_".join(words[k:]) for k in range(len(words)))

@@ -22,7 +22,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     """
     design = as_design(design)
     checks = (
-        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _cogging, _asked_for,
+        _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _angles, _asked_for,
         _pedigree, _encoder, elastic_warnings,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
@@ -129,10 +129,15 @@ def _unseen(design: Design) -> Iterator[str]:
             yield f"{sensor}.counts_per_rev: acts on nothing, {why}"
 
 
-def _cogging(design: Design) -> Iterator[str]:
-    if design.motor.cogging_Nm != 0.0 and "motor.cogging_phase" not in design.parameters:
+def _angles(design: Design) -> Iterator[str]:
+    """Angles that decide the sign of a stiffness, and are not said."""
+    said = design.parameters
+    if design.motor.cogging_Nm != 0.0 and "motor.cogging_phase" not in said:
         drives = "at angle 0 cogging drives the motor away; 180 deg: it holds"
         yield f"motor.cogging_phase: not given, 0 assumed: {drives}"
+    if design.load.gravity is not None and "load.gravity.offset" not in said:
+        drives = "at angle 0 the mass stands upright, and gravity drives it away; 180 deg: it hangs"
+        yield f"load.gravity.offset: not given, 0 assumed: {drives}"
 
 
 def _gears(design: Design) -> Iterator[str]:

@@ -536,6 +536,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
     ('"142 g*cm^2"', '"142 ± 7.1 gcm²"', 'write "142 gcm²"; "± 7.1 gcm²" is one for tolerance = "5 %"'),
     ('"0.299 ohm"', '"0.299 Ω @25°C"', 'write "0.299 Ω"; "@25°C" is one for temperature.reference'),
     ("voltage = ", "dc_bus = ", "(it is voltage)"),
+    ("[limits]", '[load.gravity]\nm = "1 kg"\nradius = "1 m"\n[limits]', "(it is mass)", "(it is arm)"),
     ("[limits]\n", f"{BRAKE}[limits]\nrated_", "at least limits.voltage = 48 V", "(it is voltage)"),
     ('computing_delay = "0 s"', 'computing_delay = "0.5 samples"', "; here 5e-05 s"),
     (

@@ -32,6 +32,9 @@ def peak(ampere: str) -> dict[str, Any]:
     return {"limits.peak_current": ampere, "control.current.gain": "9 V/A"}
 
 
+HANGS = {"load.gravity.mass": "1 kg", "load.gravity.arm": "0.1 m"}
+
+
 CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("ilr33-amber", {"control.velocity.integral_time": 5e-5}, "\ncontrol.velocity.integral_time", True),
     ("ilr33-amber", {"control.computing_delay": 3e-4}, "\ncontrol.computing_delay", True),
@@ -46,6 +49,8 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("joint", {"encoder.counts_per_rev": 4096, "output_encoder.counts_per_rev": 4096}, "acts on", False),
     ("joint", COGGING, "\nmotor.cogging_phase: not given, 0 assumed", True),
     ("joint", {**COGGING, "motor.cogging_phase": 0.0}, "\nmotor.cogging_phase", False),
+    ("first", HANGS, "\nload.gravity.offset: not given, 0 assumed: at angle 0 the mass stands upright", True),
+    ("first", {**HANGS, "load.gravity.offset": "180 deg"}, "load.gravity.offset: not", False),
     (
         "ilr33-amber",
         {"motor.resistance": {"value": "50 mohm", "grade": "Z"}},
