@@ -38,8 +38,8 @@ KEYS = (
     "control.computing_delay",
 )
 NEVER_ZERO = KEYS[:3]
-"""Inertias and a stiffness are above 0: a response that leaves 0 in the interval of one does not tell it."""
-TOO_WIDE = "its standard error is larger than the design's value", "its 95 % interval holds 0"
+"""Inertias and a stiffness are above 0: where noise may explain one, the response does not tell it."""
+TOO_WIDE = "its standard error is larger than the design's value", "it is less than 4 standard errors from 0"
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
@@ -123,7 +123,7 @@ def identify_response(
     design : Design
         Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
         response does not determine (a standard error above the design's value, and above a quarter of what
-        it is off; a 95 % interval of an inertia or a stiffness that holds 0) is kept too, and said.
+        it is off; of an inertia or a stiffness one above a quarter of what was found) is kept too, and said.
     source : path or control.FrequencyResponseData
         See `actuator_lti.files.response.read_response`.
     loop : str, optional
@@ -351,7 +351,7 @@ def _determined(
         std, own = np.sqrt(np.diag(covariance)), np.array([parameter_value(start, name) for name in names])
         share = std / np.maximum(np.maximum(np.abs(own), np.abs(found.values - own) / SURE), 1e-300)
         never = np.isin(names, NEVER_ZERO)
-        share[never] = np.maximum(share, COVERAGE * std / np.maximum(found.values, 1e-300))[never]
+        share[never] = np.maximum(share, SURE * std / np.maximum(found.values, RESOLVED * own))[never]
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
             break
