@@ -108,17 +108,16 @@ def test_counts_and_rates_are_integers(unit: Path) -> None:
 
 
 def test_keys_that_contradict_each_other_are_refused_as_in_a_design_file(unit: Path) -> None:
-    """limits.speed <= U/kE, kE within 10 % of kM, at the end of initialization and later."""
-    design = load_design("ilr33-amber")
-    top = 12.0 / parameter_value(design, "motor.back_emf_constant")
+    """Position updates at every so many of the velocity's; kE within 10 % of kM; at first and later."""
+    design, odd = load_design("ilr33-amber"), {"control.velocity.every": 2, "control.position.every": 3}
     with hosted(unit) as (host,):
-        host.put({"limits.speed": 1.1 * top})
+        host.put(odd, "Integer")
         with pytest.raises(Refused):
             host.start()
         with pytest.raises(InputError) as python:
-            with_values(design, {"limits.speed": 1.1 * top})
+            with_values(design, odd)
         assert host.said[-1] == f"logStatusError: {python.value.message}"
-        host.put({"limits.speed": 0.5 * top})
+        host.put({"control.velocity.every": 1, "control.position.every": 1}, "Integer")
         host.unit.exitInitializationMode()
         host.step(0.0, 2.5 * PERIOD)
         kM = parameter_value(design, "motor.torque_constant")
