@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flint import acb, acb_poly, arb, ctx, fmpq, fmpz_poly
+from flint import acb, acb_poly, arb, ctx, fmpq, fmpz, fmpz_poly
 
 from actuator_lti.margins.distances import MODULUS
 from actuator_lti.margins.exact import real_roots
@@ -88,3 +88,15 @@ def test_smallest_distance_of_many_states(seed: int) -> None:
         seen = [float(abs(1 + acb_poly(N)(s) / acb_poly(D)(s)).mid()) for s in points]
     assert min(seen) == pytest.approx(value, rel=1e-9)
     assert min(seen) >= value * (1.0 - 1e-12)
+
+
+def test_three_roots_in_one_place_are_told_apart() -> None:
+    """(x - 1)((2^500 (x - 1))^2 - 2) has 1 and 1 +- sqrt(2)/2^500; far from them 2^-1100."""
+    beside = fmpz_poly([-1, 1]) * (fmpz_poly([-(2**500), 2**500]) ** 2 - 2)
+    p = beside * fmpz_poly([-1, 2**1100])
+    with ctx.workprec(600):
+        one, off = arb(1), arb(2).sqrt() / fmpz(2) ** 500
+        for found in (positive_roots(p), [(root.real, times) for root, times in all_roots(p)]):
+            assert [times for _, times in found] == [1] * 4
+            for wanted in (one - off, one, one + off, arb((1, -1100))):
+                assert sum(bool(root.overlaps(wanted)) for root, _ in found) == 1

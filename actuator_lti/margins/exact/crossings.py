@@ -11,8 +11,8 @@ from actuator_lti.errors import NumericalError
 from actuator_lti.margins.assemble import Crossing
 from actuator_lti.margins.distances import Distance
 from actuator_lti.margins.exact.loop import ExactLoop
-from actuator_lti.margins.exact.real_roots import EVERYWHERE, FEW, Spans, octaves, positive_roots
-from actuator_lti.margins.exact.roots import Split, all_roots, at_enough_bits, free_of, split
+from actuator_lti.margins.exact.real_roots import EVERYWHERE, Spans, octaves, positive_roots
+from actuator_lti.margins.exact.roots import FEW, Split, all_roots, at_enough_bits, free_of, split
 from actuator_lti.margins.trust import TOUCH
 
 _FIRST_BITS = 96

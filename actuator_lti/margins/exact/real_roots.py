@@ -15,9 +15,8 @@ from typing import Any
 from flint import arb, arb_poly, ctx, fmpz, fmpz_poly
 
 from actuator_lti.errors import NumericalError
-from actuator_lti.margins.exact.roots import all_roots
+from actuator_lti.margins.exact.roots import FEW, all_roots, is_crowded
 
-FEW = 16  # degree up to which all roots at once take less time
 _MOST_BITS = 1 << 15
 _PLACE = 40503  # over 2^16: intervals end at no number that a root is likely to be
 _SHIFT = fmpz_poly([1, 1])
@@ -35,7 +34,7 @@ def positive_roots(p: fmpz_poly, spans: Spans = EVERYWHERE) -> list[tuple[arb, i
 
     All that lie in some spans of the logarithm to base 2, and maybe some beside them.
     """
-    isolated = None if p.degree() <= FEW else _places(tuple(p.coeffs()), spans)
+    isolated = None if p.degree() <= FEW and not is_crowded(p) else _places(tuple(p.coeffs()), spans)
     if isolated is None:
         real = [(root.real, times) for root, times in all_roots(p) if root.imag.is_zero() and root.real > 0]
         return sorted(real, key=lambda root: float(root[0].mid()))

@@ -11,6 +11,8 @@ from flint import acb, arb, arb_poly, ctx, fmpq_poly, fmpz_poly
 from actuator_lti.errors import NumericalError
 
 _MOST_BITS = 1 << 15
+_MANY_BITS = 2000  # of coefficients: of a usual loop of four states 500
+FEW = 16  # degree up to which all roots at once take less time
 _SQUARE = fmpz_poly([0, 0, -1])  # v = -s^2
 V = fmpz_poly([0, 1])
 Polynomial = TypeVar("Polynomial", fmpz_poly, fmpq_poly)
@@ -58,12 +60,19 @@ def all_roots(p: fmpz_poly) -> list[tuple[acb, int]]:
     return list(_isolated(tuple((p // p.content()).coeffs()), ctx.prec))
 
 
+def is_crowded(p: fmpz_poly) -> bool:
+    """Whether some roots may be so near each other that all of them at once would take minutes."""
+    return bool(p.height_bits() > _MANY_BITS)
+
+
 @lru_cache(maxsize=32)
 def _isolated(coefficients: tuple[Any, ...], bits: int) -> list[tuple[acb, int]]:
     """Margins and peaks of one loop ask for the same roots, which take seconds of a hundred states."""
     with ctx.workprec(bits):
-        result: Any = fmpz_poly(list(coefficients)).complex_roots()
-        return [(acb(root), times) for root, times in result]
+        p = fmpz_poly(list(coefficients))
+        factors: Any = p.factor()[1] if is_crowded(p) and p.degree() <= FEW else [(p, 1)]
+        found = ((root, times * own) for q, times in factors for root, own in q.complex_roots())
+        return [(acb(root), times) for root, times in found]
 
 
 @dataclass(frozen=True)
