@@ -97,7 +97,8 @@ def own_start(design: Design, bias: OperatingMotion, wanted: float) -> OwnStart:
     ])  # fmt: skip
     left = wanted - gain * (D @ e0) - per_speed * bias.speed_rad_s
     right = np.concatenate([B @ e1, [-gain * (D @ e1)], B @ e0, [left]])
-    scale = np.maximum(np.abs(table).max(axis=1), np.finfo(float).tiny)
+    scale = np.abs(table).max(axis=1)
+    scale[scale < np.finfo(float).tiny] = 1.0  # of what nothing moves: what is wanted of it stays
     table, right = table / scale[:, None], right / scale
     found = np.linalg.lstsq(table, right, rcond=None)[0]
     size = np.abs(table) @ np.abs(found) + np.abs(right)
