@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import DC_PER_A
 
 _OTHER = r"\bA\b(?! ?(?:dc|rms|pe?a?k|phase)|\()"
 _BEFORE = r"(?:(?<=\d )|(?<=[Nm]/))"  # a number or a torque per
 _WHERE = {"unit": "", "label": "(?<=, )", **dict.fromkeys(("result", "text", "reason", "note"), _BEFORE)}
-_SHEETS = {"rms-line": "1 A rms is 1.225 A dc.", "peak-phase": "1 A peak of a phase is 0.8660 A dc."}
+_SHEETS = {"rms-line": "rms", "peak-phase": "peak of a phase"}
 _WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
 
 
@@ -28,8 +29,9 @@ def in_amperes(value: Any, design: Design | None, key: str = "") -> Any:
         return _WORDS[key].sub("A dc", value) if key in _WORDS else value
     if isinstance(value, Mapping):
         made = {name: in_amperes(one, design, name) for name, one in value.items()}
-        table = made.get("kind") == "table" and made != value
-        return (
-            {**made, "note": f"{made['note']} {_SHEETS[design.motor.constants]}".strip()} if table else made
-        )
+        if made.get("kind") == "table" and made != value:
+            constants = design.motor.constants
+            same = f"1 A {_SHEETS[constants]} is {DC_PER_A[constants]:#.4g} A dc."
+            made["note"] = f"{made['note']} {same}".strip()
+        return made
     return [in_amperes(one, design, key) for one in value] if isinstance(value, list | tuple) else value

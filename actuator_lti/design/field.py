@@ -127,9 +127,7 @@ class Field:
     def fits(self, value: Any) -> bool:
         """Whether an attribute of this key may have a value; any text and truth may stand for one."""
         listed = self.kind in ("quantities", "matrix", "names")
-        if listed or isinstance(value, tuple | list):
-            return listed and isinstance(value, tuple | list) and all(map(self._fits_one, value))
-        return self._fits_one(value)
+        return listed == isinstance(value, tuple | list) and self._fits_one(value)
 
     def _fits_one(self, value: Any) -> bool:
         if isinstance(value, tuple | list):  # a row of a matrix

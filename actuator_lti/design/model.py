@@ -45,6 +45,7 @@ from actuator_lti.design.control import (
 from actuator_lti.design.field import Axis, choice, label, text
 from actuator_lti.design.law import Law, StateSpace
 from actuator_lti.design.plant import (
+    DC_PER_A,
     Coupling,
     Friction,
     FrictionPoint,
@@ -279,8 +280,8 @@ class Design:
 # factors on kM, on kE, and on R and L, from the data sheet to the equivalent DC motor
 _EQUIVALENT: dict[MotorConstants, tuple[float, float, float]] = {
     "dc": (1.0, 1.0, 1.0),
-    "rms-line": (1.0 / sqrt(1.5), sqrt(2.0), 1.0),
-    "peak-phase": (2.0 / sqrt(3.0), sqrt(3.0), 2.0),
+    "rms-line": (1.0 / DC_PER_A["rms-line"], sqrt(2.0), 1.0),
+    "peak-phase": (1.0 / DC_PER_A["peak-phase"], sqrt(3.0), 2.0),
 }
 
 

@@ -1,7 +1,7 @@
 """The plant of a drive as data (units: `actuator_lti.design.model`), and the keys of the file."""
 
 from dataclasses import dataclass, replace
-from math import inf, pi
+from math import inf, pi, sqrt
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
@@ -18,6 +18,8 @@ FrictionLaw = Literal["coulomb", "tanh"]
 LoadPath = Literal["self-locking", "back-drivable"]
 Direction = Literal["both", "forward", "reverse"]
 MotorConstants = Literal["dc", "rms-line", "peak-phase"]
+DC_PER_A: dict[MotorConstants, float] = {"dc": 1.0, "rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0}
+"""Current of the equivalent DC motor per ampere of a data sheet (docs/model.md, section 1)."""
 STANDARD_GRAVITY_m_s2 = 9.80665
 
 

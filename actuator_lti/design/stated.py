@@ -8,7 +8,7 @@ from typing import Any
 
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.fields import FIELDS
-from actuator_lti.design.plant import MotorConstants
+from actuator_lti.design.plant import DC_PER_A, MotorConstants
 from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.units import AdvisedError, ampere_unit, parse_limit, parse_quantity
 from actuator_lti.errors import InputError
@@ -21,7 +21,7 @@ _RANGE = re.compile(r"(?<=[0-9]) *(?:[-–]|to) *(?=[0-9])")
 _PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
 _PER_TRAVEL = re.compile(r"/ *\(?[kcmnuµ]?m\b")  # of a linear encoder
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
-_DC_PER = {"rms-line": sqrt(1.5), "peak-phase": sqrt(3.0) / 2.0, "dc": 1.0}  # section 1 of model.md
+_OF_AMPERE: dict[str, MotorConstants] = {"rms": "rms-line", "eff": "rms-line", "dc": "dc"}
 PHASE = "V/A phase"
 _UPSIDE_DOWN = {
     "motor.back_emf_constant": (1.0, "{angle}/(V*s)"),  # "83.4 rpm/V"
@@ -107,7 +107,7 @@ class Frame:
             if not unit.startswith("V/A"):
                 raise InputError(f"allowed: a phase only in {PHASE}, a gain of volts over amperes")
             return 2.0  # R and L line-line are twice those of a phase
-        given = {"rms": "rms-line", "eff": "rms-line", "dc": "dc"}.get(convention, "peak-phase")
+        given = _OF_AMPERE.get(convention, "peak-phase")
         if self.constants == "dc":
             phase = ", where R and L are per phase" * (given == "peak-phase")
             plain = "where the sheet's R, L, kM and kE are line-line and in these amperes: A"
@@ -121,7 +121,7 @@ class Frame:
         if not (own or power):
             raise InputError(f"allowed: a number with a unit like {unit}, as the model has it")
         volts = sqrt(2.0) if not own and said.get("V") in ("rms", "eff") else 1.0
-        return volts * float((_DC_PER[given] / (_DC_PER[self.constants] if own else 1.0)) ** power)
+        return volts * float((DC_PER_A[given] / (DC_PER_A[self.constants] if own else 1.0)) ** power)
 
     def other_axis(self, raw: Any, field: Field) -> str:
         """That the unit of a refused value would be one of the other kind of axis."""

@@ -12,6 +12,7 @@ from scipy.stats import chi2
 from actuator_lti.design import parameter_value
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.model import Design
+from actuator_lti.design.plant import DC_PER_A, MotorConstants
 from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -217,8 +218,9 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())
     if len(each) == 1 and sum(map(len, each.values())) == len(fit.names):
         words = f"{next(iter(each))} of every value"
-    read = "peak read as DC: 1.15" if design.motor.constants == "peak-phase" else "rms read as DC: 0.82"
-    scale = f", nor the scale of the current ({read} times)" * (name == "torque_constant")
+    constants: MotorConstants = "peak-phase" if design.motor.constants == "peak-phase" else "rms-line"
+    read = f"{constants.partition('-')[0]} read as DC: {1.0 / DC_PER_A[constants]:.2f} times"
+    scale = f", nor the scale of the current ({read})" * (name == "torque_constant")
     value = parameter_value(design, parameter(name).key)
     reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
     moves = {n: -part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}

@@ -39,7 +39,6 @@ KEYS = (
 )
 NEVER_ZERO = KEYS[:3]
 """Inertias and a stiffness are above 0: where noise may explain one, the response does not tell it."""
-TOO_WIDE = "its standard error is larger than the design's value", "it is less than 4 standard errors from 0"
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
 LEVEL = 1e-3
 """Probability with which noise of the stated size alone fails a response."""
@@ -355,7 +354,9 @@ def _determined(
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
             break
-        left[names[worst]] = TOO_WIDE[bool(never[worst])]
+        near = never[worst] and SURE * std[worst] > found.values[worst]
+        more = f"it is less than {SURE:g} standard errors from 0"
+        left[names[worst]] = more if near else "its standard error is larger than the design's value"
         begin, factors = _from(start, values, left), STARTS[:1]
     else:
         raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Annotated, Literal
 
+from actuator_lti.design.plant import DC_PER_A
 from actuator_lti.design.units import compatible, parse_unit
 from actuator_lti.errors import InputError
 from analyses.records.naming import KNOWN_UNITS
@@ -16,7 +17,7 @@ Missing = Literal["error", "drop", "interpolate"]
 
 MISSING_TEXTS = ("", "nan", "NaN", "NAN", "na", "NA", "N/A", "null", "NULL", "-")
 AC_FORMS = {
-    "A": {"dc": 1.0, "rms": 1.5**0.5, "peak": 0.75**0.5},
+    "A": {"dc": 1.0, "rms": DC_PER_A["rms-line"], "peak": DC_PER_A["peak-phase"]},
     "V": {"dc": 1.0, "rms": 2.0**0.5, "peak": 1.0},
 }
 """Factors to the equivalent DC motor (`Design.effective_motor`): i from a line current, u from line-line."""

@@ -82,12 +82,7 @@ CASES: list[tuple[str, dict[str, Any], str, bool]] = [
     ("first", peak("2.03 A"), "at stall", False),
     # U/kE is 12 V over 5.9 mV s/rad
     ("ilr33-amber", {"limits.speed": "2033 rad/s"}, "limits.speed", False),
-    (
-        "ilr33-amber",
-        {"limits.speed": "2034 rad/s"},
-        "2034 rad/s, but the supply reaches only",
-        True,
-    ),
+    ("ilr33-amber", {"limits.speed": "2034 rad/s"}, "2034 rad/s, but the supply reaches only", True),
     # a current loop short at rest by 1/(1 + gain/R), R 5.9 ohm, from a tenth on
     ("first", {"control.current.gain": "2 V/A"}, "74.7 % short at rest", True),
     ("first", {"control.current.gain": "53 V/A"}, " % short at rest", True),

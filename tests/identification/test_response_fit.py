@@ -130,10 +130,8 @@ def test_a_response_far_below_the_resonance_does_not_tell_the_spring(of: str, se
     Rotor and load turn as one, so that either the division or the sum alone is in the response; a fit of all
     ends anywhere along the valley, 2000 of its small standard errors away.
     """
-    hertz, noise = (
-        np.geomspace(0.1, 6.0, 30),
-        np.random.default_rng(seed).standard_normal((2, 30)) / np.sqrt(2.0),
-    )
+    hertz = np.geomspace(0.1, 6.0, 30)
+    noise = np.random.default_rng(seed).standard_normal((2, 30)) / np.sqrt(2.0)
     loop = open_loop(hertz)
     seen = loop if of == "L" else loop / (1.0 + loop)
     file = _written(tmp_path, hertz, seen * (1.0 + 0.03 * (noise[0] + 1j * noise[1])), 0.03)
