@@ -122,7 +122,7 @@ def identify_response(
     design : Design
         Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
         response does not determine (a standard error above the design's value, and above a quarter of what
-        it is off; of an inertia or a stiffness one above a quarter of what was found) is kept too, and said.
+        it is off; of a stiffness, or of one of several inertias, above a quarter of what was found) is kept.
     source : path or control.FrequencyResponseData
         See `actuator_lti.files.response.read_response`.
     loop : str, optional
@@ -350,6 +350,8 @@ def _determined(
         std, own = np.sqrt(np.diag(covariance)), np.array([parameter_value(start, name) for name in names])
         share = std / np.maximum(np.maximum(np.abs(own), np.abs(found.values - own) / SURE), 1e-300)
         never = np.isin(names, NEVER_ZERO)
+        if never.sum() == 1:  # an inertia that is left alone has no other that makes up for it
+            never &= np.array(names) == "coupling.stiffness"
         share[never] = np.maximum(share, SURE * std / np.maximum(found.values, RESOLVED * own))[never]
         worst = int(np.argmax(share))
         if share[worst] <= 1.0:
