@@ -14,7 +14,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.driving import (
     LOADS,
@@ -85,7 +85,7 @@ def correlate_record(
     record: Record,
     *,
     command: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 
@@ -177,7 +177,7 @@ def model_signals(
     record: Record,
     measured: Mapping[str, Floats],
     notes: list[str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     command: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, float]]:
