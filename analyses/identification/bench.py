@@ -80,10 +80,8 @@ def identify_bench(
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
 
-    Raises
-    ------
-    InputError
-        If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
+    Raises `InputError`: if a record lacks a signal, a key cannot be fixed, or no design can be made of the
+    result.
     """
     settings = Settings() if settings is None else settings
     limit = settings.residual_limit / 100.0

@@ -74,20 +74,11 @@ def identify_campaign(
 ) -> CampaignResult:
     """Identify C0, Cv and CM (paper, section 3) from imported runs.
 
-    Parameters
-    ----------
-    imported : ImportedCampaign
-    design : Design
-        Its torque constant makes torques of currents.
-    richer : bool
-        Whether to ask, by cross-validation, for a richer law.
-    fixed : mapping, optional
-        Coefficients (C0, Cv, CM) that are held at a value.
+    The design's torque constant makes torques of currents; ``richer``: whether to ask, by cross-validation,
+    for a richer law; ``fixed``: coefficients (C0, Cv, CM) that are held at a value.
 
-    Raises
-    ------
-    InputError
-        Without a torque constant, or with too few usable runs; the reasons of those set aside are told.
+    Raises `InputError`: without a torque constant, or with too few usable runs; the reasons of those set
+    aside are told.
     """
     design = as_design(design)
     constant = design.effective_motor.torque_constant_Nm_A

@@ -42,10 +42,7 @@ class Motion:
 def motion(design: Design, asked: Asked, *, progress: Progress | None = None) -> Motion:
     """Simulate one motion, and write its rows where that is asked for.
 
-    Raises
-    ------
-    InputError
-        For a command that does not fit the run, or a load that would not act in it.
+    Raises `InputError`: for a command that does not fit the run, or a load that would not act in it.
     """
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
     duration = asked.duration

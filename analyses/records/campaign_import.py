@@ -99,10 +99,7 @@ def import_campaign(campaign: Campaign, *, progress: Progress | None = None) -> 
 
     A run whose file is missing, broken, or cannot be joined is set aside with its reason.
 
-    Raises
-    ------
-    InputError
-        If no run at all can be used.
+    Raises `InputError`: if no run at all can be used.
     """
     if not isinstance(campaign, Campaign):
         raise InputError(f"campaign = {shown(campaign)}: allowed: a Campaign, as load_campaign gives")

@@ -21,12 +21,7 @@ from nonlinear.rows import Rows
 def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
     """Rows of the drive's numbers, in the order of the power: mechanics first, command last.
 
-    Parameters
-    ----------
-    design : Design
-        What is simulated.
-    model : Design, optional
-        What is predicted; by default the same.
+    ``design`` is simulated, ``model`` (by default the same) predicted.
 
     Examples
     --------

@@ -54,27 +54,13 @@ def validate(
 ) -> Validation:
     """Check every prediction of a design by the nonlinear simulator.
 
-    Parameters
-    ----------
-    design : Design
-    settings : Settings, optional
-        Which findings are looked for beside the checks; by default all.
-    progress : callable, optional
-        Called with (parts done, parts in all).
-    model : Design, optional
-        The drive that predictions are made of, by default the same: a wrong one shows what a validation sees.
+    ``settings``: which findings are looked for beside the checks; by default all.
+    ``progress``: called with (parts done, parts in all).
+    ``model``: drive that predictions are made of, by default the same: a wrong one shows what a validation
+    sees.
 
-    Returns
-    -------
-    Validation
-        ``rows`` are the checks; ``verdict`` and ``passed`` sum them up with what the drive itself does.
-
-    Raises
-    ------
-    InputError
-        If the design cannot be tested (no steady motion: dry friction takes the whole current, say).
-    NumericalError
-        From the computations.
+    Raises `InputError`: if the design cannot be tested (no steady motion: dry friction takes the whole
+    current, say). Raises `NumericalError`: from the computations.
 
     Examples
     --------
