@@ -117,25 +117,14 @@ def compare(
 ) -> Comparison:
     """Compute every figure of every design of a study and what differs from the base.
 
-    Parameters
-    ----------
-    study : Study, or path of its file
-    validation : bool, optional
-        Whether every design is validated (quick settings); by default as the study says.
-    progress : callable, optional
-        Called with (steps done, steps in all).
-    engine : Engine, optional
-        Where to compute; in this process, one after the other, where left out.
-    folder : Path, optional
-        Where what is found of each design is kept as soon as it is there; a study that was stopped, or has
-        changed a little, goes on from it.
+    ``validation``: whether every design is validated (quick settings); by default as the study says.
+    ``progress``: called with (steps done, steps in all).
+    ``engine``: where to compute; in this process, one after the other, where left out.
+    ``folder``: where what is found of each design is kept as soon as it is there; a study that was stopped,
+    or has changed a little, goes on from it.
 
-    Raises
-    ------
-    InputError, NumericalError
-        From the base or a variant.
+    Raises `InputError`, `NumericalError`: from the base or a variant.
     """
-
     study = study if isinstance(study, Study) else load_study(as_path(study))
     origin = _design(study.base)
     plan = LargeSignal.plan(origin)

@@ -14,7 +14,7 @@ from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.correlation.driving import (
     LOADS,
@@ -85,29 +85,21 @@ def correlate_record(
     record: Record,
     *,
     command: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 
-    Parameters
-    ----------
-    design : Design
-    record : Record
-        Needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
-        axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
-        voltage. The outermost one that is recorded drives the model, whose loops outside it do not act. A
-        ``torque`` signal is the load torque at the output, ``supply`` the bus voltage (see `supply_of`).
-        Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
-        derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
-        voltage, force. The force of a drive with an ideal source is its gain times the voltage.
-    command : str, optional
-        The signal that drives the model instead; ``"voltage"`` is the measured voltage of the motor.
-    progress : callable, optional
+    The record needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
+    axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
+    voltage. The outermost one that is recorded drives the model, whose loops outside it do not act; or
+    ``command``, where ``"voltage"`` is the measured voltage of the motor. A ``torque`` signal is the load
+    torque at the output, ``supply`` the bus voltage (see `supply_of`).
 
-    Raises
-    ------
-    InputError
-        If the record holds no command, or nothing to compare.
+    Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
+    derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
+    voltage, force. The force of a drive with an ideal source is its gain times the voltage.
+
+    Raises `InputError`: if the record holds no command, or nothing to compare.
     """
     record = prepared(record)
     design = record.drive(as_design(design))
@@ -177,7 +169,7 @@ def model_signals(
     record: Record,
     measured: Mapping[str, Floats],
     notes: list[str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     command: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, float]]:

@@ -1,12 +1,13 @@
 """From bench records to a design that may be written: inputs, joint fit, refinement, verdicts."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Progress
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.identification import verdict
@@ -75,14 +76,12 @@ def identify_bench(
     *,
     validation: Sequence[Record] = (),
     settings: Settings | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
 
-    Raises
-    ------
-    InputError
-        If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
+    Raises `InputError`: if a record lacks a signal, a key cannot be fixed, or no design can be made of the
+    result.
     """
     settings = Settings() if settings is None else settings
     limit = settings.residual_limit / 100.0
@@ -157,7 +156,7 @@ def _made(
     both: Fit | None,
     settings: Settings,
     items: Sequence[verdict.Item],
-    progress: Callable[[int, int], None] | None,
+    progress: Progress | None,
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records

@@ -10,7 +10,7 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
@@ -77,7 +77,7 @@ def fit_output(
     paths: tuple[str, ...],
     output_of: Callable[[Design], Floats],
     measured: Floats,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
     *,
     step: float = STEP,
     iterations: int = ITERATIONS,
@@ -175,11 +175,7 @@ def output_name(design: Design, record: Record) -> str:
 
 
 def refine_records(
-    design: Design,
-    records: Sequence[Record],
-    paths: tuple[str, ...],
-    *,
-    progress: Callable[[int, int], None] | None = None,
+    design: Design, records: Sequence[Record], paths: tuple[str, ...], *, progress: Progress | None = None
 ) -> OutputErrorResult:
     """Refine values by simulating every record with its own command, load and supply.
 

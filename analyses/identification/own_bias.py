@@ -28,10 +28,7 @@ SETTLED = 0.1
 
 
 def without_bias(
-    start: Design,
-    make: Callable[[JointModel], Design],
-    model: JointModel,
-    records: Sequence[Record],
+    start: Design, make: Callable[[JointModel], Design], model: JointModel, records: Sequence[Record]
 ) -> JointModel:
     """The model less what the same fit finds too much in records simulated with the design that came of it.
 

@@ -20,9 +20,8 @@ class ResidualTest:
     """Correlation of a record's innovations with an input, or (``whiteness``) with themselves.
 
     The innovations are what an autoregressive noise model leaves of the residual; an input has passed the
-    same filter. Where they are white and independent, each
-    correlation has the standard deviation ``1/sqrt(n)``; ``bound`` is left at any of the ``lags`` (rows) with
-    a probability of 1 %.
+    same filter. Where they are white and independent, each correlation has the standard deviation
+    ``1/sqrt(n)``; ``bound`` is left at any of the ``lags`` (rows) with a probability of 1 %.
     """
 
     record: str
@@ -52,11 +51,8 @@ def residual_tests(model: JointModel) -> tuple[ResidualTest, ...]:
     """Whiteness of each record's residual, and independence of speed and acceleration.
 
     At lags up to a quarter of the rows, 100 at most. Source: L. Ljung, System Identification, 2nd ed.,
-    section 16.6; pre-whitening: L. D. Haugh, J. Am. Stat. Assoc. 71 (1976).
-
-    Notes
-    -----
-    Where the residual of the simulated record was taken off (`own_bias`), it is taken off here too.
+    section 16.6; pre-whitening: L. D. Haugh, J. Am. Stat. Assoc. 71 (1976). Where the residual of the
+    simulated record was taken off (`own_bias`), it is taken off here too.
     """
     return tuple(test for part in model.records for test in _of_record(part))
 

@@ -117,19 +117,11 @@ class LoopSurvey:
 def survey_loops(design: Design | str | PathLike[str], progress: Progress | None = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
-    All margins are certified, see `stability_margins`.
+    All margins are certified, see `stability_margins`. ``progress`` is called with (steps done, steps in
+    all).
 
-    Parameters
-    ----------
-    design : Design
-    progress : callable, optional
-        Called with (steps done, steps in all).
-
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
-        loops: what else fails is left out and noted.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
+    `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.
     """
 
     def step(done: int) -> None:

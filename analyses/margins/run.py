@@ -188,16 +188,14 @@ class Margins:
 def margins(design: Design, asked: Asked | None = None) -> Margins:
     """Find the certified margins of every loop and judge the requirements.
 
+    Raises `InputError`, `NumericalError`: where the loops cannot be assembled as asked, or the margins of one
+    not be found.
+
     Examples
     --------
     >>> from actuator_lti import load_design
     >>> str(margins(load_design("emps")).verdict)
     'met'
-
-    Raises
-    ------
-    InputError, NumericalError
-        Where the loops cannot be assembled as asked, or the margins of one not be found.
     """
     asked = asked or Asked()
     loops = assemble_loops(

@@ -1,6 +1,5 @@
 """Command and load of one motion, and the motion."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,6 +8,7 @@ import numpy as np
 from actuator_lti.bounds import TONES
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, whole_number
+from actuator_lti.types import Progress
 from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
 from analyses.motion.settling import Conduct, conduct
 from nonlinear import Trajectory, commands, loads, simulate
@@ -39,13 +39,10 @@ class Motion:
         return False if self.ended.status == "diverging" else None
 
 
-def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None) -> Motion:
+def motion(design: Design, asked: Asked, *, progress: Progress | None = None) -> Motion:
     """Simulate one motion, and write its rows where that is asked for.
 
-    Raises
-    ------
-    InputError
-        For a command that does not fit the run, or a load that would not act in it.
+    Raises `InputError`: for a command that does not fit the run, or a load that would not act in it.
     """
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
     duration = asked.duration

@@ -79,11 +79,8 @@ def join_records(
     together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
     second clock's zero.
 
-    Returns
-    -------
-    Record, ClockJoin
-        The first record with the second one's signals added (linear interpolation), cut to the time both
-        cover; and how it was done.
+    What comes back is the first record with the second one's signals added (linear interpolation), cut to the
+    time both cover; and how it was done.
     """
     if method == "given":
         if offset_s is None:

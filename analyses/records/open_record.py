@@ -70,10 +70,7 @@ def open_records(path: str | Path) -> list[Record]:
     A record file is TOML: ``docs/records.md`` says what it may hold. Several records stand in ``[[record]]``
     tables, each with what is its own beside what all share.
 
-    Raises
-    ------
-    InputError
-        Names the file and what is wrong, or how to describe it.
+    Raises `InputError`: names the file and what is wrong, or how to describe it.
     """
     path = as_path(path)
     suffix = path.suffix.lower()

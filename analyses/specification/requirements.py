@@ -31,16 +31,9 @@ def evaluate_requirements(
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 
-    Parameters
-    ----------
-    design : Design
-    figures : mapping of str to LoopFigures, optional
-        Of the sampled, sliding loops; computed where left out.
+    ``figures`` are those of the sampled, sliding loops, computed where left out.
 
-    Raises
-    ------
-    InputError
-        If a requirement names a quantity or a loop that is not known.
+    Raises `InputError`: if a requirement names a quantity or a loop that is not known.
     """
     design = as_design(design)
     if figures is None:

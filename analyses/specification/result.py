@@ -95,16 +95,9 @@ class Specification:
 def specification(design: Design | str | PathLike[str], loops: Loops | None = None) -> Specification:
     """Work out and simulate the figures at each load torque of the design.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
+    ``loops``: sampled and sliding, of this design, if they are there already.
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops

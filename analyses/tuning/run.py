@@ -55,15 +55,9 @@ def tune(
     all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
     say by how much it misses. What is returned is judged once more by certified margins.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Called with (stages done, stages in all).
+    ``progress`` is called with (stages done, stages in all).
 
-    Raises
-    ------
-    InputError
-        If there is no requirement on a loop, or an element has no place in the drive.
+    Raises `InputError`: if there is no requirement on a loop, or an element has no place in the drive.
     """
     design, settings = as_design(design), settings or TuningSettings()
     if not isinstance(settings, TuningSettings):

@@ -76,13 +76,10 @@ def limit_rows(pair: Pair) -> Iterator[Row]:
 
 def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
     """One tick in which a stage is asked for ``size`` times its gain; 0 for the command of the drive."""
-    if stage in ("velocity", "current"):
-        rows.step("w_ref" if stage == "velocity" else "i_ref", size, -1.0)
-    drive = rows.running()
-    if stage not in ("velocity", "current"):
-        drive.command(size)
-    drive.begin()
-    return drive
+    point = {"velocity": "w_ref", "current": "i_ref"}.get(stage)
+    if point is not None:
+        rows.step(point, size, -1.0)
+    return rows.running().begin(size if point is None else None)
 
 
 def _gain(design: Design, stage: str) -> float:
@@ -216,8 +213,7 @@ def _resolution(pair: Pair) -> Iterator[Row]:
     if current is None or current.law is not None or not (wanted and own):
         return
     rows = pair.rows(instruments=Instruments(current_resolution_A=own))
-    drive = rows.running()
-    drive.begin(CURRENT=1.6 * wanted)
+    drive = rows.running().begin(CURRENT=1.6 * wanted)
     gain = rows.value("current_gain") + rows.value("current_integral")
     yield pair.judged(
         "current_resolution", wanted, -0.5 * drive.value("VOLTAGE_BEFORE") / gain, "A", "1.6 steps"
