@@ -9,10 +9,8 @@ import numpy as np
 
 from actuator_lti.types import Floats
 
-COVERAGE = 1.959963984540054
-"""Standard errors of a normal value in half of its 95 % interval."""
-SAME = 1e-9
-"""Part of a correlation below which values are one."""
+COVERAGE = 1.959963984540054  # standard errors of a normal value in half of its 95 % interval
+SAME = 1e-9  # part of a correlation below which values are one
 
 
 @dataclass(frozen=True, kw_only=True)

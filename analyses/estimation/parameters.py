@@ -22,8 +22,7 @@ class Parameter:
     """Of the value in SI, to the unit in which it is shown."""
 
 
-UNSTATED = 0.05
-"""Relative standard deviation of a number of a design that states no tolerance."""
+UNSTATED = 0.05  # relative standard deviation of a number of a design that states no tolerance
 TORQUE, VISCOUS, INERTIA = "N m", "N m s/rad", "kg m²"
 ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N"}
 ON_A_LINE |= {"N m/A": "N/A", "N m/V": "N/V", "N m/rad": "N/m"}

@@ -24,16 +24,13 @@ from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, one_phase
 from analyses.records.record import Record
 
-NO_CHANCE = 1e-3
-"""Level at which the design's numbers as a whole are rejected, and one of them is."""
-EXPLAINED = 0.01
-"""Level above which a cause explains what is off."""
+NO_CHANCE = 1e-3  # level at which the design's numbers as a whole are rejected, and one of them is
+EXPLAINED = 0.01  # level above which a cause explains what is off
 LEAST_VALUES = 3
 ALIKE = 0.02
 """Relative standard deviation within which a cause has to explain: rough numbers of a design that are off
 alike by chance are no cause."""
-FEW = 2.0
-"""Least factor of a cause that only two values tell."""
+FEW = 2.0  # least factor of a cause that only two values tell
 
 TORQUES = dict.fromkeys(("inertia", "dry", "viscous", "load", "gravity"), 1.0)
 CAUSES: Mapping[str, Mapping[str, float]] = {

@@ -21,8 +21,7 @@ from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding, c
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 
-LEAST_RUN = 3
-"""Samples in a row at the largest or smallest value of all: a flat top."""
+LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01

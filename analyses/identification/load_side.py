@@ -12,10 +12,8 @@ from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
 from analyses.records.record import Record
 
-ROUNDS = 4
-"""Rounds in which the sign of the load's speed and its moment are found from the speed itself."""
-NOISE_SHARE = 0.1
-"""Largest share of the coupling's torque that noise of the output encoder may make."""
+ROUNDS = 4  # rounds in which the sign of the load's speed and its moment are found from the speed itself
+NOISE_SHARE = 0.1  # largest share of the coupling's torque that noise of the output encoder may make
 
 
 @dataclass(frozen=True, kw_only=True)

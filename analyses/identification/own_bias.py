@@ -23,8 +23,7 @@ from analyses.records.record import Record
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
-SETTLED = 0.1
-"""Standard errors within which a bias that was found again is the one that was found before."""
+SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
 def without_bias(

@@ -10,8 +10,7 @@ from scipy.stats import norm
 from actuator_lti.types import Floats, Ints
 from analyses.identification.joint_model import JointModel, RecordFit
 
-LEVEL = 0.01
-"""Probability with which chance alone leaves the bound at one lag or more."""
+LEVEL = 0.01  # probability with which chance alone leaves the bound at one lag or more
 MOST_LAGS = 100
 
 

@@ -17,8 +17,7 @@ from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel
 
 LEAST_CORRELATION = 0.005
-TRUNCATION_STD = 6.5
-"""Standard deviations that a normal distribution is sampled to."""
+TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to
 
 
 REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")

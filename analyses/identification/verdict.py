@@ -20,11 +20,9 @@ from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_o
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
-RESIDUAL_LIMIT = 0.20
-"""Largest relative residual that is taken without being told to."""
+RESIDUAL_LIMIT = 0.20  # largest relative residual that is taken without being told to
 LARGEST_FACTOR = 3.0
-MOST_DRY_UNLOADED = 2.0
-"""Dry friction over the design's, where a load adds to it and none is recorded."""
+MOST_DRY_UNLOADED = 2.0  # dry friction over the design's, where a load adds to it and none is recorded
 LARGEST_OF_ANY = 10.0
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10

@@ -13,8 +13,7 @@ from analyses.records.campaign_file import Method
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
-RATE_SPREAD = 0.01
-"""Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""
+RATE_SPREAD = 0.01  # two clocks are taken to differ by less than 1 % in rate; anything else is no clock error
 GRID = 4000
 MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
