@@ -136,10 +136,7 @@ class Fit:
 
     def beside(self, name: str, value: float, std: float) -> Fit:
         """The fit and one more value, found on its own."""
-        names, values, wide = (
-            (*self.names, name),
-            np.append(self.values, value),
-            np.pad(self.covariance, (0, 1)),
-        )
+        wide = np.pad(self.covariance, (0, 1))
         wide[-1, -1] = std**2
-        return Fit(names=names, values=values, covariance=wide, fixed=self.fixed)
+        values = np.append(self.values, value)
+        return Fit(names=(*self.names, name), values=values, covariance=wide, fixed=self.fixed)

@@ -192,14 +192,13 @@ def following_item(record: str, followed: Followed) -> Item:
     if followed.alike < ALIKE:
         return Item.of(id, label, f"the motion is not that of the command (correlation {followed.alike:.2f})")
     scale = "counts a revolution, the reduction, or a unit"
-    reason = f"the motion is {1.0 + clock:.4g} times that which the loops make of the commanded speed: "
-    reason += f"the clock, {scale}"
+    what, ratio, of = "motion", 1.0 + clock, "which the loops make of the commanded speed"
+    cause = f"the clock, {scale}"
     if abs(off) > RATE_TOLERANCE:
-        reason = (
-            f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with"
-        )
-        reason += f": {scale}"
+        what, ratio, of = "recorded position", 1.0 + off, "which the loops follow the command with"
+        cause = scale
     elif followed.stage == "position":
-        reason = f"the following error is {1.0 + clock:.4g} times that of the design's loops at this motion: "
-        reason += f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+        what, of = "following error", "of the design's loops at this motion"
+        cause = f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+    reason = f"the {what} is {ratio:.4g} times that {of}: {cause}"
     return share_item(id, label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)
