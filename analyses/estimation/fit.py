@@ -105,10 +105,8 @@ class Fit:
         table = np.array([[own.get(name, 0.0) for name in self.names] for own in slopes.values()])
         table = table.reshape(len(slopes), len(self.names))
         found = dict(zip(slopes, table @ self.values, strict=True)) | dict(values or {})
-        covariance = table @ self.covariance @ table.T
-        return Fit(
-            names=tuple(slopes), values=np.array([found[name] for name in slopes]), covariance=covariance
-        )
+        made = np.array([found[name] for name in slopes])
+        return Fit(names=tuple(slopes), values=made, covariance=table @ self.covariance @ table.T)
 
     def refined(self, own: Fit) -> Fit:
         """The fit where some values were found anew, at all the others: with the error of these as well.

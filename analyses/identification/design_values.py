@@ -17,9 +17,9 @@ from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.parameters import own_share, parameter
+from analyses.estimation.parameters import default_value, own_share, parameter
 from analyses.identification.electrical import fit_electrical
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, one_phase
 from analyses.records.record import Record

@@ -16,7 +16,8 @@ from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
-from analyses.identification.joint_model import FrictionForm, default_value
+from analyses.estimation.parameters import default_value
+from analyses.identification.joint_model import FrictionForm
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 

@@ -190,7 +190,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     coupling, behind = design.coupling, design.load.friction or LoadFriction()
     assert coupling is not None
     half, (_, _, k), n = 0.5 * coupling.play_rad, coupling.pieces[0], dead_zone(0.5 * coupling.play_rad / A)
-    stiffness = n * k
+    stiffness, damping = n * k, n * coupling.damping_Nms_rad
     for _, twist, beyond in coupling.pieces[1:]:  # each bend is a dead zone of its own
         stiffness, k = stiffness + (beyond - k) * dead_zone((half + twist) / A), beyond
     own = replace(design.friction, load_coefficient=0.0)
@@ -199,9 +199,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
         at = Operating(point="describing-function", speed_amplitude_rad_s=W)
         slope = slope_at(replace(design, friction=own), at)
         load_slope += described_dry(behind.dry_torque_Nm, W_l)
-    spring = Coupling(
-        stiffness_Nm_rad=stiffness, damping_Nms_rad=n * coupling.damping_Nms_rad, after=coupling.after
-    )
+    spring = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping, after=coupling.after)
     load = replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope))
     return replace(design, coupling=spring, friction=Friction(viscous_Nms_rad=slope), load=load)
 

@@ -110,9 +110,8 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
     if np.count_nonzero(below) < 2:
-        raise InputError(
-            f"{read.name}: no two frequencies below half that of the sampling of the {name} loop"
-        )
+        told = f"no two frequencies below half that of the sampling of the {name} loop"
+        raise InputError(f"{read.name}: {told}")
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
     found = _with_spread(omega, values, read.deviation[below], loop.period_s)

@@ -65,9 +65,8 @@ def motion(design: Design, asked: Asked, *, progress: Progress | None = None) ->
             " allowed: that or more, or fewer --count or --cycles"
         )
     if asked.start >= seconds > 0.0 and asked.start > 0.0:
-        raise InputError(
-            f"--start {asked.start:g}: the run ends at {seconds:g} s; allowed: less, or --duration"
-        )
+        told = f"the run ends at {seconds:g} s; allowed: less, or --duration"
+        raise InputError(f"--start {asked.start:g}: {told}")
     run = simulate(
         design,
         command,

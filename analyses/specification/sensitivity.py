@@ -100,9 +100,7 @@ def _rise(low: float, high: float) -> float:
 
 def moved(design: Design, base: Mapping[str, float], moves: Sequence[Mapping[str, float]]) -> Population:
     """The design, and once for each move the same with some of its numbers at other values (SI)."""
-    values = {
-        path: np.array([value, *(one.get(path, value) for one in moves)]) for path, value in base.items()
-    }
+    values = {p: np.array([value, *(one.get(p, value) for one in moves)]) for p, value in base.items()}
     return Population(design, values, 1 + len(moves))
 
 
