@@ -11,12 +11,7 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.types import Progress
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.identification.campaign import (
-    CampaignResult,
-    campaign_items,
-    identify_campaign,
-    steady_error,
-)
+from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign, steady_error
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.design_values import at_constant
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency

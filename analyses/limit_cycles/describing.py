@@ -17,7 +17,7 @@ border: ``A = 2 q/(pi g)``, stable.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from itertools import pairwise
 from math import exp, log, nan, pi
 from typing import Literal
@@ -80,11 +80,9 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
         return ()
     half = 0.5 * coupling.play_rad
     grid = np.log(np.geomspace(LEAST * half, MOST * half, POINTS))
+    own = partial(_cycle, "play", design, friction=friction)
     found = kept_up(lambda log_A, near: _at_twist(design, exp(log_A), friction, near), grid)
-    return tuple(
-        _cycle("play", design, there, exp(log_A), there.shape["twist"], friction=friction, stable=stable)
-        for log_A, there, stable in found
-    )
+    return tuple(own(there, exp(log_A), there.shape["twist"], stable=s) for log_A, there, s in found)
 
 
 def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -> tuple[Cycle, ...]:

@@ -283,10 +283,8 @@ def _limited(run: Trajectory) -> str:
 
 def summary(run: Trajectory, ended: Conduct) -> Tree:
     """What happened, in numbers, SI, and what it ended in."""
-    limits = {
-        name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
-        for name, u in run.limits.items()
-    }
+    told = ("limit", "unit", "fraction", "first_time_s")
+    limits = {name: {key: getattr(use, key) for key in told} for name, use in run.limits.items()}
     angle = "m" if run.axis == "linear" else "rad"
     si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
     followed = run.stage in ("velocity", "current")  # an angle is the output; a voltage has none

@@ -19,6 +19,7 @@ from actuator_lti.design.objects import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 
 WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
 SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
@@ -122,7 +123,7 @@ def allowed_range(design: Design, path: str) -> tuple[float, float]:
     return (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
 
 
-def neighbours(design: Design, paths: tuple[str, ...], gains: np.ndarray) -> np.ndarray:
+def neighbours(design: Design, paths: tuple[str, ...], gains: Floats) -> Floats:
     """All roundings of gains to the steps of their objects, up and down, shape (roundings, gains).
 
     A gain without an object stays as it is.
@@ -223,7 +224,7 @@ def _feedforward(design: Design) -> list[Variable]:
     ]
 
 
-def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
+def change(variables: tuple[Variable, ...], values: Floats) -> Floats:
     """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
 
     Of rows in SI, shape (candidates, variables); shape (candidates,).

@@ -143,9 +143,8 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
         extra = 0.0
         if isinstance(model, CurrentLoop):
             extra = model.resistance_feedforward * (pair.model.effective_motor.resistance_ohm or 0.0) * asked
-        wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * (
-            limit - gain * asked - integral - extra
-        )
+        over = limit - gain * asked - integral - extra
+        wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * over
     yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
                  unit=unit, condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
 
