@@ -82,13 +82,9 @@ def design_values(
     if design.coupling is not None and friction is not None:  # taken off the torque that a wrong scale is in
         ratio = design.ratio_to_coupling
         behind = {"viscous": friction.viscous_Nms_rad / ratio**2, "dry": friction.dry_torque_Nm / ratio}
-    found = [
-        design_value(
-            design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0)
-        )
-        for name in model.names
-        if not name.startswith(("offset", "map_", "gravity"))
-    ]
+    told = [name for name in model.names if not name.startswith(("offset", "map_", "gravity"))]
+    before = {name: default_value(design, name) for name in told}
+    found = [design_value(design, model, n, before[n], behind.get(n.partition("_")[0], 0.0)) for n in told]
     found.append(_gravity_value(design, model))
     whole = [record for record in records if {"voltage", "current"} <= set(record.signals)]
     own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}

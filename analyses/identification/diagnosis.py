@@ -202,10 +202,8 @@ def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> t
         return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
     largest = f"{np.max(np.abs(record[name])):.4g} {KNOWN_UNITS.get(name, '')}".rstrip()
-    text = (
-        f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
-        "the other rows say that it was larger: clipped; these rows are left out"
-    )
+    text = f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
+    text += "the other rows say that it was larger: clipped; these rows are left out"
     return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]
 
 

@@ -123,10 +123,8 @@ def sampling_items(record: Record) -> Iterator[Item]:
         return
     line = x[1:-1] - 0.5 * (x[:-2] + x[2:])
     off = float(np.sqrt(np.mean(line**2)) / np.sqrt(np.mean(x**2)))
-    reason = (
-        f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
-        "sampled too slowly, or noise; the inertia cannot be trusted"
-    )
+    reason = f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
+    reason += "sampled too slowly, or noise; the inertia cannot be trusted"
     label = f"{record.name}: current sampled fast enough"
     yield Item.of(f"sampling-{record.name}", label, reason if off > LARGEST_LINE_ERROR else "")
 

@@ -93,11 +93,9 @@ def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -
         return mode_at(design, at)
 
     grid = log(top_speed_rad_s) - np.linspace(DECADES, 0.0, SPEEDS) * log(10.0)
-    found = (
-        _cycle("friction", design, there, exp(log_speed), there.shape["w"], friction=True, stable=stable)
-        for log_speed, there, stable in kept_up(mode, grid)
-    )
-    return tuple(replace(cycle, load_Nm=load_Nm) for cycle in found)
+    own, found = partial(_cycle, "friction", design, friction=True), kept_up(mode, grid)
+    cycles = (own(there, exp(speed), there.shape["w"], stable=stable) for speed, there, stable in found)
+    return tuple(replace(cycle, load_Nm=load_Nm) for cycle in cycles)
 
 
 def _cycle(

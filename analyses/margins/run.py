@@ -51,10 +51,8 @@ class Measured:
 
     def __repr__(self) -> str:
         f, off = self.frequency_hz, np.abs(self.difference_db).max()
-        return (
-            f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
-            f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
-        )
+        said = f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
+        return said + f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
 
     @property
     def nearer(self) -> tuple[str, float] | None:

@@ -188,10 +188,8 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     every = asked_for(design, extra)
     chosen = tuple(r for r in every if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
     if not chosen:
-        raise InputError(
-            "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
-            'file, or as --require "position.bandwidth>=30 Hz"'
-        )
+        told = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
+        raise InputError(told + 'file, or as --require "position.bandwidth>=30 Hz"')
     return chosen
 
 

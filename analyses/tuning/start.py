@@ -217,11 +217,8 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
 
 def _feedforward(design: Design) -> list[Variable]:
     position = design.controller.position_loop
-    return [
-        Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
-        for key in ("feedforward", "acceleration_feedforward")
-        for value in [getattr(position, key)]
-    ]
+    own = {key: getattr(position, key) for key in ("feedforward", "acceleration_feedforward")}
+    return [Variable(f"control.position.{k}", v, 0.0, max(1.2, v), v, linear=True) for k, v in own.items()]
 
 
 def change(variables: tuple[Variable, ...], values: Floats) -> Floats:
