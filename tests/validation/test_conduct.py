@@ -50,9 +50,8 @@ def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command,
 def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
     """The joint hunts in minutes after 3 deg: two periods at 0.00478 Hz are 418 s, the run is 0.3 s."""
     said = cli.data("simulate", "joint", "--amplitude", "3 deg", "--duration", "0.3")["status_detail"]
-    beyond, hertz, periods = re.fullmatch(
-        r"followed for (\S+) s beyond the run; ±.* at (\S+) Hz \((\d+) periods seen\)", said
-    ).groups()
+    words = r"followed for (\S+) s beyond the run; ±.* at (\S+) Hz \((\d+) periods seen\)"
+    beyond, hertz, periods = re.fullmatch(words, said).groups()
     assert float(beyond) > int(periods) / float(hertz) > 100.0
 
 
@@ -80,9 +79,8 @@ def test_the_command_line_says_it(cli) -> None:
     assert "status limit cycle (" in cli.text(*arguments)
     facts = cli.data(*arguments)
     assert facts["status"] == "limit cycle"
-    found = re.fullmatch(
-        r"±(\S+) deg at (\S+) Hz \((\d+) periods seen, (.*) limit acting\)", facts["status_detail"]
-    )
+    words = r"±(\S+) deg at (\S+) Hz \((\d+) periods seen, (.*) limit acting\)"
+    found = re.fullmatch(words, facts["status_detail"])
     run = simulate(LOUD, commands.step(radians(3.0)), 4.0)
     late = np.degrees(run.output_angle_rad[run.time_s.size // 2 :])
     above = late > 0.5 * (late.max() + late.min())

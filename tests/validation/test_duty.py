@@ -18,11 +18,8 @@ from tests.changed import changed
 
 AMBER, FIN, JOINT = (load_design(name) for name in ("ilr33-amber", "fin", "joint"))
 
-HOT = {
-    "temperature.thermal_resistance": "2 K/W",
-    "temperature.thermal_time": "60 s",
-    "temperature.winding_limit": "125 degC",
-}
+HOT = {"thermal_resistance": "2 K/W", "thermal_time": "60 s", "winding_limit": "125 degC"}
+HOT = {f"temperature.{key}": value for key, value in HOT.items()}
 
 
 def test_rms_current_of_a_slow_sine_is_friction_and_inertia() -> None:
