@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
-from actuator_lti.types import Progress
 from analyses.request import LOAD, POINT, OnMachines, Option
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from actuator_lti.types import Progress
     from analyses.monte_carlo.result import MonteCarloResult
 
 

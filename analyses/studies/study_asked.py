@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
-from actuator_lti.types import Progress
 from analyses.request import OnMachines, Option
 
 if TYPE_CHECKING:
+    from actuator_lti.types import Progress
     from analyses.comparison.variants import Comparison
     from analyses.studies.study import Study
 
