@@ -206,7 +206,7 @@ def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
     yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
-def steady_current_error(
+def steady_error(
     design: Design, points: Sequence[SteadyPoint], *, progress: Progress | None = None
 ) -> float | None:
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.

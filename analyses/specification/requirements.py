@@ -103,11 +103,8 @@ def judged(
     """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
-        raise InputError(
-            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
-            f"{', '.join(QUANTITIES)}",
-            where=design.origin or None,
-        )
+        told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if quantity.scope == "analysis":
         verdicts = [_verdict(requirement, None, *asked(quantity.name))]
     elif quantity.scope == "drive":
@@ -127,10 +124,8 @@ def _judge_loop(
     """Judge one requirement on one loop; an unstable loop meets none."""
     rotor = requirement.rotor or (found.rotor if found else "") if name == "current" else ""
     if name not in LOOPS:
-        raise InputError(
-            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
-            where=design.origin or None,
-        )
+        told = f"loop = {name!r}: allowed are {', '.join(LOOPS)}, every"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if found is None:
         return _verdict(requirement, name, None, f"the design has no {name} loop", rotor)
     result = found.asked(requirement)
