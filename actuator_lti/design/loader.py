@@ -16,6 +16,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.files.tree import Tree
 
+AnyDesign = Design | str | PathLike[str]  # or its name, or the path of its file
 SHIPPED = Path(__file__).parent / "shipped"
 
 
@@ -31,7 +32,7 @@ def shipped_designs() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: name != "ilr33-amber"))
 
 
-def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
+def load_design(name_or_path: AnyDesign) -> Design:
     """Read a shipped design by name, or a design file by path; a design is given back as it is.
 
     ``name_or_path``: a shipped name (see :func:`shipped_designs`), else the path of a TOML file of at most
@@ -118,7 +119,7 @@ class SweepPoint:
     design: Design
 
 
-def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]) -> tuple[SweepPoint, ...]:
+def sweep(design: AnyDesign, path: str, values: Iterable[Any]) -> tuple[SweepPoint, ...]:
     """Designs that differ in one key.
 
     ``design``: a design, a shipped name, or the path of a design file.

@@ -19,14 +19,12 @@ not.  It shares no code with the linear loops, so the two may be held against ea
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.loader import AnyDesign, as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.lifted import (
@@ -142,13 +140,7 @@ class Tangent:
         )
 
 
-def tangent(
-    design: Design | str | PathLike[str],
-    place: str,
-    *,
-    setup: LoopSetup | None = None,
-    hold: bool = True,
-) -> Tangent:
+def tangent(design: AnyDesign, place: str, *, setup: LoopSetup | None = None, hold: bool = True) -> Tangent:
     """Measure the derivative of the running drive.
 
     ``place``: ``"current"``, ``"velocity"``, ``"position"``: the loop of a stage, outer loops open.

@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import fields, replace
 from math import inf
-from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError, NumericalError, finite_number, shown, whole_number
@@ -32,7 +31,7 @@ STORED = ("magnetic_J", "kinetic_J", "spring_J")  # the other energies are the k
 
 
 def simulate(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     command: Command,
     duration_s: float,
     load_Nm: float | LoadMoment = 0.0,
