@@ -175,11 +175,11 @@ def _without(key: str, design: Design) -> str:
     torque, (ratio, words) = key == "torque_constant", _TORQUE_OVER_VOLTAGE[design.motor.constants]
     same = f"with these motor.constants it is motor.{other} {'times' if torque else 'over'} {words}"
     same = f"of a DC motor it is the number of motor.{other}" if words == "1" else same
-    p = 1.0 if design.screw is None else design.screw.travel_m_rad  # constants of the motor's own shaft
-    linear = design.axis == "linear" and design.screw is None
-    units = ("N/A", "V*s/m") if linear else ("N*m/A", "V*s/rad")
+    p, axis = 1.0, design.axis
+    if design.screw is not None:  # constants of the motor's own shaft
+        p, axis = design.screw.travel_m_rad, "rotary"
     number = held * p * (ratio if torque else 1.0 / ratio)
-    return f"; {same} in SI, {number:g} {units[0] if torque else units[1]}"
+    return f"; {same} in SI, {number:g} {FIELDS[f'motor.{key}'].unit(Structure(axis))}"
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:
