@@ -179,11 +179,9 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     )
 
 
-def _beside(
-    base: Found, origin: Design, plan: LargeSignal, tested: bool, place: tuple[int, Variant]
-) -> Found:
+def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tuple[int, Variant]) -> Found:
     """What is found of a design, how it differs from the base, and what moved it."""
-    one, design = _evaluated(place[1], plan, tested), _design(place[1])
+    one, design = _evaluated(at[1], plan, tested), _design(at[1])
     changed, differences = changes(origin, design), {}
     for key, value in one.figures.items():
         before = base.figures.get(key)

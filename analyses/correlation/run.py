@@ -120,9 +120,6 @@ class Correlation:
 
 def correlate(design: Design, asked: Asked, *, progress: Progress | None = None) -> Correlation:
     """Run the model with each record's own command, load and supply, and compare."""
-    records = [record for path in asked.records for record in open_records(path)]
-    results = [
-        correlate_record(design, record, command=asked.command, progress=progress)
-        for record in named_apart(records)
-    ]
+    records = named_apart([record for path in asked.records for record in open_records(path)])
+    results = (correlate_record(design, one, command=asked.command, progress=progress) for one in records)
     return Correlation(design, asked, tuple(results))

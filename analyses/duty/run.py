@@ -177,12 +177,9 @@ def heating(design: Design, rms_A: float) -> Heating | None:
             return heat.ambient_degC + start * t / tau
         return heat.ambient_degC - start / share * np.expm1(-share * t / tau)
 
-    reached = None
+    reached, over = None, limit - heat.ambient_degC
     if final > limit and tau > 0.0:
-        part = (limit - heat.ambient_degC) * share / start
-        reached = (
-            tau * (limit - heat.ambient_degC) / start if share == 0.0 else -tau * log(1.0 - part) / share
-        )
+        reached = tau * over / start if share == 0.0 else -tau * log(1.0 - over * share / start) / share
     last = 5.0 * tau / share if share > 0.0 else (reached or tau)
     time = np.linspace(0.0, last, _DRAWN)
     course = after(time) if tau > 0.0 else np.full(_DRAWN, final)

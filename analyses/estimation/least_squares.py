@@ -27,9 +27,8 @@ class NotTold:
     moves: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return (
-            f"cannot be separated from {' and '.join(self.moves)}" if self.moves else "is not excited at all"
-        )
+        others = " and ".join(self.moves)
+        return f"cannot be separated from {others}" if others else "is not excited at all"
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,11 +2,10 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Progress
@@ -67,7 +66,7 @@ class CampaignResult:
 
 def identify_campaign(
     imported: ImportedCampaign,
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     *,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,
@@ -206,7 +205,7 @@ def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
     yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
-def steady_current_error(
+def steady_error(
     design: Design, points: Sequence[SteadyPoint], *, progress: Progress | None = None
 ) -> float | None:
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.

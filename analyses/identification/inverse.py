@@ -18,15 +18,8 @@ from analyses.estimation.least_squares import (
     solve,
     told_apart,
 )
-from analyses.estimation.parameters import own_std, parameter
-from analyses.identification.joint_model import (
-    FrictionForm,
-    JointModel,
-    Recipe,
-    RecordFit,
-    Rows,
-    default_value,
-)
+from analyses.estimation.parameters import default_value, own_std, parameter
+from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, Rows
 from analyses.identification.rows import record_rows, rows_under
 from analyses.records.record import Record
 

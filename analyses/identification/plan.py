@@ -13,7 +13,8 @@ from actuator_lti.types import Floats, Progress
 from analyses.correlation.closed_loop import model_signals
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
-from analyses.identification.joint_model import JointModel, Rows, default_value
+from analyses.estimation.parameters import default_value
+from analyses.identification.joint_model import JointModel, Rows
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record, RowCounts
 

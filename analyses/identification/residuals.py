@@ -4,14 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import correlate, lfilter
 from scipy.stats import norm
 
 from actuator_lti.types import Floats, Ints
 from analyses.identification.joint_model import JointModel, RecordFit
 
-LEVEL = 0.01
-"""Probability with which chance alone leaves the bound at one lag or more."""
+LEVEL = 0.01  # probability with which chance alone leaves the bound at one lag or more
 MOST_LAGS = 100
 
 
@@ -71,12 +70,12 @@ def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
         lags = both if of else both[reach + 1 :]
         e, u = white - white.mean(), x - x.mean()
         size, count = float(np.linalg.norm(e) * np.linalg.norm(u)) or 1.0, len(e)
-        products = [float(e[max(k, 0) : count + min(k, 0)] @ u[max(-k, 0) : count - max(k, 0)]) for k in lags]
+        products = correlate(e, u)[count - 1 + lags]
         yield ResidualTest(
             record=part.name,
             name="independence" if of else "whiteness",
             input=of,
             lags=lags,
-            correlation=np.array(products) / size,
+            correlation=products / size,
             bound=float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count)),
         )

@@ -49,10 +49,8 @@ def motion(design: Design, asked: Asked, *, progress: Progress | None = None) ->
     if asked.cycles is not None and asked.command != "stepped-sine":  # which has a duration of its own
         needed = asked.start + asked.cycles / asked.frequency
         if duration is not None and abs(duration - needed) > 1e-9 * needed:
-            raise InputError(
-                f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
-                f" {needed:g} s; allowed: one of the two options"
-            )
+            told = f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
+            raise InputError(told + f" {needed:g} s; allowed: one of the two options")
         duration = needed
     command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
     seconds = duration
@@ -60,14 +58,11 @@ def motion(design: Design, asked: Asked, *, progress: Progress | None = None) ->
         tabled = command.kind in ("stepped_sine", "recorded", "sampled")
         seconds = command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
     elif command.kind == "stepped_sine" and 0.0 < seconds < command.end_s * (1.0 - 1e-9):
-        raise InputError(
-            f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
-            " allowed: that or more, or fewer --count or --cycles"
-        )
+        told = f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
+        raise InputError(told + " allowed: that or more, or fewer --count or --cycles")
     if asked.start >= seconds > 0.0 and asked.start > 0.0:
-        raise InputError(
-            f"--start {asked.start:g}: the run ends at {seconds:g} s; allowed: less, or --duration"
-        )
+        told = f"the run ends at {seconds:g} s; allowed: less, or --duration"
+        raise InputError(f"--start {asked.start:g}: {told}")
     run = simulate(
         design,
         command,

@@ -87,9 +87,8 @@ def open_records(path: str | Path) -> list[Record]:
         signals = {**record.signals, "force": gain * record["voltage"]}
         record = replace(record, signals=signals, units={**record.units, "force": "N"})
     notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
-    inputs = tuple(
-        replace(one, note=note or one.note) for one, note in zip(record.inputs, notes, strict=True)
-    )
+    pairs = zip(record.inputs, notes, strict=True)
+    inputs = tuple(replace(one, note=note or one.note) for one, note in pairs)
     return [replace(record, inputs=inputs)]
 
 

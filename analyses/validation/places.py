@@ -224,6 +224,5 @@ def _later(design: Design, more_s: float) -> Design:
 
 def _faint(bench: Design, design: Design) -> Design:
     """With the filter of the command; a faint one does not reach its rates."""
-    return replace(
-        bench, command=replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
-    )
+    faint = replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+    return replace(bench, command=faint)

@@ -18,7 +18,6 @@ from dataclasses import dataclass, field, replace
 from math import degrees, pi
 
 import numpy as np
-import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.loops import ExactMargins
@@ -359,9 +358,7 @@ def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
         yield place.judged(name, value, seen, place.within_at(at * t.hold_s), DB * max(lever, 1.0), "dB")
 
 
-def _fall(
-    place: Place, name: str, at: float | None, off: Callable[[Complexes], npt.NDArray[np.float64]]
-) -> Iterator[Row]:
+def _fall(place: Place, name: str, at: float | None, off: Callable[[Complexes], Floats]) -> Iterator[Row]:
     """The frequency at which ``off`` of T is zero, by one Newton step from the predicted one."""
     hold = place.tangent.hold_s
     if at is None or not 0.0 < at * hold < pi:

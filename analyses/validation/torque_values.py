@@ -166,11 +166,9 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     floor, behind = ULPS * J * unbalanced * float(np.spacing(abs(speed))) / Ts + _weight_rounding(model), 0.0
     if design.coupling is not None:
         W, coupling = abs(speed) / N_c, design.coupling
-        stretch = float(np.spacing(max(abs(motion.twist_rad), Ts * W)))
-        behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * float(
-            np.spacing(W)
-        )
-        behind = ULPS * (behind + design.load_side_inertia_kgm2 * float(np.spacing(W)) / Ts)
+        stretch, ulp = float(np.spacing(max(abs(motion.twist_rad), Ts * W))), float(np.spacing(W))
+        behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * ulp
+        behind = ULPS * (behind + design.load_side_inertia_kgm2 * ulp / Ts)
         floor += behind / N_c
     found = wanted.torque_Nm - J * (drive.value("SPEED") - speed) / Ts
     allowed = WITHIN * abs(wanted.torque_Nm) + EXACT * wanted.largest_Nm + floor

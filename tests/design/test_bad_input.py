@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from actuator_lti import assemble_loops
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.key_reference import key_reference
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
-from nonlinear import commands, simulate
 from reports.cli.main import main
+from tests.refusals import mistakes
 
 # ruff: noqa: E501 (a table of cases, one a line)
 
@@ -21,14 +20,6 @@ from reports.cli.main import main
 AMBER = design_text("ilr33-amber")
 TOLERANCE = 'tolerance = "50 %"'
 FACTS = "[[fact]]"
-
-
-def refused(text: str) -> str:
-    with pytest.raises(InputError) as caught:
-        read_design_text(text, "my.toml")
-    lines = str(caught.value).split("\n")
-    assert all(line.startswith("my.toml: ") and line.isprintable() for line in lines)
-    return "\n".join(lines)
 
 
 def changed(*replacements: tuple[str, str]) -> str:
@@ -126,7 +117,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_bad_value_is_refused_in_one_line(case: str) -> None:
     replacements, says = CASES[case]
-    line = refused(changed(*replacements))
+    line = mistakes(changed(*replacements))
     assert "\n" not in line or case in ("one table for many", "correlation of a fixed value")
     for part in says:
         assert part in line
@@ -138,14 +129,14 @@ def test_the_terminal_tells_all_mistakes_and_many_are_cut_short(capsys, tmp_path
     path.write_text(text, encoding="utf-8")
     assert main(["margins", str(path)]) == 2
     assert capsys.readouterr().err.count("\nactuator-lti: ") == 1
-    assert refused(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
+    assert mistakes(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
 
 
 def test_correlations_that_contradict_each_other_are_refused() -> None:
     keys = ("load.inertia", "gear.worm.input_inertia", "gear.planetary.input_inertia")
     pairs = [(keys[0], keys[1], 0.9), (keys[1], keys[2], 0.9), (keys[0], keys[2], -0.9)]
     tables = [f'[[correlation]]\nfirst = "{a}"\nsecond = "{b}"\ncoefficient = {c}\n' for a, b, c in pairs]
-    assert "contradict" in refused(AMBER + "".join(tables))
+    assert "contradict" in mistakes(AMBER + "".join(tables))
 
 
 @pytest.mark.parametrize(
@@ -157,7 +148,7 @@ def test_correlations_that_contradict_each_other_are_refused() -> None:
     ],
 )
 def test_the_stages_of_a_force_source_are_held_apart(old: str, new: str, says: str) -> None:
-    assert says in refused(design_text("emps").replace(old, new))
+    assert says in mistakes(design_text("emps").replace(old, new))
 
 
 def test_files_that_are_no_design_are_refused(tmp_path) -> None:
@@ -192,7 +183,7 @@ def test_free_texts_stay_text(text: str) -> None:
     assert (again.requirements[0].id, again.requirements[0].source) == (text, text)
     assert read_design_text(write_design(again), "my.toml") == again
     tree["requirement"][0]["quantity"] = "gain"
-    assert len(refused(tomli_w.dumps(tree))) < 500
+    assert len(mistakes(tomli_w.dumps(tree))) < 500
 
 
 AMBER_OF_MESSAGES = load_design("ilr33-amber")
@@ -226,13 +217,6 @@ def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path
     assert status == 2
     assert all(name in line for line in said.splitlines())
     assert words is None or (re.search(words, said) and said.count("\n") == 1)
-
-
-def test_python_names_its_arguments() -> None:
-    with pytest.raises(InputError, match=r"^form = 'sampld': one of sampled, continuous, ideal$"):
-        assemble_loops(AMBER_OF_MESSAGES, form="sampld")
-    with pytest.raises(InputError, match=r"^duration_s = nan: must be"):
-        simulate(AMBER_OF_MESSAGES, commands.step(0.01), float("nan"))
 
 
 def test_a_load_and_an_amplitude_may_have_their_units(cli) -> None:

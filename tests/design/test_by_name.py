@@ -20,6 +20,7 @@ from actuator_lti.design import (
     with_values,
 )
 from actuator_lti.design.loader import design_text
+from actuator_lti.loops.delay_budget import delay_budget
 from analyses import (
     amplitude_map,
     compare,
@@ -49,12 +50,14 @@ def test_loops_and_runs_of_a_name_a_path_and_a_design_are_the_same(tmp_path) -> 
     file.write_text(write_design(DESIGN), encoding="utf-8")
     wanted = assemble_loops(DESIGN).position.open_loop
     run = simulate(DESIGN, commands.step(0.01), 0.02)
+    budget = delay_budget(DESIGN, "velocity", 100.0)
     assert load_design(DESIGN) is DESIGN
     for given in ("ilr33-amber", str(file), file):
         result = assemble_loops(given).position.open_loop
         assert all(np.array_equal(getattr(result, part), getattr(wanted, part)) for part in "ABCD")
         again = simulate(given, commands.step(0.01), 0.02)
         assert np.array_equal(again.output_angle_rad, run.output_angle_rad)
+        assert delay_budget(given, "velocity", 100.0) == budget
 
 
 @pytest.mark.parametrize("given", [None, 3, b"ilr33-amber", ["ilr33-amber"]])
@@ -103,6 +106,7 @@ BAD = {
     "stop": lambda: commands.ramp(1.0, stop_s="x"),
     "command": lambda: simulate(DESIGN, lambda t: 0.1, 0.1),
     "duration": lambda: simulate(DESIGN, commands.step(0.01), "0.1 s"),
+    "no duration": lambda: simulate(DESIGN, commands.step(0.01), float("nan")),
     "load text": lambda: simulate(DESIGN, commands.step(0.01), 0.1, "x"),
     "load function": lambda: simulate(DESIGN, commands.step(0.01), 0.1, lambda t: 1.0),
     "start": lambda: simulate(DESIGN, commands.step(0.01), 0.1, initial={"motor_angle_rad": 0.1}),

@@ -36,18 +36,16 @@ def test_records_with_loads_of_their_own_are_one_fit_judged_on_another(files, tm
     result = cli.data(*arguments, "--design", "ilr33-amber", "--refine", "--out", tmp_path)
     checks = {check["id"]: check for check in result["items"]}
     assert checks["held-out-unseen.csv"]["passed"]
-    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
-        1.5 * result["model"]["relative_residual"] + 0.02
-    )
+    limit = 1.5 * result["model"]["relative_residual"] + 0.02
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(limit)
     assert {one["record"] for one in result["resimulated"]} == {"a.csv", "b.csv", "loaded.csv", "unseen.csv"}
     written = load_design(tmp_path / "ilr33-amber-identified.toml")
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
     page = load(tmp_path / "identification.json")
-    tables = {
-        b["caption"]: b.get("note") for part in page["sections"] for b in part["blocks"] if "caption" in b
-    }
+    blocks = [block for part in page["sections"] for block in part["blocks"] if "caption" in block]
+    tables = {block["caption"]: block.get("note") for block in blocks}
     assert "Torque constant kM, fixed: these records do not tell it" in tables["Refined by simulation"]
     for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
@@ -67,9 +65,8 @@ def test_a_held_out_record_is_filtered_and_that_of_another_drive_fails(files, tm
     words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
     told = cli.data(*words)
     checks = {check["id"]: check for check in told["items"]}
-    assert checks["held-out-again.csv"]["value"] == pytest.approx(
-        told["model"]["relative_residual"], rel=0.05
-    )
+    residual = told["model"]["relative_residual"]
+    assert checks["held-out-again.csv"]["value"] == pytest.approx(residual, rel=0.05)
 
 
 def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
@@ -93,10 +90,9 @@ def test_a_torque_command_is_the_drive(identify) -> None:
     result = identify(columns).data
     uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
     assert uses["commanded motor torque"] == "drive: torque as commanded"
-    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
-    assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
-        load_design("ilr33-amber").inertia_kgm2, rel=0.01
-    )
+    found, inertia = result["model"]["parameters"], load_design("ilr33-amber").inertia_kgm2
+    assert found["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
+    assert found["inertia"]["value"] == pytest.approx(inertia, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["one way", "one speed"])
@@ -132,10 +128,8 @@ def test_scatter_between_records_is_found_again() -> None:
     """Values 2, own error 0.1, scatter 0.5: the estimate's mean square over many draws is the truth's."""
     rng = np.random.default_rng(5)
     own = np.full(6, 0.1)
-    result = [
-        between_records(2.0 + 0.5 * rng.standard_normal(6) + own * rng.standard_normal(6), own)
-        for _ in range(400)
-    ]
+    drawn = ((rng.standard_normal(6), rng.standard_normal(6)) for _ in range(400))
+    result = [between_records(2.0 + 0.5 * apart + own * noise, own) for apart, noise in drawn]
     assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 

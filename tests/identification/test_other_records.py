@@ -23,18 +23,15 @@ GIMBAL = Path(__file__).parents[1] / "nonlinear" / "gimbal.toml"
 
 def test_friction_meets_the_published_digits(emps_file) -> None:
     """Standard errors: those of white residuals, as published; `covariance` counts their correlation."""
-    emps = open_record(emps_file)
-    model, other = (
-        fit_records(load_design("emps"), [emps], form=form) for form in ("symmetric", "per-direction")
-    )
+    design, records = load_design("emps"), [open_record(emps_file)]
+    model, other = (fit_records(design, records, form=form) for form in ("symmetric", "per-direction"))
     assert [f"{v:.4f}" for v in model.values] == ["95.1089", "203.5034", "20.3935", "-3.1648"]
     assert [f"{v:.4f}" for v in model.white_errors] == ["0.1085", "1.1460", "0.1012", "0.0444"]
     assert (np.diag(model.covariance) > model.white_errors**2).all()
     assert [f"{v:.4f}" for v in other.values] == ["95.1540", "166.7061", "20.1440", "240.4236", "20.6277"]
     assert [f"{100 * one.relative_residual:.4f}" for one in (model, other)] == ["4.0834", "3.1117"]
-    design = load_design("emps")
     assert (design.motor.rotor_inertia_kgm2, design.friction.viscous_Nms_rad) == (95.1089, 203.5034)
-    assert emps.counts.rows_in == emps.counts.rows_out == 24841
+    assert records[0].counts.rows_in == records[0].counts.rows_out == 24841
 
 
 @pytest.mark.parametrize(("changes", "status"), [((), 0), (("--set", "motor.resistance=0.3 ohm"), 1)])

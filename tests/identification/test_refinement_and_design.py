@@ -113,9 +113,8 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
 
     def margin(scale: float) -> float:
         changed = with_values(design, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
-        loops = assemble_loops(
-            changed, operating_point="describing-function", load_Nm=0.0, speed_amplitude_rad_s=0.02 * 942.5
-        )
+        at = {"operating_point": "describing-function", "load_Nm": 0.0}
+        loops = assemble_loops(changed, speed_amplitude_rad_s=0.02 * 942.5, **at)
         value = stability_margins(loops.position.open_loop).phase_margin_deg
         assert value is not None
         return value
@@ -134,9 +133,7 @@ def test_output_error_finds_the_values_of_a_record_and_names_one_at_its_bound() 
     def force(tried: Design) -> np.ndarray:
         return np.asarray(35.15065 * simulate(tried, command, 3.0).voltage_V)
 
-    start = with_values(
-        design, {"motor.rotor_inertia": 99.0, "friction.viscous": 190.0, "friction.dry_torque": 22.0}
-    )
+    start = with_values(design, dict(zip(paths, (99.0, 190.0, 22.0), strict=True)))
     found = fit_output(start, paths, force, force(design))
     assert found.values == pytest.approx([parameter_value(design, path) for path in paths], rel=2e-3)
     assert np.linalg.norm(found.rest) < 0.05 * np.linalg.norm(found.first)

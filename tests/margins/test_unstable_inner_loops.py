@@ -9,7 +9,6 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from margin_truth import determined, difference, truth_of
 from scipy.optimize import brentq, minimize_scalar
 
 from actuator_lti import assemble_loops, load_design, stability_margins
@@ -21,6 +20,7 @@ from actuator_lti.margins.poles import sorted_poles
 from actuator_lti.systems.delay_system import DelaySystem
 from tests.changed import changed
 from tests.loops.loop_designs import sprung
+from tests.margins.margin_truth import determined, difference, truth_of
 
 BASE = load_design("ilr33-amber-multirate")
 SEEDS = range(30)

@@ -237,14 +237,6 @@ def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alon
     assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
 
 
-@pytest.mark.parametrize("words", [
-    ("--samples", "0"), ("--seed", "-1"), ("--step", "5 kg"), ("--workers", "2", "--scheduler", "tcp://a:1"),
-])  # fmt: skip
-def test_bad_usage_is_refused_before_anything_is_written(cli, words, tmp_path):
-    assert cli("montecarlo", "--out", tmp_path / "o", *words).status == 2
-    assert not list(tmp_path.rglob("*.html"))
-
-
 COMMANDS = {
     "montecarlo": ("montecarlo", "--samples", "200", "--no-worst"),
     "compare": ("compare", "ilr33-amber", "--set", "gear.worm.ratio=40", "--set", "friction.law=tanh"),
