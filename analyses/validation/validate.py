@@ -239,7 +239,7 @@ class _Work:
         return settlings_of(self.design, self.bench.commanded)
 
     def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self.bench.commanded, self._settle())
+        return conditional_stability(self.design, self.bench.commanded)
 
     def _counts(self) -> tuple[Counts, ...]:
         return counts_of(self.design, self.bench.commanded, self._settle())
