@@ -101,10 +101,7 @@ def column(
 
 
 def table(
-    caption: str,
-    columns: Sequence[Column],
-    rows: Iterable[Mapping[str, Any] | Sequence[Any]],
-    note: str = "",
+    caption: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any] | Sequence[Any]], note: str = ""
 ) -> Block:
     """Make a table; a row is a mapping by column key, with ``_status`` where it has one, or its cells."""
     keys = [one["key"] for one in columns]

@@ -46,11 +46,8 @@ def compare_signals(
 ) -> SignalComparison:
     """Compare two signals sampled at the same times.
 
-    Raises
-    ------
-    InputError
-        For signals of different shape, fewer than two samples, values that are not finite, or a measured
-        signal that is zero throughout.
+    Raises `InputError`: for signals of different shape, fewer than two samples, values that are not finite,
+    or a measured signal that is zero throughout.
 
     Examples
     --------

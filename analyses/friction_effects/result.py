@@ -122,18 +122,10 @@ def friction_effects(
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    settlings : iterable of Settling, optional
-        What steps of the drive end in, if known already (`analyses.motion.settling.settlings_of`).
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``settlings``: what steps of the drive end in, if known already (`settlings_of`).
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     control, own, integrator = design.controller, design.controller.own_law, ""

@@ -1,6 +1,6 @@
 """Which further runs would shrink the uncertainty of the margins most."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,7 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.identification.surface import PATHS, SurfaceFit
 
 LOOPS = ("velocity", "position")
@@ -64,7 +64,7 @@ def suggest_runs(
     *,
     count: int = 6,
     criterion: str = "margins",
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> CampaignSuggestion:
     """Suggest further (speed, load) points, one after the other, each the best after those before it.
 
@@ -93,7 +93,7 @@ def suggest_runs(
 
 
 def margin_spreads(
-    design: Design, fit: SurfaceFit, *, progress: Callable[[int, int], None] | None = None
+    design: Design, fit: SurfaceFit, *, progress: Progress | None = None
 ) -> tuple[MarginSpread, ...]:
     """Margins, their slopes to C0, Cv, CM (central differences), and their spread from a fit's covariance."""
     middle = _margins(design)

@@ -11,12 +11,7 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.types import Progress
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.identification.campaign import (
-    CampaignResult,
-    campaign_items,
-    identify_campaign,
-    steady_current_error,
-)
+from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign, steady_error
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.design_values import at_constant
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
@@ -91,7 +86,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     source = f"identified from {len(fit.points)} runs, {listed.name}{at_constant(fit, design)}"
     made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
-    simulated = steady_current_error(written, fit.points, progress=progress)
+    simulated = steady_error(written, fit.points, progress=progress)
     load, speed = design.load.moment_max_Nm, reachable_speed(design)
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)

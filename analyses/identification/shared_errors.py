@@ -9,8 +9,7 @@ from analyses.identification.steady import SteadyPoint
 from analyses.records.campaign_file import Instruments
 
 DRAWS = 1 << 15
-LEVEL = 0.01
-"""Probability of a false alarm in a campaign."""
+LEVEL = 0.01  # probability of a false alarm in a campaign
 
 
 def shared_errors(

@@ -14,10 +14,8 @@ from analyses.records.record import Record
 
 MIN_PERIODS = 4
 TOP = 0.4  # of the sampling frequency: lines above are not looked at
-BESIDE = 6
-"""Places on either side of a line that its noise is taken from; a sharp resonance allows no more."""
-EXCITED = 25.0
-"""A line counts as excited where its power is this many times that of its noise."""
+BESIDE = 6  # places on either side of a line that its noise is taken from; a sharp resonance allows no more
+EXCITED = 25.0  # a line counts as excited where its power is this many times that of its noise
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
 FLOORS = ("damping", "viscous", "load_viscous")

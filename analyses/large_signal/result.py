@@ -165,18 +165,10 @@ def large_signals(
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 
-    Parameters
-    ----------
-    design : Design, or its name or path
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    counts : (int, int)
-        Amplitudes and frequencies of the map, at least 2 of each.
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``counts``: amplitudes and frequencies of the map, at least 2 of each.
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops

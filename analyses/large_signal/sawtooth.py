@@ -101,12 +101,8 @@ def sawtooth(
 ) -> Sawtooth:
     """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 
-    Parameters
-    ----------
-    amplitude_rad : float, optional
-        Default: full deflection.
-    frequency_hz : float, optional
-        Default: where x = w A/R is three, well inside the range of whole triangles (x >= 1.862).
+    By default of full deflection, where x = w A/R is three, well inside the range of whole triangles
+    (x >= 1.862).
     """
     design = as_design(design)
     amplitude = design.validation.full_deflection_rad if amplitude_rad is None else amplitude_rad

@@ -70,10 +70,7 @@ def limit_cycles(design: Design) -> LimitCycles:
     Cycles of play are predicted without dry friction and with it; those of dry friction alone are
     `analyses.friction_effects`.
 
-    Raises
-    ------
-    InputError
-        For a drive without a position loop.
+    Raises `InputError`: for a drive without a position loop.
 
     Examples
     --------

@@ -117,19 +117,11 @@ class LoopSurvey:
 def survey_loops(design: Design | str | PathLike[str], progress: Progress | None = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
-    All margins are certified, see `stability_margins`.
+    All margins are certified, see `stability_margins`. ``progress`` is called with (steps done, steps in
+    all).
 
-    Parameters
-    ----------
-    design : Design
-    progress : callable, optional
-        Called with (steps done, steps in all).
-
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
-        loops: what else fails is left out and noted.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
+    `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.
     """
 
     def step(done: int) -> None:
@@ -138,10 +130,8 @@ def survey_loops(design: Design | str | PathLike[str], progress: Progress | None
 
     design = as_design(design)
     loops = assemble_loops(design)
-    refused: list[str] = []
-    forms: dict[str, Mapping[str, LoopFigures]] = {
-        "sampled": all_loop_figures(loops, certify=True, locked=True)
-    }
+    refused, sampled = list[str](), all_loop_figures(loops, certify=True, locked=True)
+    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": sampled}
     for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
@@ -150,13 +140,12 @@ def survey_loops(design: Design | str | PathLike[str], progress: Progress | None
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
-    budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
+    budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
     step(5)
-    border = attempt("limit of linear validity", lambda: _onset(loops, forms["sampled"]), None)
+    border = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
     step(6)
-    return LoopSurvey(
-        design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
-    )
+    why = tuple(dict.fromkeys(refused))
+    return LoopSurvey(design, loops, forms, break_points, points, budgets, border, why)
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
@@ -204,10 +193,8 @@ def operating_points(
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
-        points += [
-            point("load driven by the motor", None, "driving"),
-            point("motor driven by the load", None, "driven"),
-        ]
+        points.append(point("load driven by the motor", None, "driving"))
+        points.append(point("motor driven by the load", None, "driven"))
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
     top = drive_figures(design).output_rate_rad_s * design.total_ratio

@@ -101,19 +101,10 @@ def monte_carlo(
     the folder before (same design, seed, settings and code) goes on, with more samples if asked for, where
     they are kept. The numbers do not depend on engine, workers or chunks.
 
-    Parameters
-    ----------
-    design : Design
-        With tolerances on some values.
-    engine : Engine, optional
-        Where to compute; by default threads of this process.
-    progress : callable, optional
-        Called with (samples done, samples to do).
+    ``engine``: where to compute; by default threads of this process.
+    ``progress``: called with (samples done, samples to do).
 
-    Raises
-    ------
-    InputError
-        If nothing has a tolerance, or the folder holds another study.
+    Raises `InputError`: if nothing has a tolerance, or the folder holds another study.
     """
     need("pyarrow", "tables", "a Monte Carlo study")
     design, settings = as_design(design), settings or MonteCarloSettings()

@@ -18,8 +18,7 @@ from analyses.records.record import Record
 
 RATE_TOLERANCE = 0.02
 """Disagreement of speed and rate above which no design is made; below it, it widens the intervals."""
-SURE = 4.0
-"""Standard errors beyond which noise explains no difference: by chance in one record of 16 000."""
+SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (
     "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
@@ -29,13 +28,10 @@ ALIKE = 0.9
 OVER = 1.2
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
-LEAST_ROWS = 10
-"""Smoothed and thinned, of a comparison."""
-STEADY = 0.1
-"""Relative difference of steps of the position beside a row that is missing or filled in."""
+LEAST_ROWS = 10  # smoothed and thinned, of a comparison
+STEADY = 0.1  # relative difference of steps of the position beside a row that is missing or filled in
 COPPER_1_K = 3.93e-3
-WINDING_K = (-75.0, 160.0)
-"""From 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H."""
+WINDING_K = (-75.0, 160.0)  # from 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H
 
 
 FOLLOWED = (

@@ -31,16 +31,9 @@ def evaluate_requirements(
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 
-    Parameters
-    ----------
-    design : Design
-    figures : mapping of str to LoopFigures, optional
-        Of the sampled, sliding loops; computed where left out.
+    ``figures`` are those of the sampled, sliding loops, computed where left out.
 
-    Raises
-    ------
-    InputError
-        If a requirement names a quantity or a loop that is not known.
+    Raises `InputError`: if a requirement names a quantity or a loop that is not known.
     """
     design = as_design(design)
     if figures is None:
@@ -110,11 +103,8 @@ def judged(
     """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
-        raise InputError(
-            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
-            f"{', '.join(QUANTITIES)}",
-            where=design.origin or None,
-        )
+        told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if quantity.scope == "analysis":
         verdicts = [_verdict(requirement, None, *asked(quantity.name))]
     elif quantity.scope == "drive":
@@ -134,10 +124,8 @@ def _judge_loop(
     """Judge one requirement on one loop; an unstable loop meets none."""
     rotor = requirement.rotor or (found.rotor if found else "") if name == "current" else ""
     if name not in LOOPS:
-        raise InputError(
-            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
-            where=design.origin or None,
-        )
+        told = f"loop = {name!r}: allowed are {', '.join(LOOPS)}, every"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if found is None:
         return _verdict(requirement, name, None, f"the design has no {name} loop", rotor)
     result = found.asked(requirement)

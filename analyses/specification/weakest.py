@@ -153,9 +153,7 @@ def spread(
     seen = [point for point in points if point.kind != "describing-function"]
     made: dict[str, dict[str, Spread]] = {}
     for loop in dict.fromkeys(name for point in points for name in point.figures):
-        judged = [
-            (point.place or "sliding", point.figures[loop].judged) for point in seen if loop in point.figures
-        ]
+        judged = [(at.place or "sliding", at.figures[loop].judged) for at in seen if loop in at.figures]
         if not all(one.stable for _, one in judged):
             continue
         rows = [(place, _signed(one.margins)) for place, one in judged]

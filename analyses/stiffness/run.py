@@ -226,16 +226,10 @@ REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
 def stiffness(design: Design | str | PathLike[str], *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
-    Parameters
-    ----------
-    design : Design
-    simulated : bool
-        Put them to the simulator: a moment injected at three frequencies, and a slow one to either side.
+    ``simulated``: put them to the simulator, by a moment injected at three frequencies, and a slow one to
+    either side.
 
-    Raises
-    ------
-    InputError
-        For a loop that is not stable.
+    Raises `InputError`: for a loop that is not stable.
     """
     design = as_design(design)
     held = design.controller.position is not None

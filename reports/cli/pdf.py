@@ -18,7 +18,7 @@ SummaryOption = Annotated[
 def pdf(
     report: Annotated[Path, typer.Argument(metavar="REPORT_JSON", help="A report.json of any command.")],
     out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="The PDF; beside the JSON where left out.")
+        Path | None, typer.Option(metavar="FILE", help="The PDF; beside the JSON where left out.")
     ] = None,
     summary: SummaryOption = False,
     as_json: JsonOption = False,

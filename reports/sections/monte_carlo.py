@@ -9,13 +9,7 @@ from actuator_lti.asked.quantities import shown_unit, with_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import (
-    ColumnStatistics,
-    Driver,
-    MonteCarloResult,
-    Odds,
-    samples_needed,
-)
+from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, samples_needed
 from reports import document as doc
 from reports.charts import style
 from reports.charts.axis import linear_ticks

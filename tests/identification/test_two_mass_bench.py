@@ -10,19 +10,13 @@ from actuator_lti.design import load_design
 from actuator_lti.design.model import Coupling, Design
 from actuator_lti.errors import InputError
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
+from analyses.identification.two_mass import NAMES
 from examples.virtual_bench import TwoMassPlan, reversal_record, sweep_record
 from examples.virtual_bench.__main__ import main as simulate
 from tests.identification.bench_records import HALF_PLAY, two_mass_design
 from tests.refusals import refused
 
-TRUTH = {
-    "motor_inertia": 2e-5,
-    "load_inertia": 2e-3,
-    "stiffness": 400.0,
-    "damping": 0.02,
-    "viscous": 1e-5,
-    "load_viscous": 0.02,
-}
+TRUTH = dict(zip(NAMES, (2e-5, 2e-3, 400.0, 0.02, 1e-5, 0.02), strict=True))
 RESONANCE, ANTIRESONANCE = np.sqrt(400.0 * 1000.0), np.sqrt(400.0 / 2e-3)
 
 
@@ -80,10 +74,9 @@ def test_the_simulated_drive_is_identified_within_its_intervals() -> None:
 
 def test_where_the_bench_cannot_measure_and_its_record_does_not_tell() -> None:
     design = two_mass_design()
+    brief = reversal_record(design, seed=0).slice(0, 200)
     with pytest.raises(InputError, match="must reverse"):
-        identify_frequency(
-            _guess(), sweep_record(design, seed=0), play_record=reversal_record(design, seed=0).slice(0, 200)
-        )
+        identify_frequency(_guess(), sweep_record(design, seed=0), play_record=brief)
     refused(sweep_record, design, TwoMassPlan(moment_Nm=0.05), words="leaves its flank")
     refused(sweep_record, replace(design, coupling=None), words="current loop and a coupling")
 
