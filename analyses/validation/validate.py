@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
@@ -46,7 +45,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     settings: Settings | None = None,
     progress: Progress | None = None,
     *,
