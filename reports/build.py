@@ -7,7 +7,7 @@ from os import PathLike
 from typing import Any
 
 from actuator_lti.design import design_hash, warnings_of
-from actuator_lti.design.loader import as_design, design_text
+from actuator_lti.design.loader import AnyDesign, as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
@@ -48,7 +48,7 @@ Step = Callable[[str], AbstractContextManager[Progress | None]]
 
 
 def report(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     out: str | PathLike[str] | None = None,
     *,
     validation: bool = True,

@@ -42,7 +42,7 @@ def export_c(design: Design, asked: AskedC) -> Exported:
     """Write what `AskedC` says; refused where there are such files already, or the prefix is no name."""
     folder_for_results(asked.target)
     texts = c_export(design, single_precision=asked.single, prefix=asked.prefix)
-    _refuse_any(asked.target, texts, asked.force)
+    _refuse_any(asked, texts)
     check = _checked(design) if asked.check else None
     texts["README.md"] += "\n" + check_text(check, single_precision=asked.single)
     return _put(asked.target, texts, check)
@@ -52,7 +52,7 @@ def export_controller(design: Design, asked: AskedController) -> Exported:
     """Write what `AskedController` says; refused as by `export_c`."""
     folder_for_results(asked.target)
     texts = controller_export(design, single_precision=asked.number == "float", prefix=asked.prefix)
-    _refuse_any(asked.target, texts, asked.force)
+    _refuse_any(asked, texts)
     return _put(asked.target, texts)
 
 
@@ -87,9 +87,9 @@ def export_linear(design: Design, asked: AskedLinear) -> Exported:
     return Exported((str(target),), f"{target}: {', '.join(named)}, {' and '.join(FORMS)}, {len(data)} bytes")
 
 
-def _refuse_any(folder: Path, names: Iterable[str], force: bool) -> None:
+def _refuse_any(asked: AskedC | AskedController, names: Iterable[str]) -> None:
     for name in names:
-        refuse_existing(folder / name, force)
+        refuse_existing(asked.target / name, asked.force)
 
 
 def _put(folder: Path, texts: Mapping[str, str], check: CodeCheck | None = None) -> Exported:

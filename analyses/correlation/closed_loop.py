@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
@@ -71,11 +70,7 @@ class CorrelationResult:
 
 
 def correlate_record(
-    design: Design | str | PathLike[str],
-    record: Record,
-    *,
-    command: str | None = None,
-    progress: Progress | None = None,
+    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress | None = None
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 

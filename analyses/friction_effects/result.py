@@ -3,11 +3,10 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
@@ -115,10 +114,7 @@ class FrictionEffects:
 
 
 def friction_effects(
-    design: Design | str | PathLike[str],
-    loops: Loops | None = None,
-    *,
-    settlings: Iterable[Settling] | None = None,
+    design: AnyDesign, loops: Loops | None = None, *, settlings: Iterable[Settling] | None = None
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 

@@ -2,11 +2,10 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Progress
@@ -67,7 +66,7 @@ class CampaignResult:
 
 def identify_campaign(
     imported: ImportedCampaign,
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     *,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, log
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
@@ -158,10 +157,7 @@ class LargeSignals:
 
 
 def large_signals(
-    design: Design | str | PathLike[str],
-    loops: Loops | None = None,
-    *,
-    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
+    design: AnyDesign, loops: Loops | None = None, *, counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES)
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 

@@ -2,11 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.tones import Tone, tone
@@ -94,10 +93,7 @@ class Sawtooth:
 
 
 def sawtooth(
-    design: Design | str | PathLike[str],
-    *,
-    amplitude_rad: float | None = None,
-    frequency_hz: float | None = None,
+    design: AnyDesign, *, amplitude_rad: float | None = None, frequency_hz: float | None = None
 ) -> Sawtooth:
     """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 

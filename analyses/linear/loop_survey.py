@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.drive.operating import Operating, OperatingPoint, slope_at
@@ -114,7 +113,7 @@ class LoopSurvey:
         return frame
 
 
-def survey_loops(design: Design | str | PathLike[str], progress: Progress | None = None) -> LoopSurvey:
+def survey_loops(design: AnyDesign, progress: Progress | None = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
     All margins are certified, see `stability_margins`. ``progress`` is called with (steps done, steps in

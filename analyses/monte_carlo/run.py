@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
 from actuator_lti.errors import InputError
@@ -87,7 +86,7 @@ def _task(design: Design, settings: MonteCarloSettings) -> SampleTask:
 
 
 def monte_carlo(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     folder: str | Path,
     settings: MonteCarloSettings | None = None,
     *,

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
 from math import inf
-from os import PathLike
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 
 
 def evaluate_requirements(
-    design: Design | str | PathLike[str], figures: Mapping[str, LoopFigures] | None = None
+    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 

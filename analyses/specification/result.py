@@ -2,11 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
@@ -92,7 +91,7 @@ class Specification:
     manoeuvres: tuple[Manoeuvre, ...]  # by load torque
 
 
-def specification(design: Design | str | PathLike[str], loops: Loops | None = None) -> Specification:
+def specification(design: AnyDesign, loops: Loops | None = None) -> Specification:
     """Work out and simulate the figures at each load torque of the design.
 
     ``loops``: sampled and sliding, of this design, if they are there already.

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, sqrt
-from os import PathLike
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.operating import Operating
 from actuator_lti.errors import InputError, UnstableError
@@ -223,7 +222,7 @@ REST_HZ = (2.0, 20.0)
 REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
 
 
-def stiffness(design: Design | str | PathLike[str], *, simulated: bool = True) -> Stiffness:
+def stiffness(design: AnyDesign, *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
     ``simulated``: put them to the simulator, by a moment injected at three frequencies, and a slow one to

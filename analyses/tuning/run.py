@@ -3,14 +3,13 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
-from os import PathLike
 
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Progress
@@ -42,10 +41,7 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 
 def tune(
-    design: Design | str | PathLike[str],
-    settings: TuningSettings | None = None,
-    *,
-    progress: Progress | None = None,
+    design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress | None = None
 ) -> TuningResult:
     """Find gains that meet the requirements on loops over all corners of the tolerances.
 

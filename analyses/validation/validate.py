@@ -3,13 +3,12 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
@@ -46,7 +45,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     settings: Settings | None = None,
     progress: Progress | None = None,
     *,
@@ -117,7 +116,7 @@ class _Work:
             amplitude_margins=self._asked("margins by amplitude", bool(stable),
                 lambda: tuple(margins_by_amplitude(bench)), ()),
             conditional=self._asked("conditional stability", whole,
-                lambda: conditional_stability(design, bench.commanded, self._settle()), None),
+                lambda: conditional_stability(design, bench.commanded), None),
             settlings=settled,
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
             counts=self._asked("motion from rest", whole,

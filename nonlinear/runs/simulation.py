@@ -5,13 +5,12 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import fields, replace
 from math import inf
-from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError, NumericalError, finite_number, shown, whole_number
@@ -32,7 +31,7 @@ STORED = ("magnetic_J", "kinetic_J", "spring_J")  # the other energies are the k
 
 
 def simulate(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     command: Command,
     duration_s: float,
     load_Nm: float | LoadMoment = 0.0,
@@ -57,6 +56,10 @@ def simulate(
     Between events the slipping plant is propagated exactly; zero crossings of the speed, stick and breakaway
     are located inside the tick in closed form, so there is no integration error (the tanh law: see
     ``tanh_tolerance``).
+
+    Raises `InputError`: for a command faster than the Nyquist frequency of the position loop, a duration of
+    no tick, values that are not finite, a probe at a stage that the design does not have; `NumericalError`:
+    if the run ends early (state not finite, too many events in a tick).
 
     Parameters
     ----------
@@ -97,18 +100,6 @@ def simulate(
         ``False`` returns a failed run with its status instead; rows not reached are NaN.
     progress : callable, optional
         Called as ``progress(done, total)`` in ticks from time to time, and once at the end.
-
-    Returns
-    -------
-    Trajectory
-
-    Raises
-    ------
-    InputError
-        For a command faster than the Nyquist frequency of the position loop, a duration of no tick, values
-        that are not finite, a probe at a stage that the design does not have.
-    NumericalError
-        If the run ends early (state not finite, too many events in a tick).
 
     Notes
     -----

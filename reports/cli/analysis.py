@@ -17,8 +17,7 @@ from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli import options as common
 from reports.cli.errors import leave_with
-from reports.cli.output import print_json, print_line, print_note, print_warning
-from reports.cli.progress import progress
+from reports.cli.output import print_json, print_line, print_note, print_warning, progress
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
