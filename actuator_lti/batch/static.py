@@ -13,10 +13,7 @@ _CHUNK = 64  # designs at once: a stiffness takes a matrix for each of its frequ
 def drive_figures(population: Population, quantity: str, load_Nm: float = 0.0) -> np.ndarray:
     """One static figure of every design, shape (count,), in its unit (see `actuator_lti.asked.drive_figure`).
 
-    Raises
-    ------
-    InputError
-        For another quantity, or the current of an ideal torque source.
+    Raises `InputError`: for another quantity, or the current of an ideal torque source.
     """
     if quantity not in DRIVE_QUANTITIES:
         raise InputError(f"quantity {quantity!r}: one of {', '.join(DRIVE_QUANTITIES)}")

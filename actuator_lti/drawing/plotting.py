@@ -52,10 +52,7 @@ _POINTS = 600
 def style() -> Iterator[Any]:
     """matplotlib.pyplot in the style of all figures, for figures of your own beside them.
 
-    Raises
-    ------
-    InputError
-        Where matplotlib is not installed.
+    Raises `InputError`: where matplotlib is not installed.
 
     Examples
     --------
@@ -121,16 +118,10 @@ def plot_bode(
 ) -> list[Axes]:
     """Magnitude in dB and unwrapped phase in degrees over frequency in Hz.
 
-    Parameters
-    ----------
-    system : python-control system, DelaySystem or measured data
-        SISO.
-    label : str
-        For the legend.
-    margins : StabilityMargins, optional
-        Of this open loop: each gain and phase margin is drawn where it is.
-    axes : two of matplotlib's axes, optional
-        Several systems go into one figure this way.
+    ``system``: python-control system, DelaySystem or measured data, SISO.
+    ``label``: for the legend.
+    ``margins``: of this open loop: each gain and phase margin is drawn where it is.
+    ``axes``: two of matplotlib's axes; several systems go into one figure this way.
 
     Examples
     --------
@@ -255,10 +246,7 @@ def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
 def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     """Angle, speed, current, voltage of a run over time; grey: the rotor rests, red: a limit acts.
 
-    Parameters
-    ----------
-    axes : four of matplotlib's axes, optional
-        See `nonlinear.Trajectory.plot`.
+    ``axes``: four of matplotlib's axes, see `nonlinear.Trajectory.plot`.
     """
     angle, speed, current, voltage = _panels(axes, 4, figsize=(6.4, 7.2))
     linear = run.axis == "linear"

@@ -86,10 +86,8 @@ def operating_motion(design: Design) -> OperatingMotion:
     The speed takes at most `SHARE` of the speed limit, the voltage, the peak and the continuous current.
     Where friction alone takes more than that, the drive stands, without it.
 
-    Raises
-    ------
-    InputError
-        If friction holds the drive whatever it does, or takes too much of a drive that cannot stand.
+    Raises `InputError`: if friction holds the drive whatever it does, or takes too much of a drive that
+    cannot stand.
 
     Examples
     --------

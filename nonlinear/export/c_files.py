@@ -45,21 +45,13 @@ def spare_parameters(p: Floats) -> int:
 def c_export(design: Design, *, single_precision: bool = False, prefix: str = "drive_") -> dict[str, str]:
     """Files of an export, by name.
 
-    Parameters
-    ----------
-    design : Design
-    single_precision : bool
-        ``float`` in place of ``double``.
-    prefix : str
-        In front of the design's own files and symbols, so that several designs share ``drive.c`` in one
-        program.
+    ``single_precision``: ``float`` in place of ``double``.
+    ``prefix``: in front of the design's own files and symbols, so that several designs share ``drive.c`` in
+    one program.
 
-    Raises
-    ------
-    InputError
-        In single precision, for a design with noise (its random streams need 53 bits) or an elastic drive
-        train (its events are located to the rounding of double precision); for a prefix that no name in C
-        begins with.
+    Raises `InputError`: in single precision, for a design with noise (its random streams need 53 bits) or an
+    elastic drive train (its events are located to the rounding of double precision); for a prefix that no
+    name in C begins with.
     """
     refuse_prefix(prefix)
     if single_precision:

@@ -23,20 +23,12 @@ def controller_export(
 ) -> dict[str, str]:
     """Files of the controller of a design, by name.
 
-    Parameters
-    ----------
-    design : Design
-    single_precision : bool
-        ``float`` in place of ``double``; coefficients are worked out in double precision all the same.
-    prefix : str
-        In front of every symbol, so that controllers of several designs fit into one program.
-    vectors : bool
-        With test vectors and the program that runs them.
+    ``single_precision``: ``float`` in place of ``double``; coefficients are worked out in double precision
+    all the same.
+    ``prefix``: in front of every symbol, so that controllers of several designs fit into one program.
+    ``vectors``: with test vectors and the program that runs them.
 
-    Raises
-    ------
-    InputError
-        For a prefix that no name in C begins with.
+    Raises `InputError`: for a prefix that no name in C begins with.
     """
     refuse_prefix(prefix)
     ours = controller_of(design, prefix, single_precision=single_precision)

@@ -57,6 +57,10 @@ def simulate(
     are located inside the tick in closed form, so there is no integration error (the tanh law: see
     ``tanh_tolerance``).
 
+    Raises `InputError`: for a command faster than the Nyquist frequency of the position loop, a duration of
+    no tick, values that are not finite, a probe at a stage that the design does not have; `NumericalError`:
+    if the run ends early (state not finite, too many events in a tick).
+
     Parameters
     ----------
     design : Design, str or path
@@ -96,18 +100,6 @@ def simulate(
         ``False`` returns a failed run with its status instead; rows not reached are NaN.
     progress : callable, optional
         Called as ``progress(done, total)`` in ticks from time to time, and once at the end.
-
-    Returns
-    -------
-    Trajectory
-
-    Raises
-    ------
-    InputError
-        For a command faster than the Nyquist frequency of the position loop, a duration of no tick, values
-        that are not finite, a probe at a stage that the design does not have.
-    NumericalError
-        If the run ends early (state not finite, too many events in a tick).
 
     Notes
     -----
