@@ -116,7 +116,7 @@ class _Work:
             amplitude_margins=self._asked("margins by amplitude", bool(stable),
                 lambda: tuple(margins_by_amplitude(bench)), ()),
             conditional=self._asked("conditional stability", whole,
-                lambda: conditional_stability(design, bench.commanded, self._settle()), None),
+                lambda: conditional_stability(design, bench.commanded), None),
             settlings=settled,
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
             counts=self._asked("motion from rest", whole,
