@@ -22,11 +22,10 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 from analyses.specification.weakest import WeakPoint, spread, weakest
 from analyses.validation import validate
 from reports import document as doc
-from reports.amperes import in_amperes
 from reports.analyses import BY_NAME, FURTHER
 from reports.document_schema import Document
 from reports.html import write_report
-from reports.live import live_model
+from reports.live.model import live_model
 from reports.provenance import provenance
 from reports.sections import (
     answer,
@@ -42,7 +41,7 @@ from reports.sections import (
     validation,
 )
 from reports.sections.names import load_unit
-from reports.study_pages import design_head, notices
+from reports.study_pages import design_head, in_amperes, notices
 
 Step = Callable[[str], AbstractContextManager[Progress | None]]
 

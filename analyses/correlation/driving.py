@@ -14,7 +14,7 @@ from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats, Ints, Mask
+from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.record import Record
 
@@ -140,22 +140,17 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_of(values: Floats) -> Mask:
-    """For each interval between two samples, whether the values jump there from standstill to standstill.
+def steps_at(values: Floats) -> Ints:
+    """The first row behind each jump of the values from standstill to standstill.
 
     Examples
     --------
-    >>> steps_of(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
-    [False, True, False, False, False, False, False]
+    >>> steps_at(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
+    [2]
     """
     moves = np.diff(values) != 0.0
     around = np.concatenate([[False], moves, [False]])
-    return np.asarray(moves & ~around[:-2] & ~around[2:])
-
-
-def steps_at(values: Floats) -> Ints:
-    """The first row behind each of these jumps."""
-    return np.flatnonzero(steps_of(values)) + 1
+    return np.flatnonzero(moves & ~around[:-2] & ~around[2:]) + 1
 
 
 def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats) -> Floats:

@@ -211,8 +211,7 @@ def steady_error(
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
 
     Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
-    and 0.2 s for the mean. Runs that the simulated drive does not bring to within 1 % of their speed are left
-    out.
+    and 0.2 s for the mean. Runs that the simulated drive leaves more than 1 % off their speed are left out.
     """
     from nonlinear import commands, simulate
 

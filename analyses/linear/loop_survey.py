@@ -116,8 +116,7 @@ class LoopSurvey:
 def survey_loops(design: AnyDesign, progress: Progress | None = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
-    All margins are certified, see `stability_margins`. ``progress`` is called with (steps done, steps in
-    all).
+    All margins are certified, see `stability_margins`. ``progress`` gets (steps done, steps in all).
 
     Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
     `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.

@@ -112,9 +112,8 @@ def answer(
     from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
     from reports import document as doc
-    from reports.amperes import in_amperes
     from reports.as_json import as_json as plain_data
-    from reports.study_pages import notices
+    from reports.study_pages import in_amperes, notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values, beyond = dict[str, Any](), list[str]()
@@ -169,7 +168,7 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 def _print(
     one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
-    from reports.amperes import in_amperes
+    from reports.study_pages import in_amperes
     from reports.terminal import print_blocks, print_section, print_verdict
 
     name = getattr(drive, "name", "")
