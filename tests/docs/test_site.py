@@ -97,7 +97,6 @@ def test_cells_of_tables_stay_cells(made: ModuleType) -> None:
     assert made.table(["a", "b"], [["1", "2"]]) == ["| a | b |", "| --- | --- |", "| 1 | 2 |", ""]
 
 
-PAGES_OF_PUBLIC_EXAMPLES = [path for path in (ROOT / "docs").rglob("*.md") if path.parent.name != "generated"]
 RUN = re.compile(r"^```\{(code-cell|python-run|shell-run)\}[^\n]*\n(.*?)^```", re.M | re.S)
 PACKAGES = (
     "actuator_lti", "nonlinear", "nonlinear.commands", "nonlinear.loads", "analyses",
@@ -106,9 +105,7 @@ PACKAGES = (
 
 
 def code_of_pages() -> tuple[str, str]:
-    result = [
-        match for page in PAGES_OF_PUBLIC_EXAMPLES for match in RUN.findall(page.read_text(encoding="utf-8"))
-    ]
+    result = [match for page in PAGES for match in RUN.findall(page.read_text(encoding="utf-8"))]
     python = "\n".join(code for kind, code in result if kind != "shell-run")
     return python, "\n".join(code for kind, code in result if kind == "shell-run")
 

@@ -112,7 +112,7 @@ def test_the_python_file_makes_python_control_systems(written) -> None:
     assert delayed(100j) == pytest.approx(continuous.open_loop(100j), rel=1e-12)
 
 
-NAMES_OF_FOLLOWED_FIGURES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_motion")
+FIGURES = ("output_rate", "motor_current", "acceleration", "torque_margin", "lost_motion")
 
 
 def drives() -> list[Design]:
@@ -136,7 +136,7 @@ def test_a_followed_figure_is_the_figure_at_other_values(place: int) -> None:
     design, rng = drives()[place], np.random.default_rng(place)
     known = {path: parameter_value(design, path) for path in paths_of(design) if changes_row(design, path)}
     keys, compared = {path: value for path, value in known.items() if value != 0.0}, 0
-    for name in NAMES_OF_FOLLOWED_FIGURES:
+    for name in FIGURES:
         if name == "motor_current" and not design.motor.has_electrical_dynamics:
             continue
         for load in (0.0, 0.3 * (design.load.moment_max_Nm or 5.0)):
