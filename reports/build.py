@@ -43,7 +43,7 @@ from reports.sections import (
 from reports.sections.names import load_unit
 from reports.study_pages import design_head, in_amperes, notices
 
-Step = Callable[[str], AbstractContextManager[Progress | None]]
+Step = Callable[[str], AbstractContextManager[Progress]]
 
 
 def report(
@@ -116,7 +116,7 @@ def report(
 def design_report(
     design: Design,
     validation: Sequence[doc.Section] = (),
-    progress: Progress | None = None,
+    progress: Progress = None,
     source: str | None = None,
 ) -> Document:
     """Compute the report of a design as a document of `reports.document`.
@@ -204,7 +204,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     return [*made, *notices(missing, "further")]
 
 
-def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
+def validation_sections(design: Design, progress: Progress = None) -> list[doc.Section]:
     """Put the predictions to the simulator; a design that cannot be tested says why."""
     title = "Predictions against simulation"
     with isolated() as missing:
