@@ -19,6 +19,7 @@ from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetA
 from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
+from nonlinear import commands, simulate
 
 RUN_UP_S = 0.3
 STEADY_S = 0.2
@@ -213,8 +214,6 @@ def steady_error(
     Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
     and 0.2 s for the mean. Runs that the simulated drive leaves more than 1 % off their speed are left out.
     """
-    from nonlinear import commands, simulate
-
     constant, duration = design.effective_motor.torque_constant_Nm_A, RUN_UP_S + STEADY_S
     if constant is None or duration / design.controller.period_s > MOST_CAMPAIGN_TICKS:
         return None

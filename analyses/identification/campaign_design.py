@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
@@ -117,8 +118,6 @@ def margin_spreads(
 
 def _margins(design: Design) -> dict[tuple[str, str], float]:
     """Gain (dB) and phase margins (deg) of the outer loops where friction matters most: in slow motion."""
-    from actuator_lti import assemble_loops, stability_margins
-
     result: dict[tuple[str, str], float] = {}
     slow = 0.02 * min(reachable_speed(design), 1e3)
     for load in sorted({0.0, design.load.moment_max_Nm}):
