@@ -29,7 +29,6 @@ from reports.live.model import live_model
 from reports.provenance import provenance
 from reports.sections import (
     answer,
-    delays,
     forms,
     limits,
     loop,
@@ -227,7 +226,7 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
     makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
     if survey.budgets:
-        makers["Delays"] = lambda: delays.section(survey.budgets)
+        makers["Delays"] = lambda: forms.delay_budget(survey.budgets)
     if design.coupling is not None or design.load.path == "back-drivable":
         makers["Stiffness"] = lambda: stiffness.of_design(design)
     if onset is not None:
