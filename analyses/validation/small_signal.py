@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from math import degrees, pi
 
 import numpy as np
+from scipy.linalg import eig
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.loops import ExactMargins
@@ -184,8 +185,6 @@ class _Crossing:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
     """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
-    from scipy.linalg import eig
-
     if angle < LEAST_ANGLE:
         return _crossing_at_rest(t, gain)
 
