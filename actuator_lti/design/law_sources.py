@@ -51,7 +51,7 @@ def read_law(path: Path) -> Tree:
 
 
 def _from_mat(data: bytes) -> Tree:
-    """What a file holds by name, fields of a structure in a table of its name; None for what cannot be read."""
+    """What a file holds by name, fields of a structure in a table of its name; None: what cannot be read."""
     content, held = read_mat5(data), Tree()
     every = {**dict.fromkeys(content.passed_over), **content.texts, **content.complexes, **content.arrays}
     for name, values in every.items():
