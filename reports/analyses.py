@@ -24,8 +24,7 @@ from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.settings import Asked as ValidationAsked
-from reports.design_files.keys import Asked as KeysAsked
-from reports.design_files.start import Asked as StartAsked
+from reports.design_files.asked import AskedKeys, AskedStart
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.nightly.asked import Asked as NightlyAsked
 
@@ -122,15 +121,15 @@ ANALYSES = (
         "designs",
         DESIGNS,
         alone=True,
-        function="reports.design_files.catalogue.catalogue",
+        function="reports.design_files.run.designs",
         words="""
         List the shipped designs: name, title, and the stages that each drive has.
 
         Try: actuator-lti designs
         """,
     ),
-    Analysis("init", DESIGNS, StartAsked, alone=True, function="reports.design_files.start.start"),
-    Analysis("keys", DESIGNS, KeysAsked, alone=True, function="reports.design_files.keys.keys"),
+    Analysis("init", DESIGNS, AskedStart, alone=True),
+    Analysis("keys", DESIGNS, AskedKeys, alone=True),
     Analysis("margins", LINEAR, MarginsAsked),
     Analysis(
         "stiffness",

@@ -16,7 +16,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Waiver
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.files.tree import Tree
@@ -227,7 +227,7 @@ def verdict(
     id: str,
     label: str,
     *,
-    passed: bool | None,
+    passed: bool | Verdict | None,
     value: float | None = None,
     limit: float | None = None,
     unit: str = "",
@@ -235,13 +235,12 @@ def verdict(
     source: str = "",
     reason: str = "",
     comparison: str = "",
-    waiver: str = "",
+    waiver: Waiver | None = None,
 ) -> VerdictItem:
     """Make one item of `verdicts`; ``distance`` is positive on the good side, by itself where that is known.
 
     ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
-    the limit, ``">="`` or ``"<="``; it is kept as it is printed. ``waiver``: see `actuator_lti` ``Waiver``.
-    Times are told in ms.
+    the limit, ``">="`` or ``"<="``; it is kept as it is printed. Times are told in ms.
     """
     unit, factor = shown_unit(unit)
     value, limit, distance = (one if one is None else factor * one for one in (value, limit, distance))
@@ -255,8 +254,8 @@ def verdict(
         "comparison": COMPARISONS.get(comparison, comparison),
         "unit": unit,
         "distance": plain(distance),
-        "verdict": Verdict.of(passed).value,
-        "waiver": waiver,
+        "verdict": (passed if isinstance(passed, Verdict) else Verdict.of(passed)).value,
+        "waiver": waiver.words if waiver else "",
         "source": source,
         "reason": prose(reason),
     }

@@ -11,13 +11,12 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 
-from ._factors import DELAY, FACTOR, MOST, REAL, WEIGHT, bounded, evaluated, halved, slot
+from ._factors import DELAY, EPS, FACTOR, MOST, REAL, WEIGHT, bounded, evaluated, halved, slot
 from ._search import DEEPEST, DONE, KNOWN, NARROWEST, half_turns
 
 MEETS, UNSETTLED = 3, 4  # status, beside those of the search
 FINEST = 1e-8  # relative: how much lower another place may be without being found
 SMALL = 1e-6  # nearer to -1 double precision says little
-EPS = 2.220446049250313e-16
 NEWTON_STEPS = 20
 NEWTON_STEP = 1e-13
 

@@ -5,7 +5,7 @@ from math import inf, pi
 from typing import Any, get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
-from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in, part_at
+from actuator_lti.design.fields import FIELDS, Field, axis_unit, fields_in, part_at
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
@@ -142,7 +142,7 @@ def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refu
 def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
     limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
-        unit = _unit(design, key)
+        unit = axis_unit(design.axis, f"command.{key}")
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
@@ -150,16 +150,12 @@ def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterat
         yield _written(design, key, value, allowed)
 
 
-def _unit(design: Design, key: str) -> str:
-    """SI unit of a key of the command, for which the axis alone counts."""
-    return FIELDS[f"command.{key}"].unit(Structure(design.axis))
-
-
 def _written(design: Design, key: str, value: float, allowed: str) -> Refusal:
     """A key of the command as the file has it, else in SI."""
-    parameter = design.parameters.get(f"command.{key}")
-    text = f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
-    return f"command.{key}", text, allowed
+    path = f"command.{key}"
+    parameter = design.parameters.get(path)
+    text = f"{value:.6g} {axis_unit(design.axis, path)}" if parameter is None else parameter.text
+    return path, text, allowed
 
 
 def _jitter(design: Design) -> Iterator[Refusal]:

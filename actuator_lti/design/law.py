@@ -76,7 +76,7 @@ class Law(StateSpace):
         "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, the others of "
         "the motor; the speed is held between updates of a velocity stage")]
     file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
-        "their place")] = ""
+        "their place. L, gain and inputs may stand in it or here")] = ""
     L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "
         "where left out", **_LIST)] = ()
     gain: Annotated[float, quantity("factor on the law; its tolerance is that of the whole law",

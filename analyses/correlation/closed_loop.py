@@ -1,11 +1,9 @@
 """The model driven by a record's own command, load and supply."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +19,7 @@ from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, prepared
-
-if TYPE_CHECKING:
-    from nonlinear import State, Trajectory
-
+from nonlinear import State, Trajectory, commands, simulate
 
 AXIS_SIGNALS = {
     "rotary": ("angle", "output_angle", "speed", "current", "voltage"),
@@ -70,7 +65,7 @@ class CorrelationResult:
 
 
 def correlate_record(
-    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress | None = None
+    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress = None
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 
@@ -153,7 +148,7 @@ def model_signals(
     record: Record,
     measured: Mapping[str, Floats],
     notes: list[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     command: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, float]]:
@@ -162,8 +157,6 @@ def model_signals(
     ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
     done is added to ``notes``.
     """
-    from nonlinear import commands, simulate
-
     driven = driving.needed_command(design, record, command)
     notes = [] if notes is None else notes
     notes.extend(driven.notes)

@@ -77,8 +77,7 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
 
     The protection is left out of the simulation, so that the current is that of the duty as asked.
 
-    Raises `InputError`: for a drive without a motor current or a position loop, or a period of too many
-    ticks.
+    Raises `InputError`: for a drive without motor current or position loop, or a period of too many ticks.
 
     Examples
     --------

@@ -40,8 +40,7 @@ class Found:
 class Fit:
     """Values in SI by name, shape (p,), their covariance, shape (p, p), and those that were fixed.
 
-    The names are those of `analyses.estimation.parameters`, which knows label, unit and key of each, or keys
-    of a design.
+    The names are those of `analyses.estimation.parameters` (label, unit, key of each), or keys of a design.
     """
 
     names: tuple[str, ...]

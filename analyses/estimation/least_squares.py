@@ -84,8 +84,7 @@ def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
 
     Raises `InputError`: where there are no more rows than values.
 
-    The variance behind ``white`` is that of the residual about its mean, over n - 1 rows, as in the published
-    EMPS figures.
+    The variance behind ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
     """
     if len(y) <= w.shape[1]:
         told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"

@@ -12,8 +12,8 @@ from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
 from analyses.large_signal.tones import linear_steady_state
-from analyses.limit_cycles.describing import at_load, cycles_of_friction, dry_Nm
-from analyses.limit_cycles.run import Confirmation, Cycle, confirm
+from analyses.limit_cycles.describing import Cycle, at_load, cycles_of_friction, dry_Nm
+from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures

@@ -69,12 +69,11 @@ def identify_bench(
     *,
     validation: Sequence[Record] = (),
     settings: Settings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
 
-    Raises `InputError`: if a record lacks a signal, a key cannot be fixed, or no design can be made of the
-    result.
+    Raises `InputError`: if a record lacks a signal, a key cannot be fixed, or no design comes of the result.
     """
     settings = Settings() if settings is None else settings
     limit = settings.residual_limit / 100.0
@@ -149,7 +148,7 @@ def _made(
     both: Fit | None,
     settings: Settings,
     items: Sequence[verdict.Item],
-    progress: Progress | None,
+    progress: Progress,
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records
@@ -197,11 +196,8 @@ def _fitted(
 ) -> JointModel:
     """The joint model as the settings ask, less its own bias."""
     gravity = settings.gravity or start.load.gravity is not None
-    if settings.friction == "map":
-        model = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
-    else:
-        form = settings.friction
-        model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
+    fit = fit_map if settings.friction == "map" else partial(fit_records, form=settings.friction)
+    model = fit(start, records, recipe=recipe, fixed=held, gravity=gravity)
     parts = []
     for part, record in zip(model.records, records, strict=True):
         command = command_of(start, record)

@@ -19,6 +19,7 @@ from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetA
 from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
+from nonlinear import commands, simulate
 
 RUN_UP_S = 0.3
 STEADY_S = 0.2
@@ -205,17 +206,12 @@ def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
     yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
-def steady_error(
-    design: Design, points: Sequence[SteadyPoint], *, progress: Progress | None = None
-) -> float | None:
+def steady_error(design: Design, points: Sequence[SteadyPoint], *, progress: Progress = None) -> float | None:
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
 
     Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
-    and 0.2 s for the mean. Runs that the simulated drive does not bring to within 1 % of their speed are left
-    out.
+    and 0.2 s for the mean. Runs that the simulated drive leaves more than 1 % off their speed are left out.
     """
-    from nonlinear import commands, simulate
-
     constant, duration = design.effective_motor.torque_constant_Nm_A, RUN_UP_S + STEADY_S
     if constant is None or duration / design.controller.period_s > MOST_CAMPAIGN_TICKS:
         return None

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Complexes, Floats
@@ -201,8 +202,6 @@ def fit_two_mass(
     9.11). ``start`` has the names of ``NAMES``, ``reduction`` is N_c, up to the coupling, ``reaction`` the
     torque on the motor by that in the coupling, 1/N_c by default.
     """
-    from scipy.optimize import least_squares
-
     held, outputs = dict(fixed or {}), len(lines.names) - 1
     names = tuple(name for name in NAMES if name not in held)
     scale = _scales(start, names)

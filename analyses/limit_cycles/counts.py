@@ -19,12 +19,12 @@ import numpy as np
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
 from actuator_lti.types import Floats
-from analyses.large_signal.conditional import step_rows
-from analyses.large_signal.tones import LONGEST_TICKS, TIME_CONSTANTS, full_range, tone
+from analyses.large_signal.tones import TIME_CONSTANTS, full_range, tone
 from analyses.limit_cycles import describing
 from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
+from analyses.motion.settling import settle
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import without_counts
 
@@ -141,11 +141,9 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
 
 def _standing(design: Design, ideal: Design) -> float:
     """Error that counts leave after a step."""
-    size, ends = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad, []
-    for one in (design, ideal):
-        low, high = step_rows(one, np.array([size]), LONGEST_TICKS // 4).run().span("output_angle_rad")
-        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - size))
-    return abs(ends[0] - ends[1])
+    size = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+    counted, smooth = (abs(settle(one, 0.0, size).rest.error) for one in (design, ideal))
+    return abs(counted - smooth)
 
 
 def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, settle_ticks: int) -> Floats:

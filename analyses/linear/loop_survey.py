@@ -19,9 +19,11 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
 from actuator_lti.loops.limiters import Onset, onset
 from actuator_lti.loops.result import Form
+from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.specification.capability import drive_figures
 
 if TYPE_CHECKING:
     import pandas
@@ -94,8 +96,6 @@ class LoopSurvey:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
-        from actuator_lti.start.extras import need
-
         names = ("stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin")
         rows = [
             {
@@ -113,11 +113,10 @@ class LoopSurvey:
         return frame
 
 
-def survey_loops(design: AnyDesign, progress: Progress | None = None) -> LoopSurvey:
+def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
-    All margins are certified, see `stability_margins`. ``progress`` is called with (steps done, steps in
-    all).
+    All margins are certified, see `stability_margins`. ``progress`` gets (steps done, steps in all).
 
     Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
     `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.
@@ -178,8 +177,6 @@ def operating_points(
     ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
     small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    from analyses.specification.capability import drive_figures
-
     linear = design.axis == "linear"
 
     def point(

@@ -185,8 +185,7 @@ class Margins:
 def margins(design: Design, asked: Asked | None = None) -> Margins:
     """Find the certified margins of every loop and judge the requirements.
 
-    Raises `InputError`, `NumericalError`: where the loops cannot be assembled as asked, or the margins of one
-    not be found.
+    Raises `InputError`, `NumericalError`: where loops cannot be assembled as asked, or margins not be found.
 
     Examples
     --------

@@ -68,12 +68,17 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     >>> settle(load_design("ilr33-amber"), 8.0, 0.01).rest.verdict
     'at rest'
     """
-    rows = Rows.of(design)
-    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
-    rows.step("command", step_rad)
-    rest = judge(rows.running())
+    rest = judge(step_rows(design, load_Nm, step_rad).running())
     assert rest is not None  # a step and a load that stay
     return Settling(step_rad, load_Nm, rest)
+
+
+def step_rows(design: Design, load_Nm: float, step_rad: float, *, limits_on: bool = True) -> Rows:
+    """A step of the command from rest at zero, under a load that is there from the start; one run."""
+    rows = Rows.of(design, limits_on=limits_on)
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
+    rows.step("command", step_rad)
+    return rows
 
 
 def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
@@ -105,8 +106,6 @@ def _rate_name(design: Design) -> str:
 
 def _smooth(record: Record, values: Floats) -> Floats:
     """A signal without its fast part, no phase; the same filter for all signals that are compared."""
-    from scipy.signal import butter, sosfiltfilt
-
     share = 2.0 * SMOOTH_HZ * record.period_s
     if share >= 0.5 or len(values) < 60:
         return values

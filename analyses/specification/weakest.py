@@ -5,22 +5,18 @@ operating points, and the corners of temperature, supply and tolerances. Margins
 by how near they let L come to -1 (`actuator_lti.asked.quantities.reserve`), not by shares of decibels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, log10
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, reserve
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.drive.operating import OperatingPoint
-    from actuator_lti.margins import StabilityMargins
-    from analyses.corners.run import Corners
-    from analyses.linear.loop_figures import LoopFigures
-    from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
+from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import OperatingPoint
+from actuator_lti.margins import StabilityMargins
+from analyses.corners.run import Corners
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ value is taken back towards home by itself. What is returned meets every corner,
 """
 
 import numpy as np
+from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
 from actuator_lti.types import Floats
 from analyses.tuning.problem import Problem
@@ -66,8 +67,6 @@ def _nearest(problem: Problem, start: Floats | None, firm: Floats | None, workin
 
 def _descend(problem: Problem, start: Floats, working: Floats) -> Floats:
     """Minimise the change by sequential quadratic programming; rows from there back to the start."""
-    from scipy.optimize import minimize
-
     program = Program(problem, lambda x: problem.rows(x, working) - MET)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
@@ -99,8 +98,6 @@ def _nearer(problem: Problem, known: Floats | None, rows: Floats, working: Float
 
 def _evolved(problem: Problem, best: Floats, working: Floats) -> Floats:
     """What evolution finds in the box about home that holds every gain whose change is smaller."""
-    from scipy.optimize import NonlinearConstraint, differential_evolution
-
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     here, free = problem.coordinates(best), [item.home is None for item in problem.variables]
     centre = np.where(free, here, problem.coordinates(problem.present))

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from scipy.optimize import minimize
 
 from actuator_lti.types import Floats
 from analyses.monte_carlo.judging import loops_of
@@ -152,8 +153,6 @@ def maximise(
     smallest limit is made as large as can be, up to the reserve of 30 %; with it the limits are constraints,
     and the smallest of ``free`` is maximised.
     """
-    from scipy.optimize import minimize
-
     program = Program(problem, limits) if free is None else Program(problem, free, limits)
     most = RESERVE if free is None else None
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)

@@ -5,35 +5,28 @@ supply, which are no part of a loop.  The linear writing may be that of another 
 one shows what a validation sees.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf, isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop
+from actuator_lti.loops import Loop, Loops, assemble_loops, exact_margins, periodic_loop
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import LimiterPath, limiter_places
+from actuator_lti.loops.limiters import Place as LimiterPlace
 from actuator_lti.types import Complexes
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
-from nonlinear import tangent
+from nonlinear import Tangent, tangent
 from nonlinear.bench.derivative import tangents
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup
 from nonlinear.bench.operating_motion import may_stand, on_its_stand, on_the_bench, standing
-
-if TYPE_CHECKING:
-    from actuator_lti.drive.operating import Operating
-    from actuator_lti.loops import Loop, Loops
-    from actuator_lti.loops.limiters import Place as LimiterPlace
-    from nonlinear import Tangent
 
 
 @dataclass(frozen=True)

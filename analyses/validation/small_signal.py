@@ -18,6 +18,7 @@ from dataclasses import dataclass, field, replace
 from math import degrees, pi
 
 import numpy as np
+from scipy.linalg import eig
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.loops import ExactMargins
@@ -184,8 +185,6 @@ class _Crossing:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
     """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
-    from scipy.linalg import eig
-
     if angle < LEAST_ANGLE:
         return _crossing_at_rest(t, gain)
 
@@ -252,7 +251,7 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
 
     ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
     """
-    t, scale = place.tangent, ratio * _lever(ratio)
+    t, scale = place.tangent, max(ratio, abs(ratio - 1.0))  # what T = -1/(K - 1) moves K by, at least K
     found = _crossing(t, ratio, angle)
     if found is None:
         return place.judged(name, ratio, None, place.within, scale, "1", "no closed-loop pole crosses there")
@@ -271,11 +270,6 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     if outward is not None and row.error < 0.1 * BESIDE * ratio and outward * side < 0.0:
         return replace(row, verdict=Verdict.NOT_MET, because=f"{words}: it crosses the other way")
     return row
-
-
-def _lever(ratio: float) -> float:
-    """What a relative change of T makes of a gain margin K, where T = -1/(K - 1), at least 1."""
-    return max(1.0, abs(ratio - 1.0) / ratio)
 
 
 def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:

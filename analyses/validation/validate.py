@@ -47,7 +47,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 def validate(
     design: AnyDesign,
     settings: Settings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     model: Design | None = None,
 ) -> Validation:
@@ -80,7 +80,7 @@ class _Work:
     design: Design
     settings: Settings
     bench: Bench
-    progress: Progress | None
+    progress: Progress
     notes: list[str] = field(default_factory=list)
     done: int = 0
 
@@ -116,7 +116,7 @@ class _Work:
             amplitude_margins=self._asked("margins by amplitude", bool(stable),
                 lambda: tuple(margins_by_amplitude(bench)), ()),
             conditional=self._asked("conditional stability", whole,
-                lambda: conditional_stability(design, bench.commanded, self._settle()), None),
+                lambda: conditional_stability(design, bench.commanded), None),
             settlings=settled,
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
             counts=self._asked("motion from rest", whole,

@@ -49,7 +49,7 @@ def simulate(
     tanh_tolerance: float = TANH_TOLERANCE,
     max_events: int = MAX_EVENTS_PER_TICK,
     raise_on_failure: bool = True,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> Trajectory:
     """Run the sampled cascade on the nonlinear drive (model.md sections 1 and 2).
 
@@ -141,7 +141,7 @@ def simulate(
     return trajectory
 
 
-def run_row(design: Design, row: Floats, tables: Floats, progress: Progress | None = None) -> Trajectory:
+def run_row(design: Design, row: Floats, tables: Floats, progress: Progress = None) -> Trajectory:
     """Run one row of parameters with its history."""
     drive = Running(*parameters(row), tables)
     history, flags, out = drive.history()
@@ -162,7 +162,7 @@ def _named_limits(run: Trajectory) -> Trajectory:
     return replace(run, limits={**run.limits, "current": own})
 
 
-def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress | None) -> int:
+def _call(drive: Running, history: Floats, flags: np.ndarray, out: Floats, progress: Progress) -> int:
     """Call the kernel; with ``progress``, in a thread that is looked at and can be interrupted."""
     shared, total = np.zeros(2), int(drive.p[at.TICKS])
     given = (drive.p, drive.s, drive.tables, history, flags, out, shared)

@@ -17,8 +17,7 @@ from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
 from reports.cli import options as common
 from reports.cli.errors import leave_with
-from reports.cli.output import print_json, print_line, print_note, print_warning
-from reports.cli.progress import progress
+from reports.cli.output import print_json, print_line, print_note, print_warning, progress
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -113,9 +112,8 @@ def answer(
     from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
     from reports import document as doc
-    from reports.amperes import in_amperes
     from reports.as_json import as_json as plain_data
-    from reports.study_pages import notices
+    from reports.study_pages import in_amperes, notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
     values, beyond = dict[str, Any](), list[str]()
@@ -170,7 +168,7 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 def _print(
     one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
-    from reports.amperes import in_amperes
+    from reports.study_pages import in_amperes
     from reports.terminal import print_blocks, print_section, print_verdict
 
     name = getattr(drive, "name", "")

@@ -1,20 +1,21 @@
-"""`actuator-lti report`: the whole report of a design as one page and one JSON file."""
+"""`actuator-lti report`: the whole report of a design as one page and one JSON file; `pdf` typesets one."""
 
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from typer import Option
+from typer import Argument, Option
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
 from reports.cli import options
 from reports.cli.errors import leave_with
-from reports.cli.output import print_line
-from reports.cli.pdf import SummaryOption
-from reports.cli.progress import progress
+from reports.cli.output import print_json, print_line, progress
 
+SummaryOption = Annotated[
+    bool, Option("--summary", help="In the PDF the first screen and one line a section: about four pages.")
+]
 OWN = ("report", "margins", "stiffness", "validate")  # documents of sections that a report has by itself
 INCLUDE = "Add the sections that identify or correlate wrote (repeatable)."
 ALSO = f"Add what takes its time: {', '.join(FURTHER)}, or all (repeatable)."
@@ -97,3 +98,31 @@ def _sections(path: Path) -> list[Any]:
         words = f"--include: a {which}, whose sections a report has by itself"
         raise InputError(f"{words}; allowed: what identify or correlate wrote with --out", where=str(path))
     return [part for part in made["sections"] if part["id"] != "provenance"]
+
+
+def pdf(
+    report: Annotated[Path, Argument(metavar="REPORT_JSON", help="A report.json of any command.")],
+    out: Annotated[
+        Path | None, Option(metavar="FILE", help="The PDF; beside the JSON where left out.")
+    ] = None,
+    summary: SummaryOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures.
+
+    Try: actuator-lti pdf out/report.json --summary --out joint.pdf
+    """
+    from analyses.isolation import drain
+    from reports.document import load
+    from reports.pdf import write_pdf
+
+    path = write_pdf(load(report), out or report.with_suffix(".pdf"), whole=not summary)
+    if as_json:
+        print_json({"schema": "actuator-lti/pdf", "version": 1, "file": str(path)})
+    else:
+        print_line(str(path))
+    damaged = drain()
+    if damaged:
+        raise InputError(
+            f"{damaged[0].part}: cannot be drawn from its data; {path} says so", where=str(report)
+        )

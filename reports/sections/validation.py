@@ -140,8 +140,7 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
     ]
     if validation.rest is Verdict.NOT_PROVEN:
         waiver = waiver_of_rest(validation.design)
-        item = _item("rest", "Comes to rest after a step", None, validation.rest_words)
-        items.append({**item, "waiver": waiver.words if waiver else ""})
+        items.append(_item("rest", "Comes to rest after a step", None, validation.rest_words, waiver=waiver))
     return items
 
 
@@ -158,9 +157,9 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> doc.
     return {**item, "waiver": waiver, "gathers": cast(doc.Counts, asdict(tally))}
 
 
-def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> doc.VerdictItem:
-    side = ">=" if "limit" in counts else ""
-    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **counts)
+def _item(id: str, label: str, passed: bool | None, reason: str, **more: Any) -> doc.VerdictItem:
+    side = ">=" if "limit" in more else ""
+    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **more)
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:

@@ -186,9 +186,6 @@ def test_free_texts_stay_text(text: str) -> None:
     assert len(mistakes(tomli_w.dumps(tree))) < 500
 
 
-AMBER_OF_MESSAGES = load_design("ilr33-amber")
-
-
 def test_the_key_reference_has_every_key_once() -> None:
     paths = [entry.path for entry in key_reference()]
     assert len(paths) == len(set(paths)) > 100
@@ -234,7 +231,7 @@ def test_a_load_and_an_amplitude_may_have_their_units(cli) -> None:
 @pytest.mark.parametrize("command", [["identify"], ["correlate", "emps"], ["simulate", "--record"]])
 def test_records_that_are_none(command: list[str], tmp_path, cli) -> None:
     design, table, empty = tmp_path / "d.toml", tmp_path / "s.csv", tmp_path / "e.csv"
-    design.write_text(write_design(AMBER_OF_MESSAGES), encoding="utf-8")
+    design.write_text(write_design(load_design("ilr33-amber")), encoding="utf-8")
     table.write_text("time_s;reference_deg\n0;1\n0,001;2\n", encoding="utf-8")
     empty.write_text("", encoding="utf-8")
     twice = [design] * (2 if command == ["identify"] else 1)

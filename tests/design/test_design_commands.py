@@ -11,6 +11,11 @@ from reports.cli.main import main
 from reports.design_files.parts import part, parts
 
 
+def drive(path, *parts_: str):
+    assert main(["init", str(path / "mine.toml"), *parts_]) == 0
+    return load_design(path / "mine.toml")
+
+
 def test_designs_lists_all_for_people_and_machines(cli) -> None:
     shown = cli.text("designs")
     listed = cli.data("designs")["designs"]
@@ -31,19 +36,14 @@ def test_init_writes_a_design_that_reads_without_a_warning_but_its_examples(tmp_
 
 @pytest.mark.parametrize("name", shipped_designs())
 def test_init_starts_from_a_shipped_design_with_its_comments(tmp_path, name: str) -> None:
-    path = tmp_path / "copy.toml"
-    assert main(["init", str(path), "--from", name]) == 0
-    copy = load_design(path)
-    assert copy.name == "copy"
-    assert copy.motor == load_design(name).motor
-    assert path.read_text().startswith("# ")
+    copy = drive(tmp_path, "--from", name)
+    assert (copy.name, copy.motor) == ("mine", load_design(name).motor)
+    assert (tmp_path / "mine.toml").read_text().startswith("# ")
 
 
 @pytest.mark.parametrize("kind", ["joint", "ballscrew", "fin", "servo-axis"])
 def test_init_writes_a_typical_drive_of_a_kind(tmp_path, kind: str) -> None:
-    path = tmp_path / "mine.toml"
-    assert main(["init", str(path), "--kind", kind]) == 0
-    design = load_design(path)
+    design = drive(tmp_path, "--kind", kind)
     assert design.name == "mine"
     assert (design.coupling is None) == (kind == "servo-axis")
     assert (design.axis == "linear") == (kind == "ballscrew")
@@ -79,11 +79,6 @@ def test_settings_go_out_and_come_in(tmp_path, cli) -> None:
 
 MOTORS, GEARS = list(parts()["motor"]), list(parts()["gear"])
 RPM = math.pi / 30.0
-
-
-def drive(path, *parts_: str):
-    assert main(["init", str(path / "mine.toml"), *parts_]) == 0
-    return load_design(path / "mine.toml")
 
 
 def test_the_catalogue_has_twenty_of_each_with_a_source() -> None:

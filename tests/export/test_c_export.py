@@ -27,7 +27,7 @@ from nonlinear.export import c_export
 from nonlinear.export.c_files import exported_row, spare_parameters
 from nonlinear.export.program import source_hash
 from nonlinear.native import LIBRARY, parameters, tick
-from reports.export_documents import check_text, summary
+from reports.exports import check_text, summary
 from tests.validation.rich_drives import random_inputs, rich_drive
 
 ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")

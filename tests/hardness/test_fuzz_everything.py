@@ -126,7 +126,7 @@ def test_a_fit_of_too_few_samples_and_rows_too_close_for_the_filter() -> None:
         refusals.refused(filtered_motion, np.linspace(0.0, 1.0, 100), period_s, **asked)
 
 
-def refused_of_reader_edges(read, text: str) -> str:
+def unread(read, text: str) -> str:
     return refusals.refused(read, text, "f")
 
 
@@ -141,28 +141,26 @@ def lists(levels: int) -> str:
 
 def test_depth_values_texts_keys_and_size() -> None:
     assert parse_toml(tables(TOML_DEPTH.most), "f")
-    assert "nested too deeply" in refused_of_reader_edges(parse_toml, tables(TOML_DEPTH.most + 1))
+    assert "nested too deeply" in unread(parse_toml, tables(TOML_DEPTH.most + 1))
     assert parse_json(lists(JSON_DEPTH.most + 1), "f")  # the innermost holds nothing
-    assert "nested too deeply" in refused_of_reader_edges(parse_json, lists(JSON_DEPTH.most + 2))
+    assert "nested too deeply" in unread(parse_json, lists(JSON_DEPTH.most + 2))
     for read, text in ((parse_toml, "a = " + "[" * 10_000), (parse_json, "[" * 10_000)):
-        assert "nested too deeply" in refused_of_reader_edges(read, text)
+        assert "nested too deeply" in unread(read, text)
 
     def text(count: int) -> str:  # with the file and the list there are two more
         return f"a = [{'1,' * (count - 2)}]"
 
     assert parse_toml(text(TOML_VALUES.most), "f")
-    assert f"at most {TOML_VALUES.most}" in refused_of_reader_edges(parse_toml, text(TOML_VALUES.most + 1))
-    assert "more values" in refused_of_reader_edges(
-        parse_toml, "\n".join(f"k{k} = 1" for k in range(TOML_VALUES.most + 1))
-    )
+    assert f"at most {TOML_VALUES.most}" in unread(parse_toml, text(TOML_VALUES.most + 1))
+    assert "more values" in unread(parse_toml, "\n".join(f"k{k} = 1" for k in range(TOML_VALUES.most + 1)))
     most = TEXT_CHARACTERS.most
     assert parse_toml(f'a = "{"x" * most}"', "f")
-    assert f"{most + 1} characters" in refused_of_reader_edges(parse_toml, f'a = "{"x" * (most + 1)}"')
-    assert "characters" in refused_of_reader_edges(parse_toml, f'"{"x" * (most + 1)}" = 1')
-    assert "nested too deeply" in refused_of_reader_edges(parse_toml, "a" + ".a" * KEY_PARTS.most + " = 1")
+    assert f"{most + 1} characters" in unread(parse_toml, f'a = "{"x" * (most + 1)}"')
+    assert "characters" in unread(parse_toml, f'"{"x" * (most + 1)}" = 1')
+    assert "nested too deeply" in unread(parse_toml, "a" + ".a" * KEY_PARTS.most + " = 1")
     room = TOML_BYTES.most - len("a = 1\n#")
     assert parse_toml("a = 1\n#" + "x" * room, "f") == {"a": 1}
-    assert "larger" in refused_of_reader_edges(parse_toml, "a = 1\n#" + "x" * (room + 1))
+    assert "larger" in unread(parse_toml, "a = 1\n#" + "x" * (room + 1))
 
 
 def test_integers_control_characters_and_keys_twice() -> None:
@@ -170,15 +168,15 @@ def test_integers_control_characters_and_keys_twice() -> None:
         for read, text in ((parse_toml, "a = {}"), (parse_json, '{{"a": {}}}')):
             edge = 2**63 - 1 if number > 0 else -(2**63)
             assert read(text.format(edge), "f") == {"a": edge}
-            assert "whole numbers of 64 bits" in refused_of_reader_edges(read, text.format(f"{number:d}"))
+            assert "whole numbers of 64 bits" in unread(read, text.format(f"{number:d}"))
     for code in (0x00, 0x07, 0x1B, 0x7F, 0x85, 0x9B):
         for text in (f'a = "x\\u{code:04x}"', f'"x\\u{code:04x}" = 1'):
-            assert f"U+{code:04X}" in refused_of_reader_edges(parse_toml, text)
-        assert f"U+{code:04X}" in refused_of_reader_edges(parse_json, f'{{"a": "x\\u{code:04x}"}}')
+            assert f"U+{code:04X}" in unread(parse_toml, text)
+        assert f"U+{code:04X}" in unread(parse_json, f'{{"a": "x\\u{code:04x}"}}')
     assert parse_toml('a = "x\\n\\t"', "f") == {"a": "x\n\t"}
     for text in ("a = 1\na = 2", "[a]\n[a]"):
-        refused_of_reader_edges(parse_toml, text)
-    refused_of_reader_edges(parse_json, '{"a": 1, "a": 2}')
+        unread(parse_toml, text)
+    unread(parse_json, '{"a": 1, "a": 2}')
 
 
 KINDS: dict[str, Callable[[Path], object]] = {

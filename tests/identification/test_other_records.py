@@ -121,11 +121,10 @@ def test_what_was_identified_is_what_the_studies_draw(tmp_path, cli) -> None:
 def test_the_tolerance_of_a_value_that_is_kept_counts_in_those_that_were_found(tmp_path) -> None:
     """At one constant load M, dry + CM M is all that shows: dry has the error M times that of CM."""
     record = open_record(write(tmp_path / "a.csv", columns_of(motion(1, load_Nm=3.0), load_Nm=3.0)))
-    base = load_design("ilr33-amber")
     key, std = "friction.load_coefficient", 2e-4
-    known = replace(base.parameters[key], tolerance=Tolerance(kind="normal", std=std))
-    design = replace(base, parameters=FrozenMap({**base.parameters, key: known}))
-    plain, wide = fit_records(base, [record]), fit_records(design, [record])
+    known = replace(AMBER.parameters[key], tolerance=Tolerance(kind="normal", std=std))
+    design = replace(AMBER, parameters=FrozenMap({**AMBER.parameters, key: known}))
+    plain, wide = fit_records(AMBER, [record]), fit_records(design, [record])
     k = plain.names.index("dry")
     assert plain.fixed["load_coefficient"].moves["dry"] == pytest.approx(3.0, rel=0.02)
     added = wide.covariance[k, k] - plain.covariance[k, k]

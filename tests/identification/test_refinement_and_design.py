@@ -77,8 +77,7 @@ def test_random_errors_have_the_least_squares_covariance_and_what_is_not_told_is
 
 
 def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: SurfaceFit) -> None:
-    design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, count=3)
+    result = suggest_runs(BASE, fit, count=3)
     left = [run.remaining for run in result.runs]
     assert left == sorted(left, reverse=True)
     assert left[0] < 1.0
@@ -93,26 +92,25 @@ def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: Surfac
     worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in result.runs]
     assert spread(result.runs) < spread(worse) < spread([])
     assert left[-1] == pytest.approx(spread(result.runs) / spread([]))
-    result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
+    result = suggest_runs(BASE, fit, count=4, criterion="D")
     assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
     assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
     assert 0.5 < result.shared_part <= 1.0
     assert result.largest_shared in fit.shared_shifts
-    refused(suggest_runs, load_design("ilr33-amber"), fit, criterion="E", words="criterion")
+    refused(suggest_runs, BASE, fit, criterion="E", words="criterion")
 
 
 def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:
     """The phase margin of the velocity loop falls as the viscous friction falls: first order holds."""
     from actuator_lti import assemble_loops, stability_margins
 
-    design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, count=1)
+    result = suggest_runs(BASE, fit, count=1)
     spread = next(m for m in result.margins if m.label == "position phase margin, 0 N m")
     base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
     base["friction.load_coefficient"] = float(fit.values[2])
 
     def margin(scale: float) -> float:
-        changed = with_values(design, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
+        changed = with_values(BASE, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
         at = {"operating_point": "describing-function", "load_Nm": 0.0}
         loops = assemble_loops(changed, speed_amplitude_rad_s=0.02 * 942.5, **at)
         value = stability_margins(loops.position.open_loop).phase_margin_deg

@@ -20,7 +20,7 @@ from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
 from analyses.tuning.start import rule_gains
 from nonlinear import Rows
-from reports.live import live_model
+from reports.live.model import live_model
 
 
 def poles(design: Design) -> np.ndarray:

@@ -12,7 +12,7 @@ import typer
 
 from actuator_lti.design.loader import design_text
 from reports.cli.app import build
-from reports.cli.progress import progress
+from reports.cli.output import progress
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:

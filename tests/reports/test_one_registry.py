@@ -20,7 +20,7 @@ from reports.as_json import as_json
 from reports.cli.app import PANELS
 from reports.document import load
 from reports.html import script
-from reports.live import live_model
+from reports.live.model import live_model
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure, figures_of
 from reports.nightly.moves import Tolerances

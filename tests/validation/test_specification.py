@@ -29,7 +29,7 @@ from reports.sections import specification as specification_section
 from reports.sections.duty import section
 from tests.changed import changed
 
-AMBER = load_design("ilr33-amber")
+AMBER, FIN, JOINT = (load_design(name) for name in ("ilr33-amber", "fin", "joint"))
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
 UNDER_LOAD = {
     "fin": {"load.moment_damping": "2 N*m*s/rad"},
@@ -169,8 +169,6 @@ def test_the_demand_of_the_plane_is_what_steady_motion_takes(name: str) -> None:
     assert float(torque.mean()) == pytest.approx(wanted, rel=2e-3)
 
 
-AMBER_OF_DUTY, FIN, JOINT = (load_design(name) for name in ("ilr33-amber", "fin", "joint"))
-
 HOT = {
     "temperature.thermal_resistance": "2 K/W",
     "temperature.thermal_time": "60 s",
@@ -180,7 +178,7 @@ HOT = {
 
 def test_rms_current_of_a_slow_sine_is_friction_and_inertia() -> None:
     """kM i = Tc sgn(w) + Cv w + J dw/dt of the motion itself, the drive following (rigid, no load path)."""
-    design = AMBER_OF_DUTY
+    design = AMBER
     A, f, M = 0.02, 1.0, 4.0
     result = duty(design, Asked.of(design, amplitude_rad=A, frequency_hz=f, load_Nm=M))
     t = np.linspace(0.0, 1.0, 20001)
@@ -279,14 +277,14 @@ def test_section_figure_and_command(cli) -> None:
 
 def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
     """1 rad at 20 Hz is far beyond 22.7 deg/s: the current may do, the motion is not the one asked for."""
-    asked = Asked.of(AMBER_OF_DUTY, amplitude_rad=0.02, frequency_hz=1.0, load_Nm=0.0)
-    assert "not followed" not in section(duty(AMBER_OF_DUTY, asked))["result"]
-    made = section(duty(AMBER_OF_DUTY, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
+    asked = Asked.of(AMBER, amplitude_rad=0.02, frequency_hz=1.0, load_Nm=0.0)
+    assert "not followed" not in section(duty(AMBER, asked))["result"]
+    made = section(duty(AMBER, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
     assert "it is not followed as asked, limited by" in made["result"]
     assert made["status"] == "warn"
-    slow = with_overrides(AMBER_OF_DUTY, {"command.rate": "7 deg/s"})  # 0.02 rad at 1 Hz are 7.2 deg/s
+    slow = with_overrides(AMBER, {"command.rate": "7 deg/s"})  # 0.02 rad at 1 Hz are 7.2 deg/s
     assert duty(slow, asked).limited == ("profile",)
-    assert duty(with_overrides(AMBER_OF_DUTY, {"command.rate": "8 deg/s"}), asked).limited == ()
+    assert duty(with_overrides(AMBER, {"command.rate": "8 deg/s"}), asked).limited == ()
 
 
 def test_the_current_of_an_ac_motor_is_told_in_the_model_s_amperes(cli) -> None:

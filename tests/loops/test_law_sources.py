@@ -1,0 +1,121 @@
+"""What a file or a system gives a law of one's own: all of it is taken, or refused by its name."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.signal
+from own_laws import period_s
+from scipy.io import savemat
+from scipy.sparse import csc_matrix
+from test_own_law import refused
+
+from actuator_lti import load_design
+from actuator_lti.design import Design, write_design
+from actuator_lti.files.mat5 import read_mat5
+
+BASE = load_design("ilr33-amber-multirate")
+T = period_s(BASE, "velocity")
+A, B, C, D = (
+    np.array(one) for one in ([[0.5, 0.1], [0, 0.9]], [[1e-3, 0], [0, 1e-4]], [[1, 0.5]], [[0.1, 0]])
+)
+L = np.array([0.25, -0.5])
+INPUTS = ["error", "speed"]
+WANTED = BASE.with_law("velocity", (A, B, C, D, T), INPUTS, L=L).controller
+PARTS = {"A": A, "B": B, "C": C, "D": D, "Ts": T}
+
+
+def read(folder: Path, held: Any, beside: str = "") -> Design:
+    """The design with a law of a file: JSON of a text, else .mat."""
+    if isinstance(held, str):
+        (folder / "k.json").write_text(held)
+    else:
+        savemat(folder / "k.mat", held)
+    tables = write_design(BASE.with_law("velocity", ([], [], [], [[1.0]], T), ["error"])).split("\n\n")
+    name = f'file = "k.{"json" if isinstance(held, str) else "mat"}"'
+    made = [f"[control.velocity.law]\n{name}\n{beside}" if "velocity.law" in one else one for one in tables]
+    (folder / "mine.toml").write_text("\n\n".join(made))
+    return load_design(folder / "mine.toml")
+
+
+NAMES = f"inputs = {INPUTS}"
+
+
+@pytest.mark.parametrize(
+    ("held", "beside"),
+    [
+        (PARTS | {"L": L}, NAMES),
+        (PARTS | {"L": L[:, None], "inputs": INPUTS}, ""),
+        (PARTS, f"{NAMES}\nL = [0.25, -0.5]"),
+        (PARTS | {"L": L, "A": csc_matrix(A), "B": csc_matrix(B), "D": csc_matrix(D)}, NAMES),
+        (PARTS | {"L": L + 0j, "A": csc_matrix(A + 0j)}, NAMES),
+        ({"K": PARTS | {"L": L, "inputs": np.array(INPUTS, dtype=object)}}, NAMES),
+    ],
+)
+def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) -> None:
+    assert read(tmp_path, held, beside).controller == WANTED
+
+
+def test_its_gain_is_taken(tmp_path: Path) -> None:
+    assert read(tmp_path, PARTS | {"gain": 2.0}, NAMES).controller.velocity.law.gain == 2.0
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D", "L", "Ts", "gain"])
+@pytest.mark.parametrize(
+    "made", [lambda one: one + 1e-3j, lambda _: "text", lambda one: csc_matrix(one * 1j)]
+)
+def test_what_is_not_real_is_refused_by_its_name(name: str, made: Any, tmp_path: Path) -> None:
+    whole = PARTS | {"L": L, "gain": 1.0}
+    for held in (whole | {name: made(whole[name])}, {"K": whole | {name: made(whole[name])}}):
+        said = refused(read, tmp_path, held, NAMES)
+        assert said.endswith(f'law.file = "k.mat": {name}: must be real; allowed: finite real numbers'), said
+
+
+@pytest.mark.parametrize("value", ['"0.5"', "true", "null", "[[0.5, true]]"])
+def test_json_text_and_truth_are_no_numbers(value: str, tmp_path: Path) -> None:
+    said = refused(read, tmp_path, f'{{"A": {value}, "B": [[1]], "C": [[1]], "D": [[0]], "Ts": {T}}}', NAMES)
+    assert "A: must be real" in said
+
+
+def test_what_a_file_leaves_open_is_refused(tmp_path: Path) -> None:
+    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
+    several = refused(read, tmp_path, {"K1": PARTS, "K2": PARTS}, NAMES)
+    assert "holds several laws: K1, K2; allowed: a file of one law" in several
+    assert "several laws: its own A, B, C, D, K" in refused(
+        read, tmp_path, json.dumps({**one, "K": one}), NAMES
+    )
+    assert "has Ts and dt that differ" in refused(read, tmp_path, json.dumps({**one, "dt": 1.0}), NAMES)
+    assert "Ts: 1 x 2; allowed: one number" in refused(read, tmp_path, PARTS | {"Ts": [T, T]}, NAMES)
+    for more, beside in (
+        ({"inputs": INPUTS[::-1]}, ""),
+        ({"L": L}, "L = [1.0, 2.0]"),
+        ({"gain": 2.0}, "gain = 3"),
+    ):
+        said, key = refused(read, tmp_path, PARTS | more, f"{NAMES}\n{beside}"), next(iter(more))
+        assert said.endswith(f"allowed: a file's name, without {key}, which the file gives")
+    assert "without A, period, which" in refused(
+        read, tmp_path, PARTS, f'{NAMES}\nA = [[1]]\nperiod = "1 ms"'
+    )
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        (np.array([[0.5j]]), [[1]], [[1]], [[0]], T),
+        scipy.signal.StateSpace([[0.5j]], [[1]], [[1]], [[0]], dt=T),
+        scipy.signal.ZerosPolesGain([0.2j], [0.5], 1.0, dt=T),
+        scipy.signal.TransferFunction([1 + 1j], [1, 0.5], dt=T),
+    ],
+)
+def test_a_complex_system_is_refused(system: Any) -> None:
+    assert "must be real" in refused(BASE.with_law, "velocity", system, ["error"])
+
+
+def test_a_damaged_sparse_matrix_is_passed_over(tmp_path: Path) -> None:
+    savemat(tmp_path / "k.mat", {"A": csc_matrix(A)})
+    good = (tmp_path / "k.mat").read_bytes()
+    assert np.array_equal(read_mat5(good).arrays["A"], A)
+    rows = np.array([0, 0, 1], dtype="<i4").tobytes()
+    assert read_mat5(good.replace(rows, np.array([0, 0, 7], dtype="<i4").tobytes())).passed_over == ["A"]
