@@ -35,6 +35,19 @@ class Matrices(NamedTuple):
     L: np.ndarray
 
 
+def balance(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """Powers of two t, x = t x', that give rows and columns of A, B and C like sizes.
+
+    As `matrix_balance` (LAPACK gebal), of A with one state more that stands for all inputs and the output.
+    """
+    from scipy.linalg import matrix_balance
+
+    n = len(A)
+    whole = np.block([[A, np.abs(B).sum(axis=1, keepdims=True)], [C.reshape(1, n), np.zeros((1, 1))]])
+    scale = matrix_balance(whole, permute=False, separate=True)[1][0]
+    return scale[:n] / scale[n]
+
+
 # fmt: off
 @dataclass(frozen=True, kw_only=True)
 class StateSpace:
@@ -98,7 +111,9 @@ class Law(StateSpace):
     @property
     def integrates(self) -> bool:
         """Whether it has a pole at z = 1."""
-        return bool(self.A) and bool(np.linalg.cond(np.eye(len(self.A)) - self.sampled.A) > SINGULAR)
+        A, B, C, _, _ = self.sampled
+        t = balance(A, B, C)  # the size of a state is a matter of taste
+        return bool(self.A) and bool(np.linalg.cond(np.eye(len(A)) - A * t / t[:, None]) > SINGULAR)
 
     @property
     def direct(self) -> float:

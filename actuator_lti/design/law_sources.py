@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from actuator_lti.design.field import BIG
+from actuator_lti.design.law import balance
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown, shown_path
@@ -90,12 +92,15 @@ def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) 
             raise InputError(f"{name}: {_shape(parts[name])}; allowed: one row, a law has one output")
     if n and parts["B"].size % n:
         raise InputError(f"B: {_shape(parts['B'])}; allowed: {n} rows, as A has")
-    tree: Tree = {
-        "A": parts["A"].reshape(n, n).tolist(),
-        "B": parts["B"].reshape(n, -1).tolist() if n else [],
-        **{name: parts[name].ravel().tolist() for name in ("C", "D", "L")},
+    A, C, D, L = parts["A"].reshape(n, n), *(parts[name].ravel() for name in ("C", "D", "L"))
+    B = parts["B"].reshape(n, -1) if n else np.zeros((0, 0))
+    beyond = max(np.abs(part).max(initial=0.0) for part in (A, B, C, L)) > BIG
+    if beyond and n and C.size == n and L.size in (0, n):
+        t = balance(A, np.hstack([B, L.reshape(n, -1)]), C)
+        A, B, C, L = A * t / t[:, None], B / t[:, None], C * t, L / t[: L.size]
+    tree = {
+        name: part.tolist() for name, part in zip((*PARTS, "L"), (A, B, C, D, L), strict=True) if part.size
     }
-    tree = {name: value for name, value in tree.items() if value}
     return tree if period_s is None else {**tree, "period": f"{_number('dt', period_s)!r} s"}
 
 

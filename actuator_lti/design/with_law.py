@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOPS
-from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS
+from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS, StateSpace, balance
 from actuator_lti.design.law_sources import PARTS, law_tree
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
@@ -100,9 +100,19 @@ def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> t
     """A continuous system sampled by a stated method."""
     from scipy.signal import cont2discrete
 
-    law_tree(*parts)
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method = {shown(method)}: allowed: {' or '.join(METHODS)}")
     if dt not in (None, 0) or dt is False:
         raise InputError(f"method = {shown(method)}: the system is sampled already, dt = {dt}")
-    return tuple(cont2discrete(tuple(np.atleast_2d(part) for part in parts), period_s, METHODS[method])[:4])
+    plain = StateSpace(**law_tree(*parts))
+    m = len(plain.B[0] if plain.B else plain.D)
+    for key, (shape, fits) in plain.sizes(m).items():
+        if not fits:
+            raise InputError(f"{key}: other sizes; allowed: {shape}")
+    A, B, C, D, _ = plain.matrices(m)
+    if not A.size:
+        return A, B, C, D
+    t = balance(A, B, C)  # what is sampled is well scaled; its states stay those of the system
+    scaled = A * t / t[:, None], B / t[:, None], (C * t)[None], D[None]
+    A, B, C, D = cont2discrete(scaled, period_s, METHODS[method])[:4]
+    return A / t * t[:, None], B * t[:, None], C / t, D

@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 import scipy.signal
@@ -14,6 +15,7 @@ from test_own_law import refused
 
 from actuator_lti import load_design
 from actuator_lti.design import Design, write_design
+from actuator_lti.design.law import Law
 from actuator_lti.files.mat5 import read_mat5
 
 BASE = load_design("ilr33-amber-multirate")
@@ -119,3 +121,67 @@ def test_a_damaged_sparse_matrix_is_passed_over(tmp_path: Path) -> None:
     assert np.array_equal(read_mat5(good).arrays["A"], A)
     rows = np.array([0, 0, 1], dtype="<i4").tobytes()
     assert read_mat5(good.replace(rows, np.array([0, 0, 7], dtype="<i4").tobytes())).passed_over == ["A"]
+
+
+def response(law: Law, z: np.ndarray) -> np.ndarray:
+    made = law.sampled
+    n = len(made.A)
+    return np.array(
+        [(made.C @ np.linalg.solve(one * np.eye(n) - made.A, made.B) + made.D).item() for one in z]
+    )
+
+
+@pytest.mark.parametrize("form", [lambda K: K, control.ss])
+def test_a_product_of_transfer_functions_is_a_law(form: Any) -> None:
+    """Its companion form has numbers of 1e15; the response is that of the factors one by one."""
+    s = control.tf("s")
+
+    def factors(p: Any) -> list[Any]:
+        lag = [1 / ((p / w) ** 2 + 1.2 * p / w + 1) for w in (900.0, 3000.0)]
+        return [22 * (p + 3) / p, (p / 20 + 1) / (p / 200 + 1), *lag]
+
+    K = form(np.prod(factors(s)))
+    mine = BASE.with_law("velocity", K, ["error"], method="tustin")
+    z = np.exp(1j * np.geomspace(1e-3, 3.0, 40))
+    want = np.prod(factors(2 / T * (z - 1) / (z + 1)), axis=0)
+    np.testing.assert_allclose(response(mine.controller.velocity.law, z), want, rtol=1e-11)
+    assert mine.controller.velocity.law.integrates
+
+
+def test_sampling_keeps_what_a_long_filter_leaves() -> None:
+    """Six lags of 30 rad/s: 1e-12 of the gain at rest is left far above them, and it is right."""
+    s, T_p = control.tf("s"), period_s(BASE, "position")
+    K = np.prod([1 / (s / (30.0 + 10 * k) + 1) for k in range(6)])
+    law = BASE.with_law("position", K, ["error"], method="tustin").controller.position.law
+    p = 1j * np.geomspace(1.0, 3000.0, 30)
+    z = (2 / T_p + p) / (2 / T_p - p)
+    want = np.prod([1 / (p / (30.0 + 10 * k) + 1) for k in range(6)], axis=0)
+    np.testing.assert_allclose(response(law, z), want, rtol=1e-10)
+    assert law.steady("command") == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_size_of_the_states_changes_nothing() -> None:
+    """Scaled by powers of two a law is the same to the last bit, anti-windup and all."""
+    law = BASE.with_law("velocity", (A, B, C, D, T), INPUTS, L=L).controller.velocity.law
+    t = 2.0 ** np.array([60.0, -60.0])
+    scaled = A * t / t[:, None], B / t[:, None], C * t, D, T
+    found = BASE.with_law("velocity", scaled, INPUTS, L=L / t).controller.velocity.law
+    for k in range(4):
+        power = np.linalg.matrix_power
+        assert np.array_equal(found.sampled.C @ power(found.sampled.A, k) @ found.sampled.B,
+                              law.sampled.C @ power(law.sampled.A, k) @ law.sampled.B)  # fmt: skip
+        assert found.sampled.C @ power(found.sampled.A, k) @ found.sampled.L == (
+            law.sampled.C @ power(law.sampled.A, k) @ law.sampled.L
+        )
+    apart = ([[0.5, 1e12], [0.0, 0.5]], [[0.0], [1.0]], [[1e-12, 0.0]], [[0.0]], T)
+    law = BASE.with_law("velocity", apart, ["error"]).controller.velocity.law
+    assert law.steady("command") == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_continuous_system_that_does_not_fit_is_refused() -> None:
+    bad = ([[1.0, 0.0], [0.0, 1.0]], [[1.0], [1.0]], [[1.0]], [[0.0]])
+    assert "C: other sizes; allowed: 1 x 2" in refused(
+        lambda: BASE.with_law("velocity", bad, ["error"], method="zoh")
+    )
+    gain = BASE.with_law("velocity", ([], [], [], [[0.2]]), ["error"], method="zoh")
+    assert gain.controller.velocity.law.D == (0.2,)
