@@ -220,6 +220,8 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
         return
     if (law.C or law.D) and not any((*law.C, *law.D)):
         yield f"{path}.{'D' if law.D else 'C'}", "zero", "the law gives nothing; allowed: not C and D zero"
+    if law.gain == 0.0:
+        yield f"{path}.gain", "0", "the law gives nothing; allowed: not 0"
     if len(law.A) > MOST_STATES:
         yield f"{path}.A", f"{len(law.A)} states", f"allowed: at most {MOST_STATES}"
     if len(law.L) not in (0, len(law.A)):

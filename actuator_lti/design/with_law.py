@@ -73,8 +73,12 @@ def with_law(
     L, gain, every, method, continuous = {**SETTINGS, **settings}.values()
     if stage not in LOOPS:
         raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(LOOPS)}")
-    there: Mapping[str, Any] = design_tree(design)["control"].get(stage, {})
-    table = {key: value for key, value in there.items() if key in BESIDE_A_LAW}
+    control: Mapping[str, Any] = design_tree(design)["control"]
+    present = [one for one in LOOPS if one in control]
+    if outer := [one for one in present if stage not in present and LOOPS.index(one) > LOOPS.index(stage)]:
+        gains = f"the drive has none, and its {outer[0]} stage has gains for a drive without"
+        raise InputError(f"stage = {shown(stage)}: {gains}; allowed: {', '.join(present)}")
+    table = {key: value for key, value in control.get(stage, {}).items() if key in BESIDE_A_LAW}
     table |= {} if every is None else {"every": every}
     ticks = 1 if stage == "current" else table.get("every", 1)
     period_s = design.controller.period_s * (ticks if isinstance(ticks, int) and ticks > 0 else 1)
