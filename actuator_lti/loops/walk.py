@@ -138,6 +138,8 @@ class Walk(ABC):
         self.signals |= {name: self.state(name) for name in plant.states}
         for name, terms in plant.rows.items():
             self.signals[name] = total(value * self.state(state) for state, value in terms.items())
+        if self.program.shares_speed and self.updates(self.drive.interval["speed"]):
+            self.measured_speed()  # whether or not a stage takes it in this tick
         if not stages:
             value = self.command() if self.updates(1) else None
             return self.held("u", value, 1, 1)

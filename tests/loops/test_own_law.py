@@ -12,18 +12,45 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, as_law, drawn, period_s
+from own_laws import PlainLaw, as_law, drawn, linear, period_s
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
-from actuator_lti.design import Design, design_hash, design_tree, read_design_text, warnings_of, write_design
+from actuator_lti.design import (
+    Design,
+    design_hash,
+    design_tree,
+    model,
+    read_design_text,
+    warnings_of,
+    write_design,
+)
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
+from tests.changed import changed
 
 TICKS = 400
 SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
+
+
+def same_run(design: Design, case: object, rng: np.random.Generator) -> None:
+    """Simulator without limits and linear map, tick by tick, under a sine, a ramp and a load."""
+    t = np.arange(TICKS)
+    command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
+    rows = Rows.of(design, limits_on=False)
+    rows["ticks"], rows["load"] = TICKS, 0.1
+    rows.series("command", command)
+    system = assemble_loops(design).tick_system
+    with np.errstate(over="ignore", invalid="ignore"):
+        run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
+    for name, ours in SIGNALS.items():
+        if name not in linear:
+            continue
+        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
+        most = np.abs(linear[name][some]).max()
+        assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (case, name)
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -36,21 +63,20 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
             continue
         design, stage = found
         stages.add(stage)
-        rng, t = np.random.default_rng(case), np.arange(TICKS)
-        command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
-        rows = Rows.of(design, limits_on=False)
-        rows["ticks"], rows["load"] = TICKS, 0.1
-        rows.series("command", command)
-        system = assemble_loops(design).tick_system
-        with np.errstate(over="ignore", invalid="ignore"):
-            run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
-        for name, ours in SIGNALS.items():
-            if name not in linear:
-                continue
-            some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
-            most = np.abs(linear[name][some]).max()
-            assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (part, case, name)
+        same_run(design, (part, case), np.random.default_rng(case))
     assert stages == {"current", "velocity", "position"}
+
+
+@pytest.mark.parametrize("every", [1, 2, 10])
+@pytest.mark.parametrize("encoder", [Encoder(speed="difference", difference_samples=3),
+                                     Encoder(speed="tracking", bandwidth_rad_s=600.0)])  # fmt: skip
+def test_a_position_law_takes_the_speed_that_is_measured_every_tick(encoder: Encoder, every: int) -> None:
+    """Without a velocity stage the speed is measured every tick, the law updated every so many."""
+    loops = {"velocity": None, "position": model.PositionLoop(gain=1.0, every=every)}
+    design = linear(changed(load_design("ilr33-amber"), encoder=encoder, controller=loops))
+    T = design.controller.period_s * every
+    law = ([], [], [], [[0.5, -0.5, -2e-3]], T)
+    same_run(design.with_law("position", law, ["command", "angle", "speed"]), every, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
