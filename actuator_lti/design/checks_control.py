@@ -196,6 +196,8 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
     path, velocity = f"control.{stage}.law.inputs", design.controller.velocity
     if "current" in law.inputs and not design.motor.has_electrical_dynamics:
         yield path, "current", "not allowed with motor.source_gain, which has no current"
+    if "twist" in law.inputs and design.coupling is None:
+        yield path, "twist", "not allowed without a coupling"
     filtered = design.encoder.filter_time_s > 0.0 or (velocity and velocity.filters_on("speed"))
     if filtered and ("speed" in law.inputs or stage == "velocity"):
         yield path, "speed", "allowed: without encoder.filter_time and filters of the speed"

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOPS
-from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS, StateSpace, balance
+from actuator_lti.design.law import BESIDE_A_LAW, LAW_WORDS, StateSpace, balance
 from actuator_lti.design.law_sources import PARTS, law_tree
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
@@ -57,8 +57,8 @@ def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
     given = getattr(system, "input_labels", None) if inputs is None else inputs
     listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for name in listed:
-        if name not in LAW_INPUTS or given is name:
-            raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_INPUTS)}")
+        if name not in LAW_WORDS or given is name:
+            raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_WORDS)}")
     return listed
 
 
