@@ -1,6 +1,5 @@
 """`stability_margins`: one entry for every kind of loop."""
 
-from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -15,6 +14,8 @@ from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
 from actuator_lti.systems.measured_response import is_measured
+
+MOST_STATES = 120  # of a loop for exact arithmetic, which takes the fifth power of their number
 
 
 def stability_margins(
@@ -110,12 +111,23 @@ def _band(band: Any) -> tuple[float, float] | None:
 
 def _rational(given: Given, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
     """In double precision, and by exact arithmetic where that is not sure of itself."""
-    if not certify:
-        with suppress(Doubtful):
+    doubt = ""
+    if not certify or _too_large(given):
+        try:
             return checked_margins(loop_of(given, warp=True), 0.0, band)
+        except Doubtful as error:
+            doubt = str(error)
+    if _too_large(given):
+        why = f"{doubt}; exact arithmetic decides up to {MOST_STATES} states, these are {given.b.size}"
+        return _withheld(given.period_s, 0.0, "factors of the loop", why)
     from actuator_lti.margins.exact.certified import certified_margins  # python-flint only where it is needed
 
     return certified_margins(given, band)
+
+
+def _too_large(given: Given) -> bool:
+    """Whether exact arithmetic on the matrices would take minutes."""
+    return given.A is not None and given.b.size > MOST_STATES
 
 
 def _behind_delay(

@@ -19,6 +19,7 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
 from actuator_lti.loops.limiters import Onset, onset
 from actuator_lti.loops.result import Form
+from actuator_lti.margins.engine import MOST_STATES
 from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.isolation import attempt
@@ -31,7 +32,6 @@ if TYPE_CHECKING:
 
 FORMS: tuple[Form, ...] = ("sampled", "continuous", "ideal")
 DESCRIBED_FRACTIONS = (0.01, 0.1)  # of the top speed, at which friction is described
-MOST_STATES = 120  # of a periodic loop's fundamental: its certificate takes the fifth power of their number
 
 
 @dataclass(frozen=True)

@@ -240,3 +240,14 @@ def test_the_smallest_distance_is_found_at_a_resonance_that_few_places_show() ->
     assert bound == pytest.approx(1.814e-3, rel=1e-3)
     assert 0.99 * bound < m.modulus_margin <= bound  # a resonance passes -1 as a straight line
     assert m.modulus_frequency_rad_s == pytest.approx(nearest.frequency_rad_s, rel=1e-6)
+
+
+def test_a_loop_of_hundreds_of_states_that_double_precision_does_not_place_is_withheld_at_once() -> None:
+    """A pole at z = 1 but for rounding, and 150 states: exact arithmetic would take minutes."""
+    n = 150
+    A = np.diag(np.full(n - 1, 1.0), -1)
+    A[0, -1] = 1.0 + 2.0**-52  # poles on the circle all round, to rounding
+    loop = control.StateSpace(A, np.eye(n)[:, :1], 0.5 * np.eye(n)[-1:], [[0.0]], 0.1)
+    m = stability_margins(loop, certify=True)
+    assert (m.stable, m.evidence) == (None, "withheld")
+    assert "exact arithmetic decides up to 120 states, these are 150" in m.evidence_reason
