@@ -14,12 +14,12 @@ import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
+from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
