@@ -74,11 +74,7 @@ def _off_dc(p: flint.acb, loop: RationalLoop) -> float:
 
 
 def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
-    def exact(value: flint.arb) -> flint.fmpq:
-        mantissa, exponent = value.mid().man_exp()
-        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
-
-    return flint.fmpq_poly([exact(value.real) for value in p.coeffs()])
+    return flint.fmpq_poly([value.real.mid().fmpq() for value in p.coeffs()])
 
 
 def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
