@@ -196,6 +196,8 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
     path, velocity = f"control.{stage}.law.inputs", design.controller.velocity
     if "current" in law.inputs and not design.motor.has_electrical_dynamics:
         yield path, "current", "not allowed with motor.source_gain, which has no current"
+    if "twist" in law.inputs and design.coupling is None:
+        yield path, "twist", "not allowed without a coupling"
     filtered = design.encoder.filter_time_s > 0.0 or (velocity and velocity.filters_on("speed"))
     if filtered and ("speed" in law.inputs or stage == "velocity"):
         yield path, "speed", "allowed: without encoder.filter_time and filters of the speed"
@@ -220,6 +222,8 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
         return
     if (law.C or law.D) and not any((*law.C, *law.D)):
         yield f"{path}.{'D' if law.D else 'C'}", "zero", "the law gives nothing; allowed: not C and D zero"
+    if law.gain == 0.0:
+        yield f"{path}.gain", "0", "the law gives nothing; allowed: not 0"
     if len(law.A) > MOST_STATES:
         yield f"{path}.A", f"{len(law.A)} states", f"allowed: at most {MOST_STATES}"
     if len(law.L) not in (0, len(law.A)):
