@@ -18,8 +18,9 @@ from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import own_share, own_std, parameter
 from analyses.identification.asked import Of
 from analyses.identification.design_values import CONSTANTS, at_constant, kept_constant
-from analyses.identification.response_fit import STEP, ResponseFit, determined
+from analyses.identification.response_fit import ResponseFit, determined
 from analyses.identification.response_model import Seen, loop_model
+from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
 from analyses.studies.sampling import correlation_of
@@ -66,7 +67,8 @@ def identify_response(
     design : Design
         Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
         response does not determine (a standard error above the design's value, and above a quarter of what
-        it is off; of a stiffness, or of one of several inertias, above a quarter of what was found) is kept.
+        it is off; of a stiffness, or of one of several inertias, no end of its interval within a factor of
+        30) is kept.
     source : path or control.FrequencyResponseData
         See `actuator_lti.files.response.read_response`.
     loop : str, optional
