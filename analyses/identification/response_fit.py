@@ -156,10 +156,8 @@ def determined(
         beside = Search.of(start, mine, seen.off, kept, unit)
         begins = [np.append(best.x, np.zeros(len(kept))), *better]
         joint = min((beside.least(beside.at(x)) for x in begins), key=lambda one: one.cost)
-        like = [told_apart(one.slopes[:, :n], mine, least=RESOLVED)[1] for one in (best, joint)]
-        untold = {one.name: str(one) for one in (*like[0], *like[1])}
         try:
-            ends, untold = (np.zeros(0), untold) if untold else _asked(start, beside, joint, level)
+            ends, untold = _asked(start, beside, joint, level)
         except _Lower as lower:
             better.append(lower.args[0])
             continue
@@ -189,8 +187,13 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     An inertia beside another that is looked for, and a stiffness, are told where their interval has two ends,
     another value where its standard error is below the design's value, or a quarter of what it is off.
     """
-    n = search.count
-    names, std = search.names[:n], np.sqrt(np.diag(joint.covariance))[:n]
+    n, ends = search.count, np.zeros((search.count, 2))
+    names, x = search.names[:n], joint.x[:n]
+    gone = np.argsort(np.abs(x) > np.where(search.logs[:n], np.log(REACH), REACH), kind="stable")
+    _, like = told_apart(joint.slopes[:, gone], [names[k] for k in gone], least=RESOLVED)
+    if like:  # the last one: of those at the end of a valley, where others do the same
+        return ends, {like[-1].name: str(like[-1])}
+    std = np.sqrt(np.diag(joint.covariance))[:n]
     own = np.array([parameter_value(start, name) for name in names])
     off = np.abs(search.values(joint.x)[:n] - own)
     share = std * search.sizes(joint.x) / np.maximum(np.maximum(np.abs(own), off / SURE), 1e-300)
@@ -198,7 +201,6 @@ def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[F
     ranged = search.logs[:n] & ~(inertia & (inertia.sum() == 1))
     share[ranged] = level * std[ranged] / np.log(REACH)
     order = sorted(range(n), key=lambda k: (not (ranged[k] or share[k] > 1.0), -share[k]))
-    ends = np.zeros((n, 2))
     for k in order:
         if not ranged[k] and share[k] > 1.0:
             return ends, {names[k]: "its standard error is larger than the design's value"}

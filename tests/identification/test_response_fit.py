@@ -140,7 +140,7 @@ def test_a_response_far_below_the_resonance_does_not_tell_the_spring(of: str, se
     file = _written(tmp_path, hertz, seen * (1.0 + 0.03 * (noise[0] + 1j * noise[1])), 0.03)
     result = identify_response(_design({}), file, of=of)  # type: ignore[arg-type]
     assert result.passed
-    assert "explains the response as well: not determined" in result.fit.fixed["coupling.stiffness"].reason
+    assert ": not determined" in result.fit.fixed["coupling.stiffness"].reason
     for key in result.fit.names:
         assert abs(result.fit[key] - TRUTH[key]) < 4.0 * result.fit.std(key), key
 
