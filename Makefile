@@ -53,9 +53,9 @@ $(ALL): $(CORE) requirements-all.lock
 
 # The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
 # that run here, and ten processors that are not at hand (tests/machines/beside.py).
-MACHINE_TESTS := tests/margins/test_margin_cases.py tests/margins/test_margin_edges.py \
+MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test_margin_edges.py \
   tests/margins/test_margin_reference_loops.py tests/margins/test_unstable_inner_loops.py \
-  tests/margins/test_delay_margins.py tests/margins/test_certified_delays.py tests/margins/test_step_random.py \
+  tests/margins/test_delay_margins.py tests/margins/test_step_random.py \
   tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
   tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \
   tests/validation/test_limit_cycles.py tests/reports/test_certified_report.py tests/identification/test_response_fit.py

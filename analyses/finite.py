@@ -3,12 +3,12 @@
 from math import isfinite
 
 
-def finite(value: float) -> float | None:
-    """The value as a plain number; ``None`` for NaN and infinities.
+def finite(value: float | None) -> float | None:
+    """The value as a plain number; ``None`` for NaN, infinities and nothing.
 
     Examples
     --------
     >>> finite(2.0), finite(float("nan"))
     (2.0, None)
     """
-    return float(value) if isfinite(value) else None
+    return None if value is None or not isfinite(value) else float(value)

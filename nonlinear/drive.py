@@ -1,12 +1,10 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
 from math import isfinite
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.errors import InputError, NumericalError, finite_number
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
@@ -18,11 +16,7 @@ from nonlinear.runs.trajectory import ADVICE, STATUS, State
 
 STATE_NAMES = {name[2:].lower(): place for name, place in vars(at).items() if name in at.STATE_NAMES}
 """Numbers of the state by name."""
-NOTED_NAMES = {
-    "output_angle": at.IO_OUTPUT,
-    "twist": at.IO_TWIST,
-    "coupling_torque": at.IO_COUPLING_TORQUE,
-}
+NOTED_NAMES = {"output_angle": at.IO_OUTPUT, "twist": at.IO_TWIST, "coupling_torque": at.IO_COUPLING_TORQUE}
 """What a tick notes of its start, by name; twist and coupling torque are those of an elastic drive."""
 
 
@@ -63,7 +57,7 @@ class Drive:
 
     def __init__(
         self,
-        design: Design | str | PathLike[str],
+        design: AnyDesign,
         initial: State | None = None,
         load_Nm: float = 0.0,
         *,

@@ -24,8 +24,7 @@ from analyses.motion.asked import Asked as MotionAsked
 from analyses.studies.study_asked import Asked as StudyAsked
 from analyses.tuning.asked import Asked as TuningAsked
 from analyses.validation.settings import Asked as ValidationAsked
-from reports.design_files.keys import Asked as KeysAsked
-from reports.design_files.start import Asked as StartAsked
+from reports.design_files.asked import AskedKeys, AskedStart
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.nightly.asked import Asked as NightlyAsked
 
@@ -45,16 +44,15 @@ class Analysis:
     request: type | None = None
     _: KW_ONLY
     words: str = ""  # the command's help, its first paragraph stands in the list; docstring of the request
-    # ``package.name`` of ``(design, request) -> result``; where empty that of the command's name in the
-    # module ``run`` beside the request. Where the result says ``passed``, that is the exit status.
+    # ``package.name`` of ``(design, request) -> result``; where empty that of the command's name beside the
+    # request, in ``run`` or ``exports``. Where the result says ``passed``, that is the exit status.
     function: str = ""
     # The section's module in `reports.sections`, whose ``section(result)`` shows the result; without a page
     # that of a list
     shown: str = ""
     also: bool = False  # whether a report has the section where it is asked for (``--also``)
     doing: str = ""  # what the bar says while the function works, which then takes ``progress``
-    alone: bool = False  # whether it is asked of no design; it has no page then
-    page: bool = True  # whether it has a page (``--out``)
+    alone: bool = False  # whether it is asked of no design
     study: bool = False  # whether it is asked of a study (a file, or a design with variants), not of a design
     # Whether the function takes ``out`` as well, the folder, and keeps there what it finds
     keeps: bool = False
@@ -71,6 +69,11 @@ class Analysis:
         return cleandoc(self.words or (self.request.__doc__ if self.request else "") or "")
 
     @property
+    def page(self) -> bool:
+        """Whether it has a page (``--out``): what is asked of a design, and is no file of another kind."""
+        return not self.alone and self.group != EXPORTS
+
+    @property
     def warns(self) -> bool:
         """Whether the result says what is suspicious about the design: where loops or runs are made of it."""
         return self.group in (LINEAR, NONLINEAR)
@@ -85,7 +88,8 @@ class Analysis:
 
     def run(self, design: Design | Study | None, *asked: Any, **more: Any) -> Any:
         beside = self.request.__module__.rpartition(".")[0] if self.request else ""
-        package, _, name = (self.function or f"{beside}.run.{self.name}").rpartition(".")
+        usual = f"{beside}.{'exports' if self.group == EXPORTS else 'run'}.{self.name.replace(' ', '_')}"
+        package, _, name = (self.function or usual).rpartition(".")
         of = () if self.alone else (design,)
         return getattr(import_module(package), name)(*of, *asked, **more)
 
@@ -105,7 +109,7 @@ class Analysis:
         ``brief`` of one whose sections are too long for a terminal, ``data``, the result as plain data,
         ``write``, files that go with it.
         """
-        own = self.name if self.page and not self.alone else "listing"
+        own = self.name if self.page else "listing"
         module = import_module(f"reports.sections.{self.shown or own}")
         return getattr(module, name, otherwise)
 
@@ -117,15 +121,15 @@ ANALYSES = (
         "designs",
         DESIGNS,
         alone=True,
-        function="reports.design_files.catalogue.catalogue",
+        function="reports.design_files.run.designs",
         words="""
         List the shipped designs: name, title, and the stages that each drive has.
 
         Try: actuator-lti designs
         """,
     ),
-    Analysis("init", DESIGNS, StartAsked, alone=True, function="reports.design_files.start.start"),
-    Analysis("keys", DESIGNS, KeysAsked, alone=True, function="reports.design_files.keys.keys"),
+    Analysis("init", DESIGNS, AskedStart, alone=True),
+    Analysis("keys", DESIGNS, AskedKeys, alone=True),
     Analysis("margins", LINEAR, MarginsAsked),
     Analysis(
         "stiffness",
@@ -211,16 +215,10 @@ ANALYSES = (
         shown="nightly",
         doing="building",
     ),
-    Analysis("export c", EXPORTS, AskedC, page=False, function="reports.exports.export_c"),
-    Analysis(
-        "export controller",
-        EXPORTS,
-        AskedController,
-        page=False,
-        function="reports.exports.export_controller",
-    ),
-    Analysis("export fmu", EXPORTS, AskedFmu, page=False, function="reports.exports.export_fmu"),
-    Analysis("export linear", EXPORTS, AskedLinear, page=False, function="reports.exports.export_linear"),
+    Analysis("export c", EXPORTS, AskedC),
+    Analysis("export controller", EXPORTS, AskedController),
+    Analysis("export fmu", EXPORTS, AskedFmu),
+    Analysis("export linear", EXPORTS, AskedLinear),
 )
 COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, controller for firmware, linear models."}
 """Words of a name that stands before others."""

@@ -7,7 +7,7 @@ from os import PathLike
 from typing import Any
 
 from actuator_lti.design import design_hash, warnings_of
-from actuator_lti.design.loader import as_design, design_text
+from actuator_lti.design.loader import AnyDesign, as_design, design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path
@@ -22,15 +22,13 @@ from analyses.specification.requirements import RequirementVerdict, evaluate_req
 from analyses.specification.weakest import WeakPoint, spread, weakest
 from analyses.validation import validate
 from reports import document as doc
-from reports.amperes import in_amperes
 from reports.analyses import BY_NAME, FURTHER
 from reports.document_schema import Document
 from reports.html import write_report
-from reports.live import live_model
+from reports.live.model import live_model
 from reports.provenance import provenance
 from reports.sections import (
     answer,
-    delays,
     forms,
     limits,
     loop,
@@ -42,13 +40,13 @@ from reports.sections import (
     validation,
 )
 from reports.sections.names import load_unit
-from reports.study_pages import design_head, notices
+from reports.study_pages import design_head, in_amperes, notices
 
-Step = Callable[[str], AbstractContextManager[Progress | None]]
+Step = Callable[[str], AbstractContextManager[Progress]]
 
 
 def report(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     out: str | PathLike[str] | None = None,
     *,
     validation: bool = True,
@@ -117,7 +115,7 @@ def report(
 def design_report(
     design: Design,
     validation: Sequence[doc.Section] = (),
-    progress: Progress | None = None,
+    progress: Progress = None,
     source: str | None = None,
 ) -> Document:
     """Compute the report of a design as a document of `reports.document`.
@@ -205,7 +203,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     return [*made, *notices(missing, "further")]
 
 
-def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
+def validation_sections(design: Design, progress: Progress = None) -> list[doc.Section]:
     """Put the predictions to the simulator; a design that cannot be tested says why."""
     title = "Predictions against simulation"
     with isolated() as missing:
@@ -228,7 +226,7 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
     makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
     if survey.budgets:
-        makers["Delays"] = lambda: delays.section(survey.budgets)
+        makers["Delays"] = lambda: forms.delay_budget(survey.budgets)
     if design.coupling is not None or design.load.path == "back-drivable":
         makers["Stiffness"] = lambda: stiffness.of_design(design)
     if onset is not None:

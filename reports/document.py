@@ -16,7 +16,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Waiver
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import parse_json, read_json, shown, shown_path
 from actuator_lti.files.tree import Tree
@@ -101,10 +101,7 @@ def column(
 
 
 def table(
-    caption: str,
-    columns: Sequence[Column],
-    rows: Iterable[Mapping[str, Any] | Sequence[Any]],
-    note: str = "",
+    caption: str, columns: Sequence[Column], rows: Iterable[Mapping[str, Any] | Sequence[Any]], note: str = ""
 ) -> Block:
     """Make a table; a row is a mapping by column key, with ``_status`` where it has one, or its cells."""
     keys = [one["key"] for one in columns]
@@ -230,7 +227,7 @@ def verdict(
     id: str,
     label: str,
     *,
-    passed: bool | None,
+    passed: bool | Verdict | None,
     value: float | None = None,
     limit: float | None = None,
     unit: str = "",
@@ -238,13 +235,12 @@ def verdict(
     source: str = "",
     reason: str = "",
     comparison: str = "",
-    waiver: str = "",
+    waiver: Waiver | None = None,
 ) -> VerdictItem:
     """Make one item of `verdicts`; ``distance`` is positive on the good side, by itself where that is known.
 
     ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
-    the limit, ``">="`` or ``"<="``; it is kept as it is printed. ``waiver``: see `actuator_lti` ``Waiver``.
-    Times are told in ms.
+    the limit, ``">="`` or ``"<="``; it is kept as it is printed. Times are told in ms.
     """
     unit, factor = shown_unit(unit)
     value, limit, distance = (one if one is None else factor * one for one in (value, limit, distance))
@@ -259,7 +255,7 @@ def verdict(
         "unit": unit,
         "distance": plain(distance),
         "verdict": Verdict.of(passed).value,
-        "waiver": waiver,
+        "waiver": waiver.words if waiver else "",
         "source": source,
         "reason": prose(reason),
     }
@@ -296,8 +292,8 @@ def section(
     """Make a section; ``id`` is its anchor.
 
     ``result``: one sentence that says what was found, ``intro``: how. ``told``: how grave the result is,
-    where the first screen says it; ``findings``: what else that has to say. Where ``verdict`` is not proven,
-    a report is not proven by this section, whatever its verdicts.
+    where the first screen says it; ``findings``: what else that has to say. ``verdict`` counts beside
+    the verdicts in it: where it is not proven, so is the document.
     """
     first = [Finding(severity=told, text=result, where=id)] if told and result else []
     made: Section = {

@@ -53,10 +53,7 @@ class AskedFmu:
 
     target: Annotated[Path | None, Option("File to write; NAME.fmu.", "FILE", flag="out")] = None
     version: Annotated[int, Option("Version of FMI; 2.", "2|3", flag="fmi")] = 2
-    platform: Annotated[
-        list[str] | None,
-        Option("linux64 or win64, may be repeated; both.", "NAME"),
-    ] = None
+    platform: Annotated[list[str] | None, Option("linux64 or win64, may be repeated; both.", "NAME")] = None
     plain: Annotated[bool, Option("Without reports inside, and no check.")] = False
     check: Annotated[bool, CHECK] = True
     force: Annotated[bool, FORCE] = False
@@ -71,7 +68,6 @@ class AskedLinear:
 
     to: Annotated[Literal["json", "mat", "python"], Option("Format; json.")] = "json"
     target: Annotated[
-        Path | None,
-        Option("File to write; NAME-linear.json, .mat or .py.", "FILE", flag="out"),
+        Path | None, Option("File to write; NAME-linear.json, .mat or .py.", "FILE", flag="out")
     ] = None
     force: Annotated[bool, FORCE] = False

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
+from actuator_lti.design import read_design_text
 from actuator_lti.errors import InputError
 
 
@@ -19,3 +20,12 @@ def refused(
     for word in (words,) if isinstance(words, str) else words:
         assert word in line
     return line
+
+
+def mistakes(text: str, origin: str = "my.toml") -> str:
+    """What a design file is answered with, a printable line a mistake."""
+    with pytest.raises(InputError) as caught:
+        read_design_text(text, origin)
+    lines = str(caught.value).split("\n")
+    assert all(line.startswith(f"{origin}: ") and line.isprintable() for line in lines)
+    return "\n".join(lines)

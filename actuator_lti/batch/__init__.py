@@ -10,7 +10,7 @@ _PUBLIC = {
     "Crossovers": "actuator_lti.batch.figures",
     "LinearFigures": "actuator_lti.batch.figures",
     "Population": "actuator_lti.batch.parameters",
-    "drive_figures": "actuator_lti.batch.static",
+    "drive_figures": "actuator_lti.asked.drive_figure",
     "linear_figures": "actuator_lti.batch.figures",
     "variable_paths": "actuator_lti.batch.parameters",
 }

@@ -127,25 +127,15 @@ def linear_figures(
     response followed on a grid that is refined until nothing can hide between two points, every crossover
     polished to rounding. The bits do not depend on threads or on the rest of the population.
 
-    Parameters
-    ----------
-    population : Population
-    operating_point, load_Nm, speed_amplitude_rad_s, direction
-        As in `actuator_lti.assemble_loops`.
-    time_figures : bool
-        Whether to follow the step responses as well (most of the time).
-    held : bool
-        Give an inner loop that its load drives away by itself, in a drive that is stable as a whole, the
-        figures of the same loop with the rotor held (current) or the load moment held (velocity), if stable.
-    threads : int
-        Threads that share the designs.
-    progress : callable, optional
-        Called with (designs done, designs in all).
+    ``operating_point``, ``load_Nm``, ``speed_amplitude_rad_s``, ``direction``: as in
+    `actuator_lti.assemble_loops`.
+    ``time_figures``: whether to follow the step responses as well (most of the time).
+    ``held``: give an inner loop that its load drives away by itself, in a drive that is stable as a whole,
+    the figures of the same loop with the rotor held (current) or the load moment held (velocity), if stable.
+    ``threads``: that share the designs.
+    ``progress``: called with (designs done, designs in all).
 
-    Raises
-    ------
-    InputError
-        For a computing delay of so many ticks that the order passes 80.
+    Raises `InputError`: for a computing delay of so many ticks that the order passes 80.
     """
     at = Operating(
         point=operating_point,

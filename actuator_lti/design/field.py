@@ -27,6 +27,11 @@ _AXES: dict[str, dict[str, str]] = {
 }
 
 
+def unit_on(axis: Axis, template: str) -> str:
+    """An SI unit on this kind of axis: ``"{angle}/s"`` is rad/s or m/s."""
+    return template.format(**_AXES[axis])
+
+
 @dataclass(frozen=True)
 class Structure:
     """What decides the units of the gains: the axis, and which inner loops there are."""
@@ -85,8 +90,8 @@ class Field:
         """The SI unit of this key in a drive of this structure; ``"1"`` is dimensionless."""
         if self.path == "control.position.gain" and structure.has_velocity:
             return "1/s"
-        drive = "A" if structure.has_current else "V"
-        unit = self.unit_template.format(drive=drive, **_AXES[structure.axis])
+        template = self.unit_template.replace("{drive}", "A" if structure.has_current else "V")
+        unit = unit_on(structure.axis, template)
         return "1" if unit == "rad/rad" else unit
 
     def travel_power(self) -> int:

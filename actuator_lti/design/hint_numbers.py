@@ -7,7 +7,7 @@ from dataclasses import replace
 from math import pi
 from typing import Any
 
-from actuator_lti.design.field import Field
+from actuator_lti.design.field import Field, unit_on
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.sheet_words import key_for
 from actuator_lti.design.spellings import split_quantity
@@ -67,9 +67,8 @@ def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str
         here = f", here {ticks}" if ticks else ""
         return f"; write the ticks of control.period{here}" if _period_s(text) > 0.0 else ""
     if field.key == "counts_per_rev":
-        linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
-        over = _over_step(text, field.section, frame)
-        return over.replace("here", f"a {'metre' * linear or 'revolution'} over it is")
+        whole = "metre" if frame.motor_axis == "linear" else "revolution"
+        return _over_step(text, field.section, frame).replace("here", f"a {whole} over it is")
     if field.path == "motor.torque_constant" and _ROOT_OF_WATTS.search(f"{text}"):
         return f"; it is {_motor_constant(text, tree, frame)}"
     if (ticks_said := _TICKS.fullmatch(f"{text}")) and (
@@ -86,9 +85,7 @@ def _per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
     loop = tree.get("control", {}).get(field.section.rpartition(".")[2]) if field.key == "gain" else {}
     if isinstance(loop, dict) and loop.get("sensor", "motor") != "motor":  # it counts at the output
         return ""
-    screw = frame.travel_m_rad is not None
-    linear = frame.structure.axis == "linear" and not screw
-    unit = field.unit(replace(frame.structure, axis="linear" if linear else "rotary"))
+    linear, unit = frame.motor_axis == "linear", field.unit(replace(frame.structure, axis=frame.motor_axis))
     with suppress(InputError, ValueError, TypeError, ArithmeticError):
         counts = frame.quantity(_of(tree, "encoder", "counts_per_rev"), FIELDS["encoder.counts_per_rev"])
         plain = CONVENTION.sub("", text)
@@ -126,10 +123,10 @@ def _lines(value: Any, word: str, takes: Takes) -> str:
 def _motor_constant(text: str, tree: Tree, frame: Frame) -> str:
     """Km in N m/sqrt(W): losses of one winding (dc), or of three with R line-line or of a phase."""
     factor = 1.0 if frame.constants == "dc" else 1.5
-    linear = frame.structure.axis == "linear" and frame.travel_m_rad is None
-    Km = _si(_ROOT_OF_WATTS.sub("", text), "N" if linear else "N*m")
+    torque = unit_on(frame.motor_axis, "{torque}")
+    Km = _si(_ROOT_OF_WATTS.sub("", text), torque)
     kM = Km * (factor * _si(_of(tree, "motor", "resistance"), "ohm")) ** 0.5
-    here = f": {kM:.4g} {'N/A' if linear else 'N*m/A'}" if kM > 0.0 else ""
+    here = f": {kM:.4g} {torque}/A" if kM > 0.0 else ""
     return f"the motor constant Km: torque_constant is Km sqrt({'' if factor == 1.0 else '1.5 '}R){here}"
 
 

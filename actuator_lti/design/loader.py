@@ -16,6 +16,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
 from actuator_lti.files.tree import Tree
 
+AnyDesign = Design | str | PathLike[str]  # or its name, or the path of its file
 SHIPPED = Path(__file__).parent / "shipped"
 
 
@@ -31,18 +32,13 @@ def shipped_designs() -> tuple[str, ...]:
     return tuple(sorted(names, key=lambda name: name != "ilr33-amber"))
 
 
-def load_design(name_or_path: Design | str | PathLike[str]) -> Design:
+def load_design(name_or_path: AnyDesign) -> Design:
     """Read a shipped design by name, or a design file by path; a design is given back as it is.
 
-    Parameters
-    ----------
-    name_or_path : str or path
-        A shipped name (see :func:`shipped_designs`), else the path of a TOML file of at most 1 MiB.
+    ``name_or_path``: a shipped name (see :func:`shipped_designs`), else the path of a TOML file of at most
+    1 MiB.
 
-    Raises
-    ------
-    InputError
-        One line: file, key, value and what is allowed.
+    Raises `InputError`: one line: file, key, value and what is allowed.
 
     Examples
     --------
@@ -97,10 +93,7 @@ def read_design_text(text: str, origin: str = "design", folder: Path = Path()) -
 
     Files that it names, as a law's, are sought in ``folder``.
 
-    Raises
-    ------
-    InputError
-        As :func:`load_design`.
+    Raises `InputError`: as :func:`load_design`.
     """
     if not isinstance(text, str):
         raise InputError(f"text = {shown(text)}: allowed: the text of a design file", where=origin)
@@ -126,27 +119,14 @@ class SweepPoint:
     design: Design
 
 
-def sweep(design: Design | str | PathLike[str], path: str, values: Iterable[Any]) -> tuple[SweepPoint, ...]:
+def sweep(design: AnyDesign, path: str, values: Iterable[Any]) -> tuple[SweepPoint, ...]:
     """Designs that differ in one key.
 
-    Parameters
-    ----------
-    design : Design, str or path
-        A design, a shipped name, or the path of a design file.
-    path : str
-        Dotted key, such as ``"limits.voltage"``.
-    values : iterable
-        Texts with their unit (``"14 V"``), or numbers in SI.
+    ``design``: a design, a shipped name, or the path of a design file.
+    ``path``: dotted key, such as ``"limits.voltage"``.
+    ``values``: texts with their unit (``"14 V"``), or numbers in SI; their order is that of the designs.
 
-    Returns
-    -------
-    tuple of SweepPoint
-        In the order of the values.
-
-    Raises
-    ------
-    InputError
-        For an unknown key, a wrong unit, or a value that is not allowed.
+    Raises `InputError`: for an unknown key, a wrong unit, or a value that is not allowed.
 
     Examples
     --------

@@ -99,21 +99,11 @@ class Design:
     def with_values(self, values: Mapping[str, Any]) -> "Design":
         """A copy with some keys changed, as a design file would write them.
 
-        Parameters
-        ----------
-        values : mapping of dotted key to value
-            Text with its unit (``"90 1/s"``), or a number in SI; other keys take text, lists and tables.
-            A changed value says in its source what it was; a tolerance in percent follows it.
+        Raises `InputError`: for an unknown key, a wrong unit, or values that contradict each other.
 
-        Returns
-        -------
-        Design
-            Checked like a file.
-
-        Raises
-        ------
-        InputError
-            For an unknown key, a wrong unit, or values that contradict each other.
+        ``values``, by dotted key: text with its unit (``"90 1/s"``), or a number in SI; other keys take
+        text, lists and tables. A changed value says in its source what it was; a tolerance in percent follows
+        it. The copy is checked like a file.
 
         Examples
         --------
@@ -130,17 +120,10 @@ class Design:
     def add_filter(self, stage: str, **keys: Any) -> "Design":
         """A copy with one more filter, the last of its place.
 
-        Parameters
-        ----------
-        stage : {"velocity"}
-            The stage whose filter it is.
-        **keys
-            ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
+        Raises `InputError`: as `with_values`, and for a stage that has no filters.
 
-        Raises
-        ------
-        InputError
-            As `with_values`, and for a stage that has no filters.
+        ``stage``: the stage whose filter it is, ``"velocity"``.
+        ``keys``: ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
 
         Examples
         --------
@@ -158,24 +141,18 @@ class Design:
     ) -> "Design":
         """A copy with a law of one's own in place of a stage's gains and filters (model.md section 10).
 
-        Parameters
-        ----------
-        stage : {"current", "velocity", "position"}
-        system
-            A sampled state space or transfer function of python-control or scipy.signal, or
-            ``(A, B, C, D, dt)``; its period must be that of the stage.
-        inputs : sequence of str, optional
-            The signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``, ``current``,
-            ``output_angle``, ``output_speed``; by default the system's own input labels.
-        **settings
-            ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the stage;
-            ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
-            the same law in continuous time, for the forms without samples.
+        Raises `InputError`: for a system of another period or shape, an unknown setting, and as
+        `with_values`.
 
-        Raises
-        ------
-        InputError
-            For a system of another period or shape, an unknown setting, and as `with_values`.
+        ``stage``: ``"current"``, ``"velocity"`` or ``"position"``.
+        ``system``: a sampled state space or transfer function of python-control or scipy.signal, or
+        ``(A, B, C, D, dt)``; its period must be that of the stage. States whose numbers are beyond 1e12 are
+        scaled by powers of two.
+        ``inputs``: the signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``,
+        ``current``, ``output_angle``, ``output_speed``, ``twist``; by default the system's own input labels.
+        ``settings``: ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the
+        stage; ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
+        the same law in continuous time, for the forms without samples.
 
         Examples
         --------

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 
-from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text
+from actuator_lti.design.field import choice, degrees, not_negative, positive, quantity, text, unit_on
 from actuator_lti.design.over_angle import OverAngle, Wave
 from actuator_lti.drive.choice import where
 
@@ -229,8 +229,7 @@ def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, 
     if speed == inf:
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)
-    unit = "rad/s" if design.axis == "rotary" else "m/s"
-    passed = f"{speed:.4g} {unit} passes more than {MOST_PHASE_rad} rad of it"
+    passed = f"{speed:.4g} {unit_on(design.axis, '{angle}/s')} passes more than {MOST_PHASE_rad} rad of it"
     return most, f"held over a tick, in which {passed} (a lower limits.speed or control.period takes more)"
 
 

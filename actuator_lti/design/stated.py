@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import isinf, pi, sqrt
 from typing import Any
 
-from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.field import Axis, Field, Structure
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.plant import DC_PER_A, MotorConstants
 from actuator_lti.design.spellings import split_quantity
@@ -37,6 +37,11 @@ class Frame:
     structure: Structure
     constants: MotorConstants
     travel_m_rad: float | None = None
+
+    @property
+    def motor_axis(self) -> Axis:
+        """The kind of axis of the motor's own values: rotary before a screw."""
+        return self.structure.axis if self.travel_m_rad is None else "rotary"
 
     def quantity(self, text: Any, field: Field) -> float:
         """The SI value of a text; behind a screw also from the units of a rotary axis.

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from math import inf, isfinite, pi, sqrt
 
 from actuator_lti.design.data_sheet import FROM
+from actuator_lti.design.field import unit_on
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed, torque_per_command
@@ -95,7 +96,7 @@ def _limits(design: Design) -> Iterator[str]:
         yield f"limits.peak_current: {peak:.{max(digits, 6)}g} A, but {only}"
     speed, top = design.limits.speed_rad_s, no_load_speed(design)
     if top < speed < inf and design.controller.velocity is not None:
-        unit = "m/s" if design.axis == "linear" else "rad/s"
+        unit = unit_on(design.axis, "{angle}/s")
         turns = "" if design.axis == "linear" else f" ({top * 30.0 / pi:.5g} rpm)"
         volts, kE = design.limits.voltage_V, design.effective_motor.back_emf_constant_Vs_rad
         only = f"U/kE = {volts:.4g} V/({kE:.4g} V/({unit})) = {top:.4g} {unit}{turns}"
@@ -151,7 +152,7 @@ def _loads(design: Design) -> Iterator[str]:
     from actuator_lti.drive.facts import stall_torque_Nm
 
     largest, given = design.load.moment_max_Nm, stall_torque_Nm(design)
-    unit, holding = "N" if design.axis == "linear" else "N*m", given * design.total_ratio
+    unit, holding = unit_on(design.axis, "{torque}"), given * design.total_ratio
     losses = design.parameters.get("friction.load_coefficient")
     if losses is not None and losses.source.startswith(FROM) and design.load.path == "self-locking":
         lost = losses.value * design.total_ratio
@@ -173,7 +174,7 @@ def _loads(design: Design) -> Iterator[str]:
 
 def beyond_largest(design: Design, key: str, load_Nm: float) -> Iterator[str]:
     """What is said of a load that is asked for and lies above the largest one of the design."""
-    largest, unit = design.load.moment_max_Nm, "N" if design.axis == "linear" else "N*m"
+    largest, unit = design.load.moment_max_Nm, unit_on(design.axis, "{torque}")
     if abs(load_Nm) > largest:
         yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
 
@@ -184,7 +185,7 @@ def elastic_warnings(design: Design) -> Iterator[str]:
     rubs = behind is not None and behind.dry_torque_Nm > 0.0
     viscous = behind is not None and behind.viscous_Nms_rad > 0.0
     free, damped = not (rubs or viscous), load.moment_damping_Nms_rad > 0.0
-    unit = "N*s/m" if design.axis == "linear" else "N*m*s/rad"
+    unit = unit_on(design.axis, "{torque}*s/{angle}")
     if coupling is not None and not (viscous or damped) and coupling.damping_Nms_rad == 0.0:
         least = 0.02 * sqrt(coupling.stiffness_Nm_rad * design.load_side_inertia_kgm2)  # 2 zeta sqrt(k J)
         but = " (its dry friction is in no linear loop)" if rubs else ""
@@ -236,5 +237,5 @@ def _encoder(design: Design) -> Iterator[str]:
         return
     step = quantum / (encoder.difference_samples * velocity.every * design.controller.period_s)
     if isfinite(top) and step > 0.05 * top:
-        unit = "m/s" if design.axis == "linear" else "rad/s"
+        unit = unit_on(design.axis, "{angle}/s")
         yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"

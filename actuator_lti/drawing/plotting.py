@@ -14,8 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.bandwidth import closed_loop_bandwidth
+from actuator_lti.design.field import unit_on
 from actuator_lti.errors import InputError
+from actuator_lti.margins import stability_margins
+from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.start.extras import need
+from actuator_lti.systems.measured_response import is_measured, measured_response, refuse_measured
+from actuator_lti.systems.phase import unwrapped_phase_deg
 from actuator_lti.systems.resolvent import apart_about_minus_one, refined
 
 if TYPE_CHECKING:
@@ -25,11 +31,11 @@ if TYPE_CHECKING:
     from actuator_lti.loops.result import Loop
     from actuator_lti.margins.results import StabilityMargins
 
-# The colours of the reports (`reports.charts.paint`): those of Okabe and Ito, darkened for white paper.
 __all__ = [
     "plot_bode", "plot_map", "plot_nyquist", "plot_onset", "plot_run", "plot_step", "style",
 ]  # fmt: skip
 
+# Those of the reports (`reports.charts.paint`), of Okabe and Ito, darkened for white paper.
 COLOURS = ("#0072b2", "#c46200", "#00805f", "#8e4585", "#c0392b", "#3a8fc4", "#7a5c1e", "#1f2933", "#66727f")
 RED, GREEN, INK, MUTED = "#c0392b", "#00805f", "#1f2933", "#66727f"
 STYLE: dict[str, Any] = {
@@ -52,10 +58,7 @@ _POINTS = 600
 def style() -> Iterator[Any]:
     """matplotlib.pyplot in the style of all figures, for figures of your own beside them.
 
-    Raises
-    ------
-    InputError
-        Where matplotlib is not installed.
+    Raises `InputError`: where matplotlib is not installed.
 
     Examples
     --------
@@ -106,9 +109,6 @@ def response(system: Any, omega_rad_s: np.ndarray) -> np.ndarray:
 
 def _curve(system: Any, margins: StabilityMargins | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies that show a system and its response there; of measured data their own points."""
-    from actuator_lti.margins.measured.margins import measured_points
-    from actuator_lti.systems.measured_response import is_measured, measured_response
-
     if is_measured(system):
         omega, L, _ = measured_points(measured_response(system), None)
         return omega, L
@@ -121,16 +121,10 @@ def plot_bode(
 ) -> list[Axes]:
     """Magnitude in dB and unwrapped phase in degrees over frequency in Hz.
 
-    Parameters
-    ----------
-    system : python-control system, DelaySystem or measured data
-        SISO.
-    label : str
-        For the legend.
-    margins : StabilityMargins, optional
-        Of this open loop: each gain and phase margin is drawn where it is.
-    axes : two of matplotlib's axes, optional
-        Several systems go into one figure this way.
+    ``system``: python-control system, DelaySystem or measured data, SISO.
+    ``label``: for the legend.
+    ``margins``: of this open loop: each gain and phase margin is drawn where it is.
+    ``axes``: two of matplotlib's axes; several systems go into one figure this way.
 
     Examples
     --------
@@ -142,9 +136,6 @@ def plot_bode(
     >>> both[1].get_xlabel()
     'frequency, Hz'
     """
-    from actuator_lti.systems.measured_response import is_measured
-    from actuator_lti.systems.phase import unwrapped_phase_deg
-
     magnitude, phase = _panels(axes, 2)
     omega, L = _curve(system, margins)
     hertz = omega / (2.0 * np.pi)
@@ -195,8 +186,6 @@ def plot_nyquist(system: Any, *, label: str = "", axes: Any = None) -> Axes:
     >>> plot_nyquist(assemble_loops("ilr33-amber").position.open_loop).get_xlabel()
     'real part'
     """
-    from actuator_lti.systems.measured_response import is_measured
-
     (panel,) = _panels(axes, 1, figsize=(4.8, 4.8))
     omega, L = _curve(system)
     if not is_measured(system):
@@ -223,9 +212,6 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     """
     import control
 
-    from actuator_lti.bandwidth import closed_loop_bandwidth
-    from actuator_lti.systems.measured_response import refuse_measured
-
     refuse_measured(system)
     if duration_s is None:
         result = closed_loop_bandwidth(system).minus3db_rad_s
@@ -247,22 +233,16 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
 
 def loop_bode(loop: Loop, axes: Any = None) -> list[Axes]:
     """Bode figure of the open loop of a `Loop`, its margins drawn; see `Loop.plot_bode`."""
-    from actuator_lti.margins import stability_margins
-
     return plot_bode(loop.open_loop, label=loop.name, margins=stability_margins(loop.open_loop), axes=axes)
 
 
 def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     """Angle, speed, current, voltage of a run over time; grey: the rotor rests, red: a limit acts.
 
-    Parameters
-    ----------
-    axes : four of matplotlib's axes, optional
-        See `nonlinear.Trajectory.plot`.
+    ``axes``: four of matplotlib's axes, see `nonlinear.Trajectory.plot`.
     """
     angle, speed, current, voltage = _panels(axes, 4, figsize=(6.4, 7.2))
-    linear = run.axis == "linear"
-    factor, unit = (1e3, "mm") if linear else (np.degrees(1.0), "deg")
+    factor, unit = _shown_angle(run.axis == "linear")
     scale, time_unit = (1e3, "ms") if run.time_s[-1] < 1.0 else (1.0, "s")
     time = scale * run.time_s
     panels = {"position": (angle, factor), "velocity": (speed, run.ratio), "current": (current, 1.0)}
@@ -273,7 +253,7 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     current.plot(time, run.current_A)
     voltage.step(time, run.voltage_V, where="post")
     angle.set(ylabel=f"output, {unit}", title=run.design_name)
-    speed.set_ylabel("motor, " + ("m/s" if linear else "rad/s"))
+    speed.set_ylabel(f"motor, {unit_on(run.axis, '{angle}/s')}")
     current.set_ylabel("current, A")
     voltage.set(ylabel="voltage, V", xlabel=f"time, {time_unit}")
     for panel in (angle, speed, current, voltage):
@@ -302,8 +282,7 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
     """
     (panel,) = _panels(axes, 1)
     hertz = onset.omega_rad_s / (2.0 * np.pi)
-    _amplitude_axes(panel, linear_axis)
-    factor = 1e3 if linear_axis else np.degrees(1.0)
+    factor = _amplitude_axes(panel, linear_axis)
     for name, amplitude in onset.each_rad.items():
         there = np.isfinite(amplitude)
         if np.any(there):
@@ -327,7 +306,7 @@ def plot_map(
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    factor = 1e3 if linear_axis else np.degrees(1.0)
+    factor = _amplitude_axes(panel, linear_axis)
     present = [k for k in range(len(names)) if np.any(kind == k)]
     shades = {k: COLOURS[k % len(COLOURS)] if names[k] != "none" else "#ffffff" for k in present}
     colours, codes = ListedColormap(list(shades.values())), np.searchsorted(present, kind)
@@ -335,7 +314,6 @@ def plot_map(
     panel.pcolormesh(frequency_hz, factor * amplitude_rad, codes, cmap=colours, **look)
     for amplitude in (onset_rad or {}).values():
         panel.plot(frequency_hz, factor * amplitude, color=INK, linewidth=1.0)
-    _amplitude_axes(panel, linear_axis)
     low, high = factor * amplitude_rad.min(), factor * amplitude_rad.max()
     panel.set(ylim=(low, high), xlim=(frequency_hz.min(), frequency_hz.max()))
     patches = [Patch(facecolor=c, edgecolor=MUTED, alpha=0.6, label=names[k]) for k, c in shades.items()]
@@ -345,6 +323,13 @@ def plot_map(
     return panel
 
 
-def _amplitude_axes(panel: Axes, linear_axis: bool) -> None:
-    unit = "mm" if linear_axis else "deg"
+def _amplitude_axes(panel: Axes, linear_axis: bool) -> float:
+    """Logarithmic axes of a command's amplitude over frequency; what an amplitude is drawn times."""
+    factor, unit = _shown_angle(linear_axis)
     panel.set(xscale="log", yscale="log", xlabel="frequency, Hz", ylabel=f"command amplitude, {unit}")
+    return factor
+
+
+def _shown_angle(linear_axis: bool) -> tuple[float, str]:
+    """What an angle or a travel is drawn times, and its unit then."""
+    return (1e3, "mm") if linear_axis else (float(np.degrees(1.0)), "deg")

@@ -90,12 +90,9 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     of such names, or a complex one. What a name leaves open (dB or ratio, deg or rad) and the numbers do
     not decide is refused.
 
-    Parameters
-    ----------
-    source : path or control.FrequencyResponseData
-    averages : int, optional
-        Of the coherence; or as a column or array of this name. The deviation is then
-        sqrt((1 - g2)/(g2 (n - 1))) (Bendat, Piersol, Random Data, chapter 9).
+    ``source``: path or control.FrequencyResponseData.
+    ``averages``: of the coherence; or as a column or array of this name. The deviation is then
+    sqrt((1 - g2)/(g2 (n - 1))) (Bendat, Piersol, Random Data, chapter 9).
 
     An InputError names the file and what is allowed.
     """

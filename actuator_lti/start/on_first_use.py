@@ -35,3 +35,8 @@ def on_first_use(
         return sorted({*own, *names, *modules})
 
     return load, known
+
+
+def from_rooms(package: str, **names: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """The same of names that stand by the module of the package that defines them, several in one text."""
+    return on_first_use(package, {n: f"{package}.{room}" for room, own in names.items() for n in own.split()})

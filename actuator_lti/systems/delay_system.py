@@ -41,19 +41,12 @@ def _matrix(value: Any, rows: int, columns: int, name: str) -> np.ndarray:
 class DelaySystem(ControlFace):
     """A continuous system with internal delays, see the module for the equations.
 
-    Parameters
-    ----------
-    A, B1, B2, C1, C2, D11, D12, D21, D22 : array_like
-        Shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m), (k,k).
-    delays_s : sequence of float
-        k delays in s, each > 0.
-    inputs, outputs, name : optional
-        Names as in python-control (or the numbers of signals).
+    ``A, B1, B2, C1, C2, D11, D12, D21, D22``: shapes (n,n), (n,m), (n,k), (p,n), (k,n), (p,m), (p,k), (k,m),
+    (k,k).
+    ``delays_s``: k delays in s, each > 0.
+    ``inputs, outputs, name``: optional, names as in python-control (or the numbers of signals).
 
-    Raises
-    ------
-    InputError
-        For a delay that is not positive, or entries that are not finite.
+    Raises `InputError`: for a delay that is not positive, or entries that are not finite.
 
     Examples
     --------
@@ -146,10 +139,7 @@ class DelaySystem(ControlFace):
     def without_delays(self) -> control.StateSpace:
         """State space with every delay set to zero.
 
-        Raises
-        ------
-        InputError
-            If that leaves an algebraic loop without a solution.
+        Raises `InputError`: if that leaves an algebraic loop without a solution.
         """
         if self.delays_s.size and np.linalg.cond(np.eye(self.delays_s.size) - self.D22) > 1e12:
             raise InputError("without_delays: an algebraic loop without a solution remains")
@@ -161,10 +151,7 @@ class DelaySystem(ControlFace):
         For functions of python-control that want poles; its states are those of the system, then
         ``delay0_0, delay0_1, ...`` of each delay. No figure of this library uses it.
 
-        Raises
-        ------
-        InputError
-            For an order outside 1 to 12, beyond which the coefficients lose their digits.
+        Raises `InputError`: for an order outside 1 to 12, beyond which the coefficients lose their digits.
 
         Examples
         --------
@@ -271,10 +258,7 @@ class DelaySystem(ControlFace):
 
         ``control.feedback`` takes it as its first system only: `from_system` makes one of the first.
 
-        Raises
-        ------
-        InputError
-            If the delay-free path round the loop is algebraic and without a solution.
+        Raises `InputError`: if the delay-free path round the loop is algebraic and without a solution.
         """
         return DelaySystem.of(self.plain.feedback(DelaySystem.from_system(other).plain, sign))
 

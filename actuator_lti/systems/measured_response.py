@@ -26,18 +26,11 @@ class MeasuredResponse:
     `stability_margins` takes it as it takes `control.FrequencyResponseData`; the ranges that it states are
     widened by the radius.
 
-    Attributes
-    ----------
-    omega : array (m,)
-        Angular frequencies, rad/s.
-    frdata : array (m,), complex
-        Measured values.
-    radius : array (m,)
-        Radius of the circle, at the confidence of the range (0.99 by default).
-    dt : float or None
-        Sampling period, s; ``None`` for a continuous loop.
-    source : str
-        Where the radius comes from.
+    ``omega``, shape (m,): angular frequencies, rad/s.
+    ``frdata``, shape (m,), complex: measured values.
+    ``radius``, shape (m,): of the circle, at the confidence of the range (0.99 by default).
+    ``dt``: sampling period, s; ``None`` for a continuous loop.
+    ``source``: where the radius comes from.
     """
 
     ninputs: ClassVar[int] = 1
@@ -53,23 +46,13 @@ class MeasuredResponse:
     def with_noise(
         cls, data: Any, standard_deviation: ArrayLike, confidence: float = CONFIDENCE
     ) -> MeasuredResponse:
-        """Noise that is given.
+        """Noise that is given, of data with one input and one output.
 
-        Parameters
-        ----------
-        data : FrequencyResponseData
-            One input, one output.
-        standard_deviation : array_like
-            Root mean square of the complex error of each value, sqrt(E |e|^2), in the unit of L; a number or
-            one for each frequency. The error is taken as circular and Gaussian: |e| exceeds the radius
-            sigma sqrt(-ln(1 - confidence)) in 1 - confidence of all cases.
-        confidence : float
-            Of the circle.
+        ``standard_deviation``: root mean square of the complex error of each value, sqrt(E |e|^2), in the
+        unit of L; a number or one for each frequency. The error is taken as circular and Gaussian: |e|
+        exceeds the radius sigma sqrt(-ln(1 - confidence)) in 1 - confidence of all cases.
 
-        Raises
-        ------
-        InputError
-            A negative or infinite standard deviation, or a confidence outside (0, 1).
+        Raises `InputError`: a negative or infinite standard deviation, or a confidence outside (0, 1).
         """
         omega, L, dt = _read(data)
         sigma = _per_point(standard_deviation, L.size, "standard_deviation", math.inf)
@@ -86,19 +69,10 @@ class MeasuredResponse:
         the coherence g^2 as estimated and F the quantile of F(2, 2 n - 2) (Bendat, Piersol, Random Data,
         chapter 9).
 
-        Parameters
-        ----------
-        data : FrequencyResponseData
-        coherence : array_like
-            Ordinary coherence g^2 of each value, in (0, 1].
-        averages : int
-            Independent averages, at least 2.
-        confidence : float
+        ``coherence``: ordinary coherence g^2 of each value, in (0, 1].
+        ``averages``: independent averages, at least 2.
 
-        Raises
-        ------
-        InputError
-            A coherence outside (0, 1], fewer than 2 averages.
+        Raises `InputError`: a coherence outside (0, 1], fewer than 2 averages.
         """
         omega, L, dt = _read(data)
         g2 = _per_point(coherence, L.size, "coherence", 1.0)
@@ -117,10 +91,7 @@ class MeasuredResponse:
         With n repeats |e|^2 over the estimated variance of the mean follows F(2, 2 n - 2): the radius grows
         where there are few.
 
-        Raises
-        ------
-        InputError
-            Fewer than 2 repeats, or other frequencies.
+        Raises `InputError`: fewer than 2 repeats, or other frequencies.
         """
         if len(repeats) < 2:
             raise InputError("repeats: at least two measurements are needed to see the scatter")

@@ -33,27 +33,16 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by
     -180 deg, as a damped one does.
 
-    Parameters
-    ----------
-    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
-        One input, one output, continuous or sampled. Measured data have no factors: their phase is followed
-        from point to point, from between -180 and 180 deg at the first, straight over log frequency.
-    omega_rad_s : array_like
-        Angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured data within
-        their band), any order, any shape.
-    delay_s : float, optional
-        Exact delay in series, s.
+    ``system``: StateSpace, TransferFunction, DelaySystem or FrequencyResponseData of one input and one
+    output, continuous or sampled. Measured data have no factors: their phase is followed from point to point,
+    from between -180 and 180 deg at the first, straight over log frequency.
+    ``omega_rad_s``: angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured
+    data within their band), any order, any shape, which is that of the result.
+    ``delay_s``: exact delay in series, s.
 
-    Returns
-    -------
-    array
-        Phase in deg, shape of ``omega_rad_s``.
-
-    Raises
-    ------
-    InputError
-        A frequency that is not positive and finite, or beyond Nyquist; measured data: outside of their band,
-        or behind an interval in which the phase turns as no smooth curve does, or is lost in noise.
+    Raises `InputError`: a frequency that is not positive and finite, or beyond Nyquist; measured data:
+    outside of their band, or behind an interval in which the phase turns as no smooth curve does, or is lost
+    in noise.
 
     Examples
     --------

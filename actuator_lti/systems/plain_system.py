@@ -110,10 +110,7 @@ class PlainDelaySystem:
     def feedback(self, other: PlainDelaySystem | None = None, sign: int = -1) -> PlainDelaySystem:
         """Closed loop ``self / (1 - sign self other)``, ``other`` 1 where left out.
 
-        Raises
-        ------
-        InputError
-            If the delay-free path round the loop is algebraic and without a solution.
+        Raises `InputError`: if the delay-free path round the loop is algebraic and without a solution.
         """
         back = static(np.eye(self.ninputs, self.noutputs)) if other is None else other
         m, p = self.ninputs, self.noutputs

@@ -38,12 +38,7 @@ def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
 def held_step(A: np.ndarray, B: np.ndarray, duration_s: Any) -> tuple[np.ndarray, np.ndarray]:
     """``x(t + h) = Phi x(t) + Gamma u`` for u held over h: both from one exponential, balanced first.
 
-    Parameters
-    ----------
-    A : ndarray, shape (..., n, n)
-    B : ndarray, shape (..., n, m)
-    duration_s : float or ndarray, shape (...)
-        h >= 0; zero gives the unit matrix and zero.
+    A has the shape (..., n, n), B (..., n, m), h >= 0 (...); an h of zero gives the unit matrix and zero.
     """
     n, m = B.shape[-2:]
     h = np.asarray(duration_s)[..., None, None]

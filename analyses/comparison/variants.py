@@ -111,31 +111,20 @@ def compare(
     study: Study | str | PathLike[str],
     *,
     validation: bool | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     engine: Engine | None = None,
     folder: Path | None = None,
 ) -> Comparison:
     """Compute every figure of every design of a study and what differs from the base.
 
-    Parameters
-    ----------
-    study : Study, or path of its file
-    validation : bool, optional
-        Whether every design is validated (quick settings); by default as the study says.
-    progress : callable, optional
-        Called with (steps done, steps in all).
-    engine : Engine, optional
-        Where to compute; in this process, one after the other, where left out.
-    folder : Path, optional
-        Where what is found of each design is kept as soon as it is there; a study that was stopped, or has
-        changed a little, goes on from it.
+    ``validation``: whether every design is validated (quick settings); by default as the study says.
+    ``progress``: called with (steps done, steps in all).
+    ``engine``: where to compute; in this process, one after the other, where left out.
+    ``folder``: where what is found of each design is kept as soon as it is there; a study that was stopped,
+    or has changed a little, goes on from it.
 
-    Raises
-    ------
-    InputError, NumericalError
-        From the base or a variant.
+    Raises `InputError`, `NumericalError`: from the base or a variant.
     """
-
     study = study if isinstance(study, Study) else load_study(as_path(study))
     origin = _design(study.base)
     plan = LargeSignal.plan(origin)
@@ -190,11 +179,9 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
     )
 
 
-def _beside(
-    base: Found, origin: Design, plan: LargeSignal, tested: bool, place: tuple[int, Variant]
-) -> Found:
+def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tuple[int, Variant]) -> Found:
     """What is found of a design, how it differs from the base, and what moved it."""
-    one, design = _evaluated(place[1], plan, tested), _design(place[1])
+    one, design = _evaluated(at[1], plan, tested), _design(at[1])
     changed, differences = changes(origin, design), {}
     for key, value in one.figures.items():
         before = base.figures.get(key)

@@ -1,41 +1,25 @@
 """The model driven by a record's own command, load and supply."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
+from analyses.correlation import driving
 from analyses.correlation.compare import SignalComparison, compare_signals
-from analyses.correlation.driving import (
-    LOADS,
-    Driven,
-    at_ticks,
-    earlier_s,
-    first_states,
-    load_of,
-    needed_command,
-    steps_at,
-    supply_of,
-)
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, prepared
-
-if TYPE_CHECKING:
-    from nonlinear import State, Trajectory
-
+from nonlinear import State, Trajectory, commands, simulate
 
 AXIS_SIGNALS = {
     "rotary": ("angle", "output_angle", "speed", "current", "voltage"),
@@ -81,33 +65,21 @@ class CorrelationResult:
 
 
 def correlate_record(
-    design: Design | str | PathLike[str],
-    record: Record,
-    *,
-    command: str | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress = None
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 
-    Parameters
-    ----------
-    design : Design
-    record : Record
-        Needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
-        axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
-        voltage. The outermost one that is recorded drives the model, whose loops outside it do not act. A
-        ``torque`` signal is the load torque at the output, ``supply`` the bus voltage (see `supply_of`).
-        Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
-        derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
-        voltage, force. The force of a drive with an ideal source is its gain times the voltage.
-    command : str, optional
-        The signal that drives the model instead; ``"voltage"`` is the measured voltage of the motor.
-    progress : callable, optional
+    The record needs a command: of position (``reference``, output angle; ``position_reference`` on a linear
+    axis), of speed (``speed_reference``, at the motor; ``velocity_reference``), of current, torque or
+    voltage. The outermost one that is recorded drives the model, whose loops outside it do not act; or
+    ``command``, where ``"voltage"`` is the measured voltage of the motor. A ``torque`` signal is the load
+    torque at the output, ``supply`` the bus voltage (see `driving.supply_of`).
 
-    Raises
-    ------
-    InputError
-        If the record holds no command, or nothing to compare.
+    Compared are, where recorded: angle, output_angle or position, speed or velocity (else the position's
+    derivative: 4th-order Butterworth at 100 Hz forward and backward, central differences), current,
+    voltage, force. The force of a drive with an ideal source is its gain times the voltage.
+
+    Raises `InputError`: if the record holds no command, or nothing to compare.
     """
     record = prepared(record)
     design = record.drive(as_design(design))
@@ -120,18 +92,17 @@ def correlate_record(
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     with because({record.name: findings}):
         modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
-    driven = needed_command(design, record, command)
+    driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
-    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
+    load = driving.LOADS[design.axis]
+    used = dict.fromkeys(measured, "compared") | {load: "load", "enable": "enabled part"}
     used[driven.signal] = "command" if outermost else f"{driven.stage} command"
     if design.effective_motor.source_gain_Nm_V is None:
         used["supply"] = "supply"
     if "force" in measured and "force" not in record.signals:
         used["voltage"] = "force, by the source's gain"
-    signals = {
-        name: compare_signals(name, KNOWN_UNITS[name], record.time_s, values, modelled[name])
-        for name, values in measured.items()
-    }
+    at_s, units = record.time_s, KNOWN_UNITS
+    signals = {n: compare_signals(n, units[n], at_s, own, modelled[n]) for n, own in measured.items()}
     return CorrelationResult(
         record=record.name,
         design=design.name,
@@ -177,7 +148,7 @@ def model_signals(
     record: Record,
     measured: Mapping[str, Floats],
     notes: list[str] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
     *,
     command: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, float]]:
@@ -186,25 +157,24 @@ def model_signals(
     ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
     done is added to ``notes``.
     """
-    from nonlinear import commands, simulate
-
-    driven = needed_command(design, record, command)
+    driven = driving.needed_command(design, record, command)
     notes = [] if notes is None else notes
     notes.extend(driven.notes)
     time = record.time_s - record.time_s[0]
-    supply = supply_of(driven, record, time, notes)
-    model, load = load_of(driven.design, record, time, notes)
+    supply = driving.supply_of(driven, record, time, notes)
+    model, load = driving.load_of(driven.design, record, time, notes)
     period = model.controller.period_s
     duration = float(time[-1]) + 2.0 * period
-    initial, moving = first_states(driven, record, measured)
+    initial, moving = driving.first_states(driven, record, measured)
 
     def run(early_s: Floats, *, until: float = duration, at: State = initial, **more: Any) -> Trajectory:
-        wanted = commands.sampled(*at_ticks(driven, time, duration, early_s), where=record.name)
+        wanted = commands.sampled(*driving.at_ticks(driven, time, duration, early_s), where=record.name)
         return simulate(model, wanted, until, load, initial=at, **supply, **more)
 
     if moving is not initial:
         part = {name: values[:FIRST_ROWS] for name, values in measured.items()}
-        until, early = float(time[:FIRST_ROWS][-1]) + 2.0 * period, np.zeros(len(steps_at(driven.values)))
+        until = float(time[:FIRST_ROWS][-1]) + 2.0 * period
+        early = np.zeros(len(driving.steps_at(driven.values)))
         rest, goes = (_series(model, run(early, until=until, at=at), time) for at in (initial, moving))
         if _off(part, goes) < _off(part, rest):
             initial = moving
@@ -223,7 +193,7 @@ def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> floa
 
 
 def _with_steps(
-    driven: Driven, time: Floats, measured: Mapping[str, Floats], run: Callable[[Floats], Trajectory]
+    driven: driving.Driven, time: Floats, measured: Mapping[str, Floats], run: Callable[[Floats], Trajectory]
 ) -> tuple[Trajectory, dict[str, Floats]]:
     """A run and its signals at the record's times, each step of the command at the tick that meets it best.
 
@@ -231,12 +201,12 @@ def _with_steps(
     after the later sample (written before it acts) to the earlier one.
     """
     tick, row = driven.design.controller.period_s, float(np.median(np.diff(time)))
-    early = np.zeros(len(steps_at(driven.values)))
+    early = np.zeros(len(driving.steps_at(driven.values)))
     made = run(early)
     series = _series(driven.design, made, time)
     name = next((name for name in ANSWERS if name in measured), "")
     for _ in range(STEP_ROUNDS if len(early) and name else 0):
-        more = earlier_s(driven, time, measured[name], series[name])
+        more = driving.earlier_s(driven, time, measured[name], series[name])
         moved = tick * np.clip(np.round((early + more) / tick), -1.0, np.floor(row / tick * (1.0 + 1e-9)))
         if np.array_equal(moved, early):
             break

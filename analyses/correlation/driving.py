@@ -1,27 +1,23 @@
 """What drives the model over a record: the command and its stage, the load, the supply, the first state."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy.interpolate import Akima1DInterpolator, CubicSpline
 
 from actuator_lti.design.model import Command as CommandShape
 from actuator_lti.design.model import Design
 from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats, Ints, Mask
+from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.record import Record
-
-if TYPE_CHECKING:
-    from nonlinear import State
-    from nonlinear.loads import LoadMoment
-
+from nonlinear import State, commands, loads
+from nonlinear.loads import LoadMoment
 
 LOADS = {"rotary": "torque", "linear": "load_force"}
 STAGES = ("position", "velocity", "current", "voltage")
@@ -125,8 +121,6 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
 
 def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     """A spline or Akima's curve, which misses every other sample less; beyond the ends it stands still."""
-    from scipy.interpolate import Akima1DInterpolator, CubicSpline
-
     inside = np.clip(at_s, time_s[0], time_s[-1])
     if len(values) < 3 or np.ptp(values) == 0.0:
         return np.interp(inside, time_s, values)
@@ -140,22 +134,17 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_of(values: Floats) -> Mask:
-    """For each interval between two samples, whether the values jump there from standstill to standstill.
+def steps_at(values: Floats) -> Ints:
+    """The first row behind each jump of the values from standstill to standstill.
 
     Examples
     --------
-    >>> steps_of(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
-    [False, True, False, False, False, False, False]
+    >>> steps_at(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
+    [2]
     """
     moves = np.diff(values) != 0.0
     around = np.concatenate([[False], moves, [False]])
-    return np.asarray(moves & ~around[:-2] & ~around[2:])
-
-
-def steps_at(values: Floats) -> Ints:
-    """The first row behind each of these jumps."""
-    return np.flatnonzero(steps_of(values)) + 1
+    return np.flatnonzero(moves & ~around[:-2] & ~around[2:]) + 1
 
 
 def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats) -> Floats:
@@ -181,8 +170,6 @@ def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) 
     ratio of the bus, so the supply scales it too: the loop's gain is the design's at ``limits.voltage``. A
     command in volts is taken as volts.
     """
-    from nonlinear import commands
-
     design = driven.design
     if "supply" not in record.signals or design.effective_motor.source_gain_Nm_V is not None:
         return {}
@@ -195,8 +182,6 @@ def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) 
 
 def load_of(design: Design, record: Record, time_s: Floats, notes: list[str]) -> tuple[Design, LoadMoment]:
     """The recorded load, which holds all of it; without one, the design's own moments act."""
-    from nonlinear import loads
-
     name, own = LOADS[design.axis], design.load.acting()
     if name not in record.signals:
         notes.extend(f"load: the design's {key} acts" for key in own)
@@ -211,8 +196,6 @@ def first_states(driven: Driven, record: Record, measured: Mapping[str, Floats])
 
     In motion, or with a current, the controllers are settled: their integrals hold what is needed for it.
     """
-    from nonlinear import State
-
     design = driven.design
     ratio, motor = design.total_ratio, design.effective_motor
     place = next((name for name in ("angle", "output_angle", "position") if name in measured), None)

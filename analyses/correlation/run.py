@@ -1,11 +1,12 @@
 """Records against the model: the figures of each, and of all together."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.types import Progress
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.compare import SignalComparison
@@ -117,13 +118,8 @@ class Correlation:
         return agrees(self.records, self.limit)
 
 
-def correlate(
-    design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None
-) -> Correlation:
+def correlate(design: Design, asked: Asked, *, progress: Progress = None) -> Correlation:
     """Run the model with each record's own command, load and supply, and compare."""
-    records = [record for path in asked.records for record in open_records(path)]
-    results = [
-        correlate_record(design, record, command=asked.command, progress=progress)
-        for record in named_apart(records)
-    ]
+    records = named_apart([record for path in asked.records for record in open_records(path)])
+    results = (correlate_record(design, one, command=asked.command, progress=progress) for one in records)
     return Correlation(design, asked, tuple(results))

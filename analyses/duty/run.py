@@ -77,10 +77,7 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
 
     The protection is left out of the simulation, so that the current is that of the duty as asked.
 
-    Raises
-    ------
-    InputError
-        For a drive without a motor current or a position loop, or a period of too many ticks.
+    Raises `InputError`: for a drive without motor current or position loop, or a period of too many ticks.
 
     Examples
     --------
@@ -179,12 +176,9 @@ def heating(design: Design, rms_A: float) -> Heating | None:
             return heat.ambient_degC + start * t / tau
         return heat.ambient_degC - start / share * np.expm1(-share * t / tau)
 
-    reached = None
+    reached, over = None, limit - heat.ambient_degC
     if final > limit and tau > 0.0:
-        part = (limit - heat.ambient_degC) * share / start
-        reached = (
-            tau * (limit - heat.ambient_degC) / start if share == 0.0 else -tau * log(1.0 - part) / share
-        )
+        reached = tau * over / start if share == 0.0 else -tau * log(1.0 - over * share / start) / share
     last = 5.0 * tau / share if share > 0.0 else (reached or tau)
     time = np.linspace(0.0, last, _DRAWN)
     course = after(time) if tau > 0.0 else np.full(_DRAWN, final)

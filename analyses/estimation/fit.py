@@ -9,10 +9,8 @@ import numpy as np
 
 from actuator_lti.types import Floats
 
-COVERAGE = 1.959963984540054
-"""Standard errors of a normal value in half of its 95 % interval."""
-SAME = 1e-9
-"""Part of a correlation below which values are one."""
+COVERAGE = 1.959963984540054  # standard errors of a normal value in half of its 95 % interval
+SAME = 1e-9  # part of a correlation below which values are one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,8 +40,7 @@ class Found:
 class Fit:
     """Values in SI by name, shape (p,), their covariance, shape (p, p), and those that were fixed.
 
-    The names are those of `analyses.estimation.parameters`, which knows label, unit and key of each, or keys
-    of a design.
+    The names are those of `analyses.estimation.parameters` (label, unit, key of each), or keys of a design.
     """
 
     names: tuple[str, ...]
@@ -107,10 +104,8 @@ class Fit:
         table = np.array([[own.get(name, 0.0) for name in self.names] for own in slopes.values()])
         table = table.reshape(len(slopes), len(self.names))
         found = dict(zip(slopes, table @ self.values, strict=True)) | dict(values or {})
-        covariance = table @ self.covariance @ table.T
-        return Fit(
-            names=tuple(slopes), values=np.array([found[name] for name in slopes]), covariance=covariance
-        )
+        made = np.array([found[name] for name in slopes])
+        return Fit(names=tuple(slopes), values=made, covariance=table @ self.covariance @ table.T)
 
     def refined(self, own: Fit) -> Fit:
         """The fit where some values were found anew, at all the others: with the error of these as well.
@@ -138,10 +133,7 @@ class Fit:
 
     def beside(self, name: str, value: float, std: float) -> Fit:
         """The fit and one more value, found on its own."""
-        names, values, wide = (
-            (*self.names, name),
-            np.append(self.values, value),
-            np.pad(self.covariance, (0, 1)),
-        )
+        wide = np.pad(self.covariance, (0, 1))
         wide[-1, -1] = std**2
-        return Fit(names=names, values=values, covariance=wide, fixed=self.fixed)
+        values = np.append(self.values, value)
+        return Fit(names=(*self.names, name), values=values, covariance=wide, fixed=self.fixed)

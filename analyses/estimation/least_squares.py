@@ -27,9 +27,8 @@ class NotTold:
     moves: Mapping[str, float] = field(default_factory=dict)
 
     def __str__(self) -> str:
-        return (
-            f"cannot be separated from {' and '.join(self.moves)}" if self.moves else "is not excited at all"
-        )
+        others = " and ".join(self.moves)
+        return f"cannot be separated from {others}" if others else "is not excited at all"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +49,6 @@ def told_apart(
 
     Examples
     --------
-    >>> import numpy as np
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
     >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
     >>> kept, [f"{one.name} {one}" for one in left]
@@ -79,23 +77,13 @@ def told_apart(
 
 
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
-    """Ordinary least squares of ``y = w p``.
+    """Ordinary least squares of ``y = w p``, of shapes (n, p) and (n,).
 
-    Parameters
-    ----------
-    w, y : array, shape (n, p) and (n,)
-    ends : sequence of int
-        Where each record ends, so that no block of rows reaches over two of them.
+    ``ends``: where each record ends, so that no block of rows reaches over two of them.
 
-    Raises
-    ------
-    InputError
-        Where there are no more rows than values.
+    Raises `InputError`: where there are no more rows than values.
 
-    Notes
-    -----
-    ``white``: variance of the residual about its mean, over n - 1 rows, as in the published EMPS figures.
-    ``correlated``: see `correlated_covariance`.
+    The variance behind ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
     """
     if len(y) <= w.shape[1]:
         told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"

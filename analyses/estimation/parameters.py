@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
+from math import cos, sin, sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -22,8 +22,7 @@ class Parameter:
     """Of the value in SI, to the unit in which it is shown."""
 
 
-UNSTATED = 0.05
-"""Relative standard deviation of a number of a design that states no tolerance."""
+UNSTATED = 0.05  # relative standard deviation of a number of a design that states no tolerance
 TORQUE, VISCOUS, INERTIA = "N m", "N m s/rad", "kg m²"
 ON_A_LINE = {TORQUE: "N", VISCOUS: "N s/m", INERTIA: "kg", "N m/(N m)": "N/N"}
 ON_A_LINE |= {"N m/A": "N/A", "N m/V": "N/V", "N m/rad": "N/m"}
@@ -80,6 +79,26 @@ def parameter(name: str, axis: str = "rotary") -> Parameter:
     if axis != "linear":
         return one
     return Parameter(one.linear or one.label, ON_A_LINE.get(one.unit, one.unit), one.key, scale=one.scale)
+
+
+def default_value(design: Design, name: str) -> float:
+    """The design's own value of a parameter of an inverse model, at the motor."""
+    friction, gravity = design.friction, design.load.gravity
+    if name == "inertia":
+        return design.inertia_kgm2
+    if name.startswith("map_"):
+        return dict(enumerate(point.torque_Nm for point in friction.map(1))).get(int(name[4:]), 0.0)
+    if name.startswith("gravity_") and gravity is not None:
+        part = cos if name == "gravity_sin" else sin
+        return gravity.peak_Nm * part(gravity.offset_rad)
+    side = -1 if name.endswith("_reverse") else 1
+    own = {
+        "viscous": friction.viscous(side),
+        "dry": friction.dry_Nm(0.0, side),
+        "offset": friction.offset_torque_Nm,
+        "load": friction.load_coefficient,
+    }
+    return own.get(name.partition("_")[0], 0.0)
 
 
 def own_std(design: Design, key: str) -> float:

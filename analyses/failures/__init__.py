@@ -1,7 +1,5 @@
 """What a drive does when a part of it fails: deflection, current and moment over time."""
 
-from actuator_lti.start.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import from_rooms
 
-_ROOMS = {"Asked": f"{__name__}.asked"}
-_ROOMS |= dict.fromkeys(("FailureCase", "Failures", "failures"), f"{__name__}.run")
-__getattr__, __dir__ = on_first_use(__name__, _ROOMS)
+__getattr__, __dir__ = from_rooms(__name__, asked="Asked", run="FailureCase Failures failures")

@@ -62,18 +62,10 @@ MOST_TICKS = 400_000
 def failures(design: Design, asked: Asked | None = None) -> Failures:
     """Follow every failure case from its start to the stop or to the end of the time watched.
 
-    Parameters
-    ----------
-    design : Design
-    asked : Asked, optional
-        Default: the design's full deflection is the stop, a tenth of it the deflection asked for.
+    By default the design's full deflection is the stop, a tenth of it the deflection asked for.
 
-    Raises
-    ------
-    InputError
-        For a drive whose closed loop is not stable, or a time of too many ticks.
-    NumericalError
-        If a run fails.
+    Raises `InputError`: for a drive whose closed loop is not stable, or a time of too many ticks. Raises
+    `NumericalError`: if a run fails.
 
     Examples
     --------

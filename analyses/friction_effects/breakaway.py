@@ -124,10 +124,8 @@ def threshold(design: Design, load_Nm: float) -> Threshold | None:
         return Threshold(static, (), None, 0.0)  # a step's own kick moves it at once
     if static.integral_time_s is not None:
         sizes = static.forward_rad * np.array(FRACTIONS)
-        waiting = tuple(
-            Waiting(float(size), static.waiting_time_s(float(size)), finite(time))
-            for size, time in zip(sizes, _first_motion_s(design, load_Nm, sizes), strict=True)
-        )
+        times = zip(sizes.tolist(), _first_motion_s(design, load_Nm, sizes), strict=True)
+        waiting = tuple(Waiting(size, static.waiting_time_s(size), finite(time)) for size, time in times)
         return Threshold(static, waiting, None, 0.0)
     sizes = static.forward_rad * np.linspace(1.0 - WITHIN, 1.0 + WITHIN, COUNT)
     moved = _first_motion_s(design, load_Nm, sizes) < math.inf

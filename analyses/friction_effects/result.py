@@ -3,18 +3,17 @@
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import dry_torque
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.friction_effects.breakaway import Hysteresis, Threshold, hysteresis, threshold
 from analyses.large_signal.tones import linear_steady_state
-from analyses.limit_cycles.describing import at_load, cycles_of_friction, dry_Nm
-from analyses.limit_cycles.run import Confirmation, Cycle, confirm
+from analyses.limit_cycles.describing import Cycle, at_load, cycles_of_friction, dry_Nm
+from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.limit_cycles.stick_slip import StickSlipCycle, stick_slip_cycle
 from analyses.motion.settling import Settling, noticed, settlings_of
 from analyses.specification.capability import drive_figures
@@ -115,25 +114,14 @@ class FrictionEffects:
 
 
 def friction_effects(
-    design: Design | str | PathLike[str],
-    loops: Loops | None = None,
-    *,
-    settlings: Iterable[Settling] | None = None,
+    design: AnyDesign, loops: Loops | None = None, *, settlings: Iterable[Settling] | None = None
 ) -> FrictionEffects:
     """Find threshold, hysteresis, standing error and limit cycles at each load torque of the design.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    settlings : iterable of Settling, optional
-        What steps of the drive end in, if known already (`analyses.motion.settling.settlings_of`).
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``settlings``: what steps of the drive end in, if known already (`settlings_of`).
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     control, own, integrator = design.controller, design.controller.own_law, ""

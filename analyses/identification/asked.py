@@ -25,8 +25,7 @@ class Settings:
     """What is looked for in records of a motion, and how."""
 
     fix: Annotated[
-        list[str] | None,
-        Option("Hold a value, such as friction.viscous=0; repeatable.", "KEY=VALUE"),
+        list[str] | None, Option("Hold a value, such as friction.viscous=0; repeatable.", "KEY=VALUE")
     ] = None
     residual_limit: Annotated[
         float, Option("Largest relative residual for which a design is written; 20.", "%")

@@ -1,15 +1,16 @@
 """From bench records to a design that may be written: inputs, joint fit, refinement, verdicts."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 from actuator_lti.design import read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
+from actuator_lti.types import Progress
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
-from analyses.identification import verdict
+from analyses.identification import to_design, verdict
 from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.design_values import (
     DesignValue,
@@ -27,13 +28,6 @@ from analyses.identification.output_error import OutputErrorResult, Resimulated,
 from analyses.identification.own_bias import without_bias
 from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.rows import is_loaded, recipe_for
-from analyses.identification.to_design import (
-    INERTIAS,
-    design_with_fit,
-    joint_values,
-    with_correlations,
-    with_structure,
-)
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
@@ -75,14 +69,11 @@ def identify_bench(
     *,
     validation: Sequence[Record] = (),
     settings: Settings | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
 
-    Raises
-    ------
-    InputError
-        If a record lacks a signal, a key cannot be fixed, or no design can be made of the result.
+    Raises `InputError`: if a record lacks a signal, a key cannot be fixed, or no design comes of the result.
     """
     settings = Settings() if settings is None else settings
     limit = settings.residual_limit / 100.0
@@ -135,7 +126,7 @@ def _by_voltage(
     """The design with what the voltage equation tells of its motor, and that fit."""
     found = fit_electrical(plain, records, recipe, late_s)
     told = f"voltage equation of {_names(records)}"
-    return design_with_fit(plain, electrical_values(plain, found), told), found
+    return to_design.design_with_fit(plain, electrical_values(plain, found), told), found
 
 
 def _names(records: Sequence[Record]) -> str:
@@ -157,21 +148,21 @@ def _made(
     both: Fit | None,
     settings: Settings,
     items: Sequence[verdict.Item],
-    progress: Callable[[int, int], None] | None,
+    progress: Progress,
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records
     source = f"identified from {_names(records)}{at_constant(model, start)}"
     try:
-        values = joint_values(start, model, inertia_to=settings.inertia_to)
+        values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
         for record in records:
             for key in record.settings.keys() & set(values.names):
                 told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
                 raise InputError(f"settings.{key}: {told}", where=record.name)
-        made = design_with_fit(with_structure(start, model), values, source)
+        made = to_design.design_with_fit(to_design.with_structure(start, model), values, source)
         if both is not None:
-            both = joint_values(start, both, inertia_to=settings.inertia_to)
-            made = with_correlations(made, both)
+            both = to_design.joint_values(start, both, inertia_to=settings.inertia_to)
+            made = to_design.with_correlations(made, both)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
         raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
@@ -182,8 +173,8 @@ def _made(
             both = both.refined(refined)
             own = both.renamed({name: name for name in refined.names})
             refined = replace(refined, covariance=own.covariance)
-        made = design_with_fit(made, refined, f"{source}, refined by simulation")
-        made = made if both is None else with_correlations(made, both)
+        made = to_design.design_with_fit(made, refined, f"{source}, refined by simulation")
+        made = made if both is None else to_design.with_correlations(made, both)
     return read_design_text(write_design(made)), refined
 
 
@@ -191,7 +182,8 @@ def _held(design: Design, start: Design, settings: Settings) -> dict[str, float]
     """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
     form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
     names = (*NAMES[form], "load_coefficient")
-    held = held_by_name(fixed_values(design, settings.fix), names, dict.fromkeys(INERTIAS, "inertia"))
+    whole = dict.fromkeys(to_design.INERTIAS, "inertia")
+    held = held_by_name(fixed_values(design, settings.fix), names, whole)
     return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
 
 
@@ -204,11 +196,8 @@ def _fitted(
 ) -> JointModel:
     """The joint model as the settings ask, less its own bias."""
     gravity = settings.gravity or start.load.gravity is not None
-    if settings.friction == "map":
-        model = fit_map(start, records, recipe=recipe, fixed=held, gravity=gravity)
-    else:
-        form = settings.friction
-        model = fit_records(start, records, form=form, recipe=recipe, fixed=held, gravity=gravity)
+    fit = fit_map if settings.friction == "map" else partial(fit_records, form=settings.friction)
+    model = fit(start, records, recipe=recipe, fixed=held, gravity=gravity)
     parts = []
     for part, record in zip(model.records, records, strict=True):
         command = command_of(start, record)
@@ -216,8 +205,8 @@ def _fitted(
         parts.append(replace(part, used={**more, **part.used}))
 
     def made(model: JointModel) -> Design:
-        values = joint_values(start, model, inertia_to=settings.inertia_to)
-        return design_with_fit(with_structure(start, model), values, "")
+        values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
+        return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
 
     return without_bias(start, made, replace(model, records=tuple(parts)), records)
 

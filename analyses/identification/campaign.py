@@ -1,15 +1,14 @@
 """From a campaign to coefficients: import, steady parts, surface, the question of a richer law."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
@@ -20,6 +19,7 @@ from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetA
 from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
+from nonlinear import commands, simulate
 
 RUN_UP_S = 0.3
 STEADY_S = 0.2
@@ -67,27 +67,18 @@ class CampaignResult:
 
 def identify_campaign(
     imported: ImportedCampaign,
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     *,
     richer: bool = True,
     fixed: Mapping[str, float] | None = None,
 ) -> CampaignResult:
     """Identify C0, Cv and CM (paper, section 3) from imported runs.
 
-    Parameters
-    ----------
-    imported : ImportedCampaign
-    design : Design
-        Its torque constant makes torques of currents.
-    richer : bool
-        Whether to ask, by cross-validation, for a richer law.
-    fixed : mapping, optional
-        Coefficients (C0, Cv, CM) that are held at a value.
+    The design's torque constant makes torques of currents; ``richer``: whether to ask, by cross-validation,
+    for a richer law; ``fixed``: coefficients (C0, Cv, CM) that are held at a value.
 
-    Raises
-    ------
-    InputError
-        Without a torque constant, or with too few usable runs; the reasons of those set aside are told.
+    Raises `InputError`: without a torque constant, or with too few usable runs; the reasons of those set
+    aside are told.
     """
     design = as_design(design)
     constant = design.effective_motor.torque_constant_Nm_A
@@ -180,11 +171,7 @@ def _values_of(design: Design) -> dict[str, float]:
 
 
 def campaign_items(
-    design: Design,
-    result: CampaignResult,
-    simulated: float | None,
-    limit: float,
-    held: Collection[str] = (),
+    design: Design, result: CampaignResult, simulated: float | None, limit: float, held: Collection[str] = ()
 ) -> tuple[Item, ...]:
     """The verdict on a campaign: runs, residual, size, and the written design simulated again."""
     fit, aside = result.fit, sorted(result.set_aside, key=lambda run: not run.contradicts)
@@ -219,17 +206,12 @@ def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
     yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
-def steady_current_error(
-    design: Design, points: Sequence[SteadyPoint], *, progress: Callable[[int, int], None] | None = None
-) -> float | None:
+def steady_error(design: Design, points: Sequence[SteadyPoint], *, progress: Progress = None) -> float | None:
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
 
     Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up
-    and 0.2 s for the mean. Runs that the simulated drive does not bring to within 1 % of their speed are left
-    out.
+    and 0.2 s for the mean. Runs that the simulated drive leaves more than 1 % off their speed are left out.
     """
-    from nonlinear import commands, simulate
-
     constant, duration = design.effective_motor.torque_constant_Nm_A, RUN_UP_S + STEADY_S
     if constant is None or duration / design.controller.period_s > MOST_CAMPAIGN_TICKS:
         return None

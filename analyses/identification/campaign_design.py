@@ -1,15 +1,16 @@
 """Which further runs would shrink the uncertainty of the margins most."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.identification.surface import PATHS, SurfaceFit
 
 LOOPS = ("velocity", "position")
@@ -59,12 +60,7 @@ class CampaignSuggestion:
 
 
 def suggest_runs(
-    design: Design,
-    fit: SurfaceFit,
-    *,
-    count: int = 6,
-    criterion: str = "margins",
-    progress: Callable[[int, int], None] | None = None,
+    design: Design, fit: SurfaceFit, *, count: int = 6, criterion: str = "margins", progress: Progress = None
 ) -> CampaignSuggestion:
     """Suggest further (speed, load) points, one after the other, each the best after those before it.
 
@@ -92,9 +88,7 @@ def suggest_runs(
     )
 
 
-def margin_spreads(
-    design: Design, fit: SurfaceFit, *, progress: Callable[[int, int], None] | None = None
-) -> tuple[MarginSpread, ...]:
+def margin_spreads(design: Design, fit: SurfaceFit, *, progress: Progress = None) -> tuple[MarginSpread, ...]:
     """Margins, their slopes to C0, Cv, CM (central differences), and their spread from a fit's covariance."""
     middle = _margins(design)
     slopes = {key: np.zeros(3) for key in middle}
@@ -117,8 +111,6 @@ def margin_spreads(
 
 def _margins(design: Design) -> dict[tuple[str, str], float]:
     """Gain (dB) and phase margins (deg) of the outer loops where friction matters most: in slow motion."""
-    from actuator_lti import assemble_loops, stability_margins
-
     result: dict[tuple[str, str], float] = {}
     slow = 0.02 * min(reachable_speed(design), 1e3)
     for load in sorted({0.0, design.load.moment_max_Nm}):

@@ -17,23 +17,20 @@ from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.parameters import own_share, parameter
+from analyses.estimation.parameters import default_value, own_share, parameter
 from analyses.identification.electrical import fit_electrical
-from analyses.identification.joint_model import JointModel, default_value
+from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, one_phase
 from analyses.records.record import Record
 
-NO_CHANCE = 1e-3
-"""Level at which the design's numbers as a whole are rejected, and one of them is."""
-EXPLAINED = 0.01
-"""Level above which a cause explains what is off."""
+NO_CHANCE = 1e-3  # level at which the design's numbers as a whole are rejected, and one of them is
+EXPLAINED = 0.01  # level above which a cause explains what is off
 LEAST_VALUES = 3
 ALIKE = 0.02
 """Relative standard deviation within which a cause has to explain: rough numbers of a design that are off
 alike by chance are no cause."""
-FEW = 2.0
-"""Least factor of a cause that only two values tell."""
+FEW = 2.0  # least factor of a cause that only two values tell
 
 TORQUES = dict.fromkeys(("inertia", "dry", "viscous", "load", "gravity"), 1.0)
 CAUSES: Mapping[str, Mapping[str, float]] = {
@@ -85,13 +82,9 @@ def design_values(
     if design.coupling is not None and friction is not None:  # taken off the torque that a wrong scale is in
         ratio = design.ratio_to_coupling
         behind = {"viscous": friction.viscous_Nms_rad / ratio**2, "dry": friction.dry_torque_Nm / ratio}
-    found = [
-        design_value(
-            design, model, name, default_value(design, name), behind.get(name.partition("_")[0], 0.0)
-        )
-        for name in model.names
-        if not name.startswith(("offset", "map_", "gravity"))
-    ]
+    told = [name for name in model.names if not name.startswith(("offset", "map_", "gravity"))]
+    before = {name: default_value(design, name) for name in told}
+    found = [design_value(design, model, n, before[n], behind.get(n.partition("_")[0], 0.0)) for n in told]
     found.append(_gravity_value(design, model))
     whole = [record for record in records if {"voltage", "current"} <= set(record.signals)]
     own = {"resistance": motor.resistance_ohm, "back_emf": motor.back_emf_constant_Vs_rad}

@@ -21,8 +21,7 @@ from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding, c
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record
 
-LEAST_RUN = 3
-"""Samples in a row at the largest or smallest value of all: a flat top."""
+LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8
 SETTLED = 0.1
 LARGEST_STEP_S = 0.01
@@ -203,10 +202,8 @@ def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> t
         return record, []
     share = 100.0 * np.count_nonzero(flat) / len(flat)
     largest = f"{np.max(np.abs(record[name])):.4g} {KNOWN_UNITS.get(name, '')}".rstrip()
-    text = (
-        f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
-        "the other rows say that it was larger: clipped; these rows are left out"
-    )
+    text = f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
+    text += "the other rows say that it was larger: clipped; these rows are left out"
     return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]
 
 

@@ -18,8 +18,7 @@ from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
-SHOWN = 5.0
-"""A value counts as shown where it exceeds its standard error so many times."""
+SHOWN = 5.0  # a value counts as shown where it exceeds its standard error so many times
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -100,9 +100,7 @@ def _one_more(speed: Floats, rest: Floats, top: float, result: tuple[float, ...]
     for k, here in enumerate(chosen):  # between the grid's neighbours
         others = chosen[:k] + chosen[k + 1 :]
         ends = np.log(here) - step, min(np.log(here) + step, np.log(0.97 * top))
-        moved = minimize_scalar(
-            lambda x, o=others: misfit([*o, float(np.exp(x))]), bounds=ends, method="bounded"
-        )
+        moved = minimize_scalar(lambda x, o=others: misfit([*o, np.exp(x)]), bounds=ends, method="bounded")
         if apart(np.exp(moved.x), others) and moved.fun < misfit(chosen):
             chosen[k] = np.exp(moved.x)
     return tuple(float(v) for v in sorted(chosen))

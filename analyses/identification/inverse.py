@@ -18,15 +18,8 @@ from analyses.estimation.least_squares import (
     solve,
     told_apart,
 )
-from analyses.estimation.parameters import own_std, parameter
-from analyses.identification.joint_model import (
-    FrictionForm,
-    JointModel,
-    Recipe,
-    RecordFit,
-    Rows,
-    default_value,
-)
+from analyses.estimation.parameters import default_value, own_std, parameter
+from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, RecordFit, Rows
 from analyses.identification.rows import record_rows, rows_under
 from analyses.records.record import Record
 
@@ -54,12 +47,8 @@ def fit_records(
     sin(output angle + offset)``, ``knots_rad_s`` (from 0) are speeds of a friction map in the place of dry
     and viscous friction. The recipe is by default that of each record's own period.
 
-    Raises
-    ------
-    InputError
-        If a record lacks a signal, or nothing is left to fit.
-    NumericalError
-        If the rows are singular all the same.
+    Raises `InputError`: if a record lacks a signal, or nothing is left to fit. Raises `NumericalError`: if
+    the rows are singular all the same.
     """
     if not records:
         raise InputError("no record to identify from")

@@ -12,7 +12,6 @@ from typing import Literal
 
 import numpy as np
 
-from actuator_lti.design.model import Design
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.fit import Fit
 from analyses.records.differentiation import Motion, filtered_motion
@@ -237,23 +236,3 @@ class JointModel(Fit):
     def rows_used(self) -> int:
         """Rows of the regression."""
         return sum(record.rows_used for record in self.records)
-
-
-def default_value(design: Design, name: str) -> float:
-    """The design's own value of a parameter of the model, at the motor."""
-    friction, gravity = design.friction, design.load.gravity
-    if name == "inertia":
-        return design.inertia_kgm2
-    if name.startswith("map_"):
-        return dict(enumerate(point.torque_Nm for point in friction.map(1))).get(int(name[4:]), 0.0)
-    if name.startswith("gravity_") and gravity is not None:
-        part = np.cos if name == "gravity_sin" else np.sin
-        return gravity.peak_Nm * float(part(gravity.offset_rad))
-    side = -1 if name.endswith("_reverse") else 1
-    own = {
-        "viscous": friction.viscous(side),
-        "dry": friction.dry_Nm(0.0, side),
-        "offset": friction.offset_torque_Nm,
-        "load": friction.load_coefficient,
-    }
-    return own.get(name.partition("_")[0], 0.0)

@@ -12,10 +12,8 @@ from analyses.identification.joint_model import Recipe
 from analyses.records.differentiation import Motion
 from analyses.records.record import Record
 
-ROUNDS = 4
-"""Rounds in which the sign of the load's speed and its moment are found from the speed itself."""
-NOISE_SHARE = 0.1
-"""Largest share of the coupling's torque that noise of the output encoder may make."""
+ROUNDS = 4  # rounds in which the sign of the load's speed and its moment are found from the speed itself
+NOISE_SHARE = 0.1  # largest share of the coupling's torque that noise of the output encoder may make
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,14 +53,10 @@ def two_sides(
         motor = Motion(**{name: values + vars(extra)[name] for name, values in vars(motion).items()})
         told = "load's own motion, the motor's by the design's stiffness"
         return TwoSides(motor=motor, load=load, torque=torque, told=told)
-    load, told = _follows(design, coupling, record, motion, moment), "load's motion by the design's coupling"
-    measured, used = _measured(design, record, load, moment, recipe), {}
-    if measured is not None:
-        load, told, used = (
-            measured,
-            "load's motion of the output's encoder",
-            {"output_angle": "load's motion"},
-        )
+    load, told, used = _follows(design, coupling, record, motion, moment), "by the design's coupling", {}
+    if (measured := _measured(design, record, load, moment, recipe)) is not None:
+        load, told, used = measured, "of the output's encoder", {"output_angle": "load's motion"}
+    told = f"load's motion {told}"
     return TwoSides(motor=motion, load=load, torque=_of_load(design, load), told=told, used=used)
 
 

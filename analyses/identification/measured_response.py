@@ -1,6 +1,6 @@
 """Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,7 @@ from actuator_lti.design import parameter_value, paths_of, read_design_text, wit
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.response import RecordedResponse, read_response
-from actuator_lti.types import Complexes
+from actuator_lti.types import Complexes, Progress
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.estimation.parameters import own_share, own_std, parameter
@@ -58,7 +58,7 @@ def identify_response(
     fixed: Mapping[str, float] | None = None,
     limit: float = 0.2,
     averages: int | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> ResponseResult:
     """Fit a design to a measured frequency response of one of its loops.
 

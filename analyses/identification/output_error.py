@@ -10,25 +10,24 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.correlation.closed_loop import correlate_record, measured_signals, model_signals
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import correlated_covariance
-from analyses.identification.joint_model import FrictionForm, default_value
+from analyses.estimation.parameters import default_value
+from analyses.identification.joint_model import FrictionForm
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record
 
 STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
-AT_END = 1e-9
-"""Part of the start within which a value is at the end of what its key allows."""
+AT_END = 1e-9  # part of the start within which a value is at the end of what its key allows
 LEAST_STEPPED = 0.1
 """Part of the start below which a value's own size is no measure of its step: it may go to zero."""
-LEAST_LOAD = 1e-6
-"""Part of its start that is left of an inertia behind a coupling."""
+LEAST_LOAD = 1e-6  # part of its start that is left of an inertia behind a coupling
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
 MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
@@ -77,7 +76,7 @@ def fit_output(
     paths: tuple[str, ...],
     output_of: Callable[[Design], Floats],
     measured: Floats,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
@@ -172,11 +171,7 @@ def output_name(design: Design, record: Record) -> str:
 
 
 def refine_records(
-    design: Design,
-    records: Sequence[Record],
-    paths: tuple[str, ...],
-    *,
-    progress: Callable[[int, int], None] | None = None,
+    design: Design, records: Sequence[Record], paths: tuple[str, ...], *, progress: Progress = None
 ) -> OutputErrorResult:
     """Refine values by simulating every record with its own command, load and supply.
 

@@ -14,8 +14,9 @@ from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
+from analyses.estimation.parameters import default_value
 from analyses.identification.inverse import fit_records, with_scatter
-from analyses.identification.joint_model import JointModel, RecordFit, default_value
+from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
 from analyses.records.record import Record
@@ -23,15 +24,11 @@ from analyses.records.record import Record
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
-SETTLED = 0.1
-"""Standard errors within which a bias that was found again is the one that was found before."""
+SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
 def without_bias(
-    start: Design,
-    make: Callable[[JointModel], Design],
-    model: JointModel,
-    records: Sequence[Record],
+    start: Design, make: Callable[[JointModel], Design], model: JointModel, records: Sequence[Record]
 ) -> JointModel:
     """The model less what the same fit finds too much in records simulated with the design that came of it.
 

@@ -1,6 +1,6 @@
 """Motions within a drive's limits that tell its values as closely as asked: the plan of an experiment."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import product
 
@@ -9,11 +9,12 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.correlation.closed_loop import model_signals
 from analyses.estimation.fit import COVERAGE, Fit
 from analyses.estimation.least_squares import Information, covariance_of, information_of, told_apart
-from analyses.identification.joint_model import JointModel, Rows, default_value
+from analyses.estimation.parameters import default_value
+from analyses.identification.joint_model import JointModel, Rows
 from analyses.identification.rows import record_rows
 from analyses.records.record import Record, RowCounts
 
@@ -76,7 +77,7 @@ def plan_motions(
     within: float,
     noise: float,
     measured: JointModel | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress = None,
 ) -> Plan:
     """Choose motions, one after the other, until every interval is expected to be as small as asked.
 

@@ -16,8 +16,7 @@ from analyses.records.differentiation import filtered_motion
 from analyses.records.record import Record
 
 OF_THE_LOAD = ("stiffness", "load_inertia", "damping", "load_viscous")
-CONTACT = 0.25
-"""Rows whose torque is above this share of its largest (95 % point) are taken as in contact."""
+CONTACT = 0.25  # rows whose torque is above this share of its largest (95 % point) are taken as in contact
 LEAST_ROWS = 50
 BEYOND = 0.9
 ROUNDS = 8

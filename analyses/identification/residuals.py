@@ -4,14 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import correlate, lfilter
 from scipy.stats import norm
 
 from actuator_lti.types import Floats, Ints
 from analyses.identification.joint_model import JointModel, RecordFit
 
-LEVEL = 0.01
-"""Probability with which chance alone leaves the bound at one lag or more."""
+LEVEL = 0.01  # probability with which chance alone leaves the bound at one lag or more
 MOST_LAGS = 100
 
 
@@ -20,9 +19,8 @@ class ResidualTest:
     """Correlation of a record's innovations with an input, or (``whiteness``) with themselves.
 
     The innovations are what an autoregressive noise model leaves of the residual; an input has passed the
-    same filter. Where they are white and independent, each
-    correlation has the standard deviation ``1/sqrt(n)``; ``bound`` is left at any of the ``lags`` (rows) with
-    a probability of 1 %.
+    same filter. Where they are white and independent, each correlation has the standard deviation
+    ``1/sqrt(n)``; ``bound`` is left at any of the ``lags`` (rows) with a probability of 1 %.
     """
 
     record: str
@@ -52,11 +50,8 @@ def residual_tests(model: JointModel) -> tuple[ResidualTest, ...]:
     """Whiteness of each record's residual, and independence of speed and acceleration.
 
     At lags up to a quarter of the rows, 100 at most. Source: L. Ljung, System Identification, 2nd ed.,
-    section 16.6; pre-whitening: L. D. Haugh, J. Am. Stat. Assoc. 71 (1976).
-
-    Notes
-    -----
-    Where the residual of the simulated record was taken off (`own_bias`), it is taken off here too.
+    section 16.6; pre-whitening: L. D. Haugh, J. Am. Stat. Assoc. 71 (1976). Where the residual of the
+    simulated record was taken off (`own_bias`), it is taken off here too.
     """
     return tuple(test for part in model.records for test in _of_record(part))
 
@@ -75,12 +70,12 @@ def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
         lags = both if of else both[reach + 1 :]
         e, u = white - white.mean(), x - x.mean()
         size, count = float(np.linalg.norm(e) * np.linalg.norm(u)) or 1.0, len(e)
-        products = [float(e[max(k, 0) : count + min(k, 0)] @ u[max(-k, 0) : count - max(k, 0)]) for k in lags]
+        products = correlate(e, u)[count - 1 + lags]
         yield ResidualTest(
             record=part.name,
             name="independence" if of else "whiteness",
             input=of,
             lags=lags,
-            correlation=np.array(products) / size,
+            correlation=products / size,
             bound=float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count)),
         )

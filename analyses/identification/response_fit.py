@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Progress
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
 from analyses.estimation.least_squares import told_apart
 from analyses.identification.response_model import Seen
@@ -138,9 +138,7 @@ class ResponseFit(Fit):
         return low, high
 
 
-def determined(
-    start: Design, names: tuple[str, ...], seen: Seen, progress: Callable[[int, int], None] | None
-) -> ResponseFit:
+def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Progress = None) -> ResponseFit:
     """The fit of what is determined; of the others the one told worst is kept first."""
     left, better = dict[str, str](), list[Floats]()
     while mine := tuple(name for name in names if name not in left):

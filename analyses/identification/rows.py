@@ -11,14 +11,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.arrays import lasting
-from analyses.identification.joint_model import (
-    FrictionForm,
-    JointModel,
-    Recipe,
-    Rows,
-    default_value,
-    friction_columns,
-)
+from analyses.estimation.parameters import default_value
+from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import place_of

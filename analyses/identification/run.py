@@ -11,12 +11,7 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.types import Progress
 from analyses.identification.asked import Asked, fixed_values, held_by_name
 from analyses.identification.bench import BenchResult, identify_bench
-from analyses.identification.campaign import (
-    CampaignResult,
-    campaign_items,
-    identify_campaign,
-    steady_current_error,
-)
+from analyses.identification.campaign import CampaignResult, campaign_items, identify_campaign, steady_error
 from analyses.identification.campaign_design import CampaignSuggestion, suggest_runs
 from analyses.identification.design_values import at_constant
 from analyses.identification.frequency_bench import FrequencyResult, identify_frequency
@@ -43,7 +38,7 @@ class CampaignAnswer(Identified):
 
 
 def identify(
-    design: Design, asked: Asked, *, progress: Progress | None = None
+    design: Design, asked: Asked, *, progress: Progress = None
 ) -> BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan:
     """Identify a drive from its records, and hold the design that comes of it against them."""
     limit, first, *others = asked.residual_limit / 100.0, *asked.files
@@ -83,7 +78,7 @@ def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
     return named_apart([record for path in paths for record in open_records(path)], taken)
 
 
-def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:
+def _of_campaign(design: Design, asked: Asked, progress: Progress) -> CampaignAnswer:
     listed, fixed = load_campaign(asked.files[0]), fixed_values(design, asked.fix)
     held, imported = held_by_name(fixed, NAMES), import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)
@@ -91,7 +86,7 @@ def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> Cam
     source = f"identified from {len(fit.points)} runs, {listed.name}{at_constant(fit, design)}"
     made = design_with_fit(with_values(design, fixed), fit.by_key(), source)
     written = read_design_text(write_design(made))
-    simulated = steady_current_error(written, fit.points, progress=progress)
+    simulated = steady_error(written, fit.points, progress=progress)
     load, speed = design.load.moment_max_Nm, reachable_speed(design)
     load = load if load > 0.0 else max(p.load_Nm for p in fit.points)
     speed = speed if math.isfinite(speed) else max(p.speed_rad_s for p in fit.points)

@@ -3,14 +3,14 @@
 from functools import lru_cache
 
 import numpy as np
+from scipy.stats import norm
 
 from actuator_lti.types import Floats
 from analyses.identification.steady import SteadyPoint
 from analyses.records.campaign_file import Instruments
 
 DRAWS = 1 << 15
-LEVEL = 0.01
-"""Probability of a false alarm in a campaign."""
+LEVEL = 0.01  # probability of a false alarm in a campaign
 
 
 def shared_errors(
@@ -72,8 +72,6 @@ def standardised(x: Floats, y: Floats, variance: Floats, shared: Floats) -> tupl
     (n, k), are estimated along with the coefficients, within their bounds, so that an error of an
     instrument does not make outliers of all runs that used it.
     """
-    from scipy.stats import norm
-
     w, count = 1.0 / np.sqrt(variance), len(y)
     a = with_shared(x * w[:, None], shared * w[:, None])
     b = np.concatenate([y * w, np.zeros(shared.shape[1])])

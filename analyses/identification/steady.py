@@ -30,11 +30,9 @@ class SteadyCriterion:
     least_duration_s: float = 0.5
 
     def __str__(self) -> str:
-        return (
-            f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
-            f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), "
-            f"longest stretch, {self.trim_s:g} s cut off at both ends"
-        )
+        said = f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
+        said += f"plateau per second (or {self.noise_factor:g} standard deviations of its noise), "
+        return said + f"longest stretch, {self.trim_s:g} s cut off at both ends"
 
 
 CRITERION = SteadyCriterion()
@@ -89,7 +87,6 @@ def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.array([0.0, 0.1, 0.25, 0.3, 0.45, 0.5])
     >>> moving_slope(t, 3.0 * t + 1.0, 4).round(12).tolist()
     [3.0, 3.0, 3.0]

@@ -263,7 +263,5 @@ def contributions(
     share = terms / total
     gradient = (np.eye(3) - share[:, None]) * point[None, :] / total
     spread = np.zeros((3, 3)) if covariance is None else gradient @ covariance @ gradient.T
-    return tuple(
-        Contribution(name=name, torque_Nm=float(t), share=float(s), share_std=float(np.sqrt(v)))
-        for name, t, s, v in zip(NAMES, terms, share, np.diag(spread), strict=True)
-    )
+    rows = zip(NAMES, terms.tolist(), share.tolist(), np.sqrt(np.diag(spread)).tolist(), strict=True)
+    return tuple(Contribution(name=n, torque_Nm=t, share=s, share_std=std) for n, t, s, std in rows)

@@ -17,8 +17,7 @@ from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel
 
 LEAST_CORRELATION = 0.005
-TRUNCATION_STD = 6.5
-"""Standard deviations that a normal distribution is sampled to."""
+TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to
 
 
 REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")
@@ -136,10 +135,8 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     except InputError as error:
         if not error.message.startswith(fit.names):
             raise
-        raise InputError(
-            f"identified {error.message}; the record does not tell it: it takes a longer motion,"
-            " at several speeds in both directions"
-        ) from error
+        told = f"identified {error.message}; the record does not tell it: it takes a longer motion,"
+        raise InputError(told + " at several speeds in both directions") from error
     parameters = dict(changed.parameters)
     for path, std in zip(fit.names, fit.standard_errors, strict=True):
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))
@@ -185,11 +182,8 @@ def _correlations(paths: Sequence[str], correlation: Floats) -> list[Correlation
     if lowest < 0.0:  # rounding and leaving out may have made it indefinite by as much
         keep = 1.0 / (1.0 - 1.01 * lowest + 1e-9)
         matrix = np.where(np.eye(len(paths)) > 0.0, 1.0, keep * matrix)
-    return [
-        Correlation(first=paths[i], second=paths[j], coefficient=float(matrix[i, j]))
-        for i, j in combinations(range(len(paths)), 2)
-        if matrix[i, j] != 0.0
-    ]
+    pairs = ((i, j) for i, j in combinations(range(len(paths)), 2) if matrix[i, j] != 0.0)
+    return [Correlation(first=paths[i], second=paths[j], coefficient=float(matrix[i, j])) for i, j in pairs]
 
 
 def _short(value: float) -> float:

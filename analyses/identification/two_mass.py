@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Complexes, Floats
@@ -14,10 +15,8 @@ from analyses.records.record import Record
 
 MIN_PERIODS = 4
 TOP = 0.4  # of the sampling frequency: lines above are not looked at
-BESIDE = 6
-"""Places on either side of a line that its noise is taken from; a sharp resonance allows no more."""
-EXCITED = 25.0
-"""A line counts as excited where its power is this many times that of its noise."""
+BESIDE = 6  # places on either side of a line that its noise is taken from; a sharp resonance allows no more
+EXCITED = 25.0  # a line counts as excited where its power is this many times that of its noise
 NAMES = ("motor_inertia", "load_inertia", "stiffness", "damping", "viscous", "load_viscous")
 """J_m at the motor, J_l at its own shaft, k and c at the coupling, Cv at the motor, Cv_l behind."""
 FLOORS = ("damping", "viscous", "load_viscous")
@@ -203,8 +202,6 @@ def fit_two_mass(
     9.11). ``start`` has the names of ``NAMES``, ``reduction`` is N_c, up to the coupling, ``reaction`` the
     torque on the motor by that in the coupling, 1/N_c by default.
     """
-    from scipy.optimize import least_squares
-
     held, outputs = dict(fixed or {}), len(lines.names) - 1
     names = tuple(name for name in NAMES if name not in held)
     scale = _scales(start, names)

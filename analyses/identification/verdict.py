@@ -20,11 +20,9 @@ from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_o
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 
-RESIDUAL_LIMIT = 0.20
-"""Largest relative residual that is taken without being told to."""
+RESIDUAL_LIMIT = 0.20  # largest relative residual that is taken without being told to
 LARGEST_FACTOR = 3.0
-MOST_DRY_UNLOADED = 2.0
-"""Dry friction over the design's, where a load adds to it and none is recorded."""
+MOST_DRY_UNLOADED = 2.0  # dry friction over the design's, where a load adds to it and none is recorded
 LARGEST_OF_ANY = 10.0
 LARGEST_LINE_ERROR = 0.5
 ROWS_EACH = 10
@@ -125,10 +123,8 @@ def sampling_items(record: Record) -> Iterator[Item]:
         return
     line = x[1:-1] - 0.5 * (x[:-2] + x[2:])
     off = float(np.sqrt(np.mean(line**2)) / np.sqrt(np.mean(x**2)))
-    reason = (
-        f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
-        "sampled too slowly, or noise; the inertia cannot be trusted"
-    )
+    reason = f"the current leaves the line between its neighbours by {100.0 * off:.0f} % of its rms: "
+    reason += "sampled too slowly, or noise; the inertia cannot be trusted"
     label = f"{record.name}: current sampled fast enough"
     yield Item.of(f"sampling-{record.name}", label, reason if off > LARGEST_LINE_ERROR else "")
 
@@ -194,14 +190,13 @@ def following_item(record: str, followed: Followed) -> Item:
     if followed.alike < ALIKE:
         return Item.of(id, label, f"the motion is not that of the command (correlation {followed.alike:.2f})")
     scale = "counts a revolution, the reduction, or a unit"
-    reason = f"the motion is {1.0 + clock:.4g} times that which the loops make of the commanded speed: "
-    reason += f"the clock, {scale}"
+    what, ratio, of = "motion", 1.0 + clock, "which the loops make of the commanded speed"
+    cause = f"the clock, {scale}"
     if abs(off) > RATE_TOLERANCE:
-        reason = (
-            f"the recorded position is {1.0 + off:.4g} times that which the loops follow the command with"
-        )
-        reason += f": {scale}"
+        what, ratio, of = "recorded position", 1.0 + off, "which the loops follow the command with"
+        cause = scale
     elif followed.stage == "position":
-        reason = f"the following error is {1.0 + clock:.4g} times that of the design's loops at this motion: "
-        reason += f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+        what, of = "following error", "of the design's loops at this motion"
+        cause = f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
+    reason = f"the {what} is {ratio:.4g} times that {of}: {cause}"
     return share_item(id, label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)

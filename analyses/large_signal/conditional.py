@@ -13,40 +13,36 @@ it and goes on integrating.
 
 from dataclasses import dataclass
 from itertools import pairwise
-from math import asin, inf, isfinite, pi, sqrt
+from math import asin, ceil, isfinite, pi, sqrt
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import brentq
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.steady import torque_gain_Nm_rad
 from actuator_lti.drive.wiring import wire
-from actuator_lti.errors import TooManyTicks
 from actuator_lti.loops import ExactMargins, Loops, exact_margins, periodic_loop
 from actuator_lti.loops.periodic import PeriodicLoop
 from actuator_lti.types import Floats
-from analyses.large_signal.tones import full_range
-from analyses.motion.settling import accepted_rad
+from analyses.motion.settling import accepted_rad, settle, step_rows
 from nonlinear import LIMITERS, Rows
-from nonlinear.bench.operating_motion import lasting_torque_Nm, quiet
+from nonlinear.bench.operating_motion import quiet
+from nonlinear.settling.rest import MOST_WORK, Rest, judge
 
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
+ENDINGS: dict[str, Ending] = {
+    "diverging": "diverges",
+    "limit cycle": "keeps oscillating",
+    "still moving": "keeps oscillating",
+    "at rest": "is held by a limit",
+}
 SMALLEST_PART, LARGEST_PART = 0.01, 1.0  # of full deflection
 LEAST_PART = 1e-6  # of full deflection, where the smallest part does not settle
 STEPS = 16
 CLOSE = 1e-3
-CONVERGED = 0.05  # error left, relative to the step
-LASTING = 0.9  # error of the last window over that of the one before
-RESTING = 1e-3  # of the step: the output moves by less in the last window
-HELD = 0.5  # of the last window: a limit that acts longer holds the drive
-GROWS = 1.2  # from window to window
+ABOUT = 2.0  # times the swing without limits: what is no larger is not theirs
+LASTING = 0.9  # of the error before: what falls by more dies out
 OWN = tuple(name for name in LIMITERS if name != "profile")  # limits of the drive, not of its command
-AGAIN = (1, 4, 16)  # times the wait
-WINDOWS = 20.0  # time constants of the loop that are waited for, beside the travel
-SETTLED = 14.0  # time constants in the settling ticks
-LONGEST_TICKS = 40_000_000  # of a run
 LOW_GAIN = 0.02  # lower gain margins below this are out of reach of any limit
 
 
@@ -75,7 +71,7 @@ class Conditional:
     # Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
     # where not even the smallest tried does
     threshold_rad: float | None
-    next_rad: float | None  # smallest step tried that does not; it has been watched for four times as long
+    next_rad: float | None  # smallest step tried that does not
     full_deflection_rad: float
     # Frequency, and amplitude of the output error, while the step at the threshold hovers there
     oscillation_hz: float | None
@@ -108,10 +104,10 @@ def saturation_ratio(gain: float) -> float:
     return 1.0 if gain >= 1.0 else float(brentq(lambda a: saturation_gain(a) - gain, 1.0, 4.0 / gain))
 
 
-def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Conditional:
+def conditional_stability(design: Design, loops: Loops) -> Conditional:
     """Look for conditional stability: by margins, by describing functions, and by steps in time.
 
-    ``loops`` are sampled and sliding; in ``settle_ticks`` the linear drive settles.
+    ``loops`` are sampled and sliding.
     """
     margins = {point: exact_margins(loops, point) for point in wire(design).points if point != "output"}
     predictions = [
@@ -120,8 +116,8 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
         if isfinite(limit) and margins[point].stable and margins[point].gain_lower > LOW_GAIN
     ]
     design = quiet(design)
-    threshold, following = step_threshold(design, settle_ticks)
-    hertz, amplitude = _hovering(design, threshold, settle_ticks) if threshold else (None, None)
+    threshold, following = step_threshold(design)
+    hertz, amplitude = _hovering(design, threshold) if threshold else (None, None)
     return Conditional(
         margins=margins,
         predictions=tuple(one for one in predictions if one is not None),
@@ -130,7 +126,7 @@ def conditional_stability(design: Design, loops: Loops, settle_ticks: int) -> Co
         full_deflection_rad=design.validation.full_deflection_rad,
         oscillation_hz=hertz,
         oscillation_rad=amplitude,
-        **({} if following is None else _end(design, following, settle_ticks)),
+        **({} if following is None else _end(design, following)),
     )
 
 
@@ -193,125 +189,89 @@ def _to_output(design: Design, point: str, omega: float) -> float:
     return abs(kM / (s * whole)) / N
 
 
-def step_threshold(design: Design, settle_ticks: int) -> tuple[float | None, float | None]:
-    """Largest step (rad, output) that settles and smallest tried that does not, up to full deflection.
+def step_threshold(design: Design) -> tuple[float | None, float | None]:
+    """Largest step (rad, output) that settles, and smallest tried that does not, up to full deflection.
 
-    A step that does not settle is run again for longer before it is believed; where it settles then, all are
-    given that time.
+    Steps of growing size are asked up to the first that does not settle, then those between it and the one
+    before. The first is 0 where not even the smallest tried settles; both ``None`` where all do.
     """
-    for longer in AGAIN:
-        low, high = _bisected(design, settle_ticks, longer)
-        if high is None:
-            break
-        if not settles(design, np.array([high]), settle_ticks, AGAIN[1] * longer)[0]:
-            return low, high
-    return None, None
-
-
-def _bisected(design: Design, settle_ticks: int, longer: int) -> tuple[float | None, float | None]:
-    """The threshold with one time to settle; 0 where not even the smallest step tried settles."""
     full = design.validation.full_deflection_rad
-    sizes = full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS)
-    low, high, least = 0.0, None, SMALLEST_PART
-    while True:
-        bad = np.flatnonzero(~settles(design, sizes, settle_ticks, longer))
-        if not bad.size:
-            if high is None:
-                return None, None
-            low = float(sizes[-1])
-        else:
-            k = int(bad[0])
-            low, high = (float(sizes[k - 1]) if k else low), float(sizes[k])
-        if low == 0.0 and least > LEAST_PART:
-            sizes, least = full * np.geomspace(LEAST_PART, SMALLEST_PART, STEPS), LEAST_PART
-            continue
-        if low == 0.0 or high - low < CLOSE * high:
-            return low, high
-        sizes = np.geomspace(low, high, STEPS + 2)[1:-1]
+    low, high = _first_unsettled(design, full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS))
+    if low == 0.0:
+        low, high = _first_unsettled(design, full * np.geomspace(LEAST_PART, SMALLEST_PART, STEPS), high)
+    while high is not None and low > 0.0 and high - low > CLOSE * high:
+        low, high = _first_unsettled(design, np.geomspace(low, high, STEPS)[:-1], high)
+    return (None, None) if high is None else (low, high)
 
 
-def settles(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> npt.NDArray[np.bool_]:
-    """Which steps from rest settle: the error left is small, or still falls, or the drive has come to rest.
+def _first_unsettled(
+    design: Design, sizes_rad: Floats, beyond: float | None = None
+) -> tuple[float, float | None]:
+    """The size before the first that does not settle (0: none), and that one, else ``beyond``."""
+    low = 0.0
+    for size in sizes_rad.tolist():
+        if not settles(design, size):
+            return low, size
+        low = size
+    return low, beyond
 
-    Small is a share of the step, what friction holds up, and the swing that a requirement accepts.
 
-    An error larger than the step itself does not count as falling: an irregular swing against a limit has a
-    smaller window now and then.
+def settles(design: Design, size_rad: float) -> bool:
+    """Whether no limit keeps a step from rest from coming to rest (`nonlinear.settling.rest`).
 
-    A controller without an integral comes to rest beside its target where the load has a slope; a drive that
-    stands because a limit holds it has not settled.  What goes on moving without growing while no limit acts
-    is kept going by something else (`nonlinear.settling.rest`).  A swing against a limit dies out by a
-    constant amount
-    a period, not by a share of itself: only windows of many periods (``longer``) tell it from one that stays.
-
-    Raises `TooManyTicks`: where one run would take more than `LONGEST_TICKS`.
+    What stands because a limit holds it has not settled.  What moves on while no limit acts, or about as much
+    without any limit, is kept going by something else (dry friction, counts); a swing that a requirement
+    accepts is accepted here.
     """
-    rows = step_rows(design, sizes_rad, settle_ticks, longer)
-    if rows["ticks"].max() > LONGEST_TICKS:
-        raise TooManyTicks(f"a step of {int(rows['ticks'].max())} ticks: at most {LONGEST_TICKS} are run")
-    result = rows.run()
-    spans = [result.span("output_angle_rad", last) for last in (0, 1)]
-    errors = [np.abs(np.array(span) - sizes_rad).max(axis=0) for span in spans]
-    near = errors[0] <= np.maximum(CONVERGED * sizes_rad, _standing(design) + accepted_rad(design))
-    rests = np.ptp(spans[0], axis=0) <= RESTING * sizes_rad
-    limited = np.max([result.window_limit_fraction(name) for name in OWN], axis=0)
-    held = rests & (limited > HELD)
-    alone = (limited == 0.0) & (errors[0] < GROWS * errors[1])
-    falls = (errors[0] < LASTING * errors[1]) & (errors[0] < sizes_rad)
-    return np.asarray(result.ok & ~held & (near | rests | alone | falls))
+    rest = settle(design, 0.0, size_rad).rest
+    if not _limits_of(rest) or (rest.verdict == "limit cycle" and rest.amplitude <= accepted_rad(design)):
+        return True
+    if rest.verdict == "still moving" and _dies_out(design, size_rad, rest):
+        return True
+    without = judge(step_rows(design, 0.0, size_rad, limits_on=False).running())
+    assert without is not None  # a step that stays
+    return not without.comes_to_rest and rest.amplitude <= ABOUT * without.amplitude
 
 
-def _standing(design: Design) -> float:
-    """Error (output, rad) that dry friction can hold up against a controller without integral."""
-    velocity, friction, behind = design.controller.velocity, design.friction, design.load.friction
-    gain = abs(float(torque_gain_Nm_rad(design)))
-    if gain == 0.0:
-        return inf
-    if velocity is not None and velocity.integral_time_s is not None:
-        gain *= 10.0  # the integral brings it on in time
-    dry = friction.dry_Nm(0.0) * friction.breakaway_ratio + abs(friction.offset_torque_Nm)
-    dry += max((point.torque_Nm for point in friction.points), default=0.0)
-    dry += 0.0 if behind is None else behind.dry_torque_Nm / design.ratio_to_coupling
-    play = 0.0 if design.coupling is None else design.coupling.play_rad / design.ratio_behind_coupling
-    return 2.0 * dry / gain + play
+def _dies_out(design: Design, size_rad: float, rest: Rest) -> bool:
+    """Whether a motion that was followed in vain falls over four times that time.
+
+    A swing against a limit dies out by a constant amount a period, not by a share of itself.
+    """
+    run = _halves(design, size_rad, 4.0 * rest.after_s).run()
+    late, early = (np.abs(np.array(run.span("output_angle_rad", k)) - size_rad).max() for k in (0, 1))
+    return bool(run.ok[0] and late < LASTING * early)
 
 
-def step_rows(design: Design, sizes_rad: Floats, settle_ticks: int, longer: int = 1) -> Rows:
-    """Runs of steps from rest, long enough to travel and to settle, with windows ``longer`` times as long."""
-    rows = Rows.of(design, sizes_rad.size)
-    way, tick_s = sizes_rad * design.total_ratio, design.controller.period_s
-    asked, ratio = design.command, design.total_ratio  # a profile may be slower than the drive
-    speed = min(full_range(design)["velocity"], asked.rate_rad_s * ratio)
-    speeding = min(lasting_torque_Nm(design) / design.inertia_kgm2, asked.acceleration_rad_s2 * ratio)
-    travel = way / (speed * tick_s)
-    swing = 4.0 * (np.sqrt(2.0 * way / speeding) + np.cbrt(way / (asked.jerk_rad_s3 * ratio))) / tick_s
-    window = np.ceil(longer * np.maximum(0.25 * WINDOWS * max(settle_ticks / SETTLED, 1.0), swing))
-    rows["ticks"] = np.ceil(2.0 * travel) + 4 * window
-    rows.window(window, 1, 0)
-    rows.step("command", sizes_rad)
+def _limits_of(rest: Rest) -> list[str]:
+    """The drive's own limits that act in what a motion ends in."""
+    return [name for name in rest.limited if name in OWN]
+
+
+def _end(design: Design, size_rad: float) -> dict[str, Any]:
+    """What the smallest step that does not settle ends in, and which limit acts then for how much of it."""
+    rest = settle(design, 0.0, size_rad).rest
+    run = _halves(design, size_rad, rest.after_s).run()
+    used = run.window_limit_fraction if run.ok[0] else run.limit_fraction  # it may not get so far
+    shares = {name: float(used(name)[0]) for name in _limits_of(rest)}
+    limiter = max(shares, key=lambda name: shares[name])
+    ending = ENDINGS[rest.verdict]
+    share = shares[limiter]
+    return {"limiter": limiter, "limiter_share": share, "ending": ending, "end_rad": rest.amplitude}
+
+
+def _halves(design: Design, size_rad: float, duration_s: float) -> Rows:
+    """The run of a step, its halves windows."""
+    rows = step_rows(design, 0.0, size_rad)
+    half = min(ceil(0.5 * duration_s / design.controller.period_s), 4 * MOST_WORK)
+    rows["ticks"] = 2 * half
+    rows.window(half, 1, 0)
     return rows
 
 
-def _end(design: Design, size_rad: float, settle_ticks: int) -> dict[str, Any]:
-    """Watch the smallest step that does not settle for longer: what it ends in, and which limit acts then."""
-    result = step_rows(design, np.array([size_rad]), settle_ticks, AGAIN[1]).run()
-    spans = [float(np.ptp(result.span("output_angle_rad", last))) for last in (0, 1)]
-    used = result.window_limit_fraction if result.ok[0] else result.limit_fraction  # it may not get so far
-    shares = {name: float(used(name)[0]) for name in OWN}
-    limiter = max(shares, key=lambda name: shares[name])
-    ending: Ending = "keeps oscillating"
-    if not result.ok[0] or spans[0] > GROWS * spans[1]:
-        ending = "diverges"
-    elif spans[0] <= RESTING * size_rad:
-        ending = "is held by a limit"
-    share = shares[limiter]
-    named = limiter if share > 0.0 else ""
-    return {"limiter": named, "limiter_share": share, "ending": ending, "end_rad": 0.5 * spans[0]}
-
-
-def _hovering(design: Design, size_rad: float, settle_ticks: int) -> tuple[float | None, float | None]:
+def _hovering(design: Design, size_rad: float) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    run = step_rows(design, np.array([size_rad]), settle_ticks).trajectory()
+    run = _halves(design, size_rad, settle(design, 0.0, size_rad).rest.after_s).trajectory()
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.errors import whole_number
@@ -106,7 +105,7 @@ class AmplitudeMap:
 
 
 def amplitude_map(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     loops: Loops,
     *,
     load_Nm: float = 0.0,

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, log
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Command, Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
@@ -158,25 +157,14 @@ class LargeSignals:
 
 
 def large_signals(
-    design: Design | str | PathLike[str],
-    loops: Loops | None = None,
-    *,
-    counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
+    design: AnyDesign, loops: Loops | None = None, *, counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES)
 ) -> LargeSignals:
     """Look at large signals from every side (model.md section 5).
 
-    Parameters
-    ----------
-    design : Design, or its name or path
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
-    counts : (int, int)
-        Amplitudes and frequencies of the map, at least 2 of each.
+    ``loops``: sampled and sliding, of this design, if they are there already.
+    ``counts``: amplitudes and frequencies of the map, at least 2 of each.
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops

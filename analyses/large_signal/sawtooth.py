@@ -2,11 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from analyses.large_signal.classify import FULL_TRIANGLE, RateLimited, rate_limited
 from analyses.large_signal.tones import Tone, tone
@@ -94,19 +93,12 @@ class Sawtooth:
 
 
 def sawtooth(
-    design: Design | str | PathLike[str],
-    *,
-    amplitude_rad: float | None = None,
-    frequency_hz: float | None = None,
+    design: AnyDesign, *, amplitude_rad: float | None = None, frequency_hz: float | None = None
 ) -> Sawtooth:
     """Simulate a sine of which the output can only follow the flanks, at each load torque of the design.
 
-    Parameters
-    ----------
-    amplitude_rad : float, optional
-        Default: full deflection.
-    frequency_hz : float, optional
-        Default: where x = w A/R is three, well inside the range of whole triangles (x >= 1.862).
+    By default of full deflection, where x = w A/R is three, well inside the range of whole triangles
+    (x >= 1.862).
     """
     design = as_design(design)
     amplitude = design.validation.full_deflection_rad if amplitude_rad is None else amplitude_rad

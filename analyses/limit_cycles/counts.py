@@ -19,19 +19,12 @@ import numpy as np
 from actuator_lti.design.model import Design, Sensor
 from actuator_lti.loops import Loops
 from actuator_lti.types import Floats
-from analyses.large_signal.conditional import step_rows
-from analyses.large_signal.tones import LONGEST_TICKS, TIME_CONSTANTS, full_range, tone
-from analyses.limit_cycles.describing import (
-    SENSORS,
-    Cause,
-    counts_matter,
-    cycles_of_quantisation,
-    quantum_of,
-    without_nonlinearities,
-)
+from analyses.large_signal.tones import TIME_CONSTANTS, full_range, tone
+from analyses.limit_cycles import describing
 from analyses.limit_cycles.run import Confirmation, confirm
 from analyses.linear.loop_figures import loop_figures
 from analyses.linear.responses import response_at
+from analyses.motion.settling import settle
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import without_counts
 
@@ -90,13 +83,13 @@ def linear_ratio() -> float:
 
 def counts_of(design: Design, loops: Loops, settle_ticks: int) -> tuple[Counts, ...]:
     """Look at every encoder whose counts a loop sees, of a position drive that settles in so many ticks."""
-    causes = (cause for cause in reversed(SENSORS) if counts_matter(design, cause))
+    causes = (cause for cause in reversed(describing.SENSORS) if describing.counts_matter(design, cause))
     return tuple(_one(design, loops, cause, settle_ticks) for cause in causes)
 
 
-def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Counts:
-    sensor, other = SENSORS[cause]
-    quantum, velocity = quantum_of(design, cause) or 0.0, design.controller.velocity
+def _one(design: Design, loops: Loops, cause: describing.Cause, settle_ticks: int) -> Counts:
+    sensor, other = describing.SENSORS[cause]
+    quantum, velocity = describing.quantum_of(design, cause) or 0.0, design.controller.velocity
     to_motor = design.total_ratio if sensor == "output" else 1.0
     to_output = design.total_ratio if sensor == "motor" else 1.0
     alone, ideal = without_counts(design, other), without_counts(design)
@@ -113,7 +106,7 @@ def _one(design: Design, loops: Loops, cause: Cause, settle_ticks: int) -> Count
         speed_step_rad_s=quantum * to_motor / _span_s(design) if made_of else None,  # q/(m T)
         ripple_rad_s=ripple,
         ripple_at_rad_s=at,
-        cycles=tuple(confirm(design, one) for one in cycles_of_quantisation(design, (cause,))),
+        cycles=tuple(confirm(design, one) for one in describing.cycles_of_quantisation(design, (cause,))),
         linear_rad=linear,
         linear_seen_rad=float(TRIED[good][0]) * linear_ratio() * quantum if good.any() else None,
         off=off,
@@ -148,11 +141,9 @@ def _ripple(design: Design, ideal: Design, count_rad: float, settle_ticks: int) 
 
 def _standing(design: Design, ideal: Design) -> float:
     """Error that counts leave after a step."""
-    size, ends = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad, []
-    for one in (design, ideal):
-        low, high = step_rows(one, np.array([size]), LONGEST_TICKS // 4).run().span("output_angle_rad")
-        ends.append(abs(0.5 * (float(low[0]) + float(high[0])) - size))
-    return abs(ends[0] - ends[1])
+    size = min(design.validation.amplitude_fractions) * design.validation.full_deflection_rad
+    counted, smooth = (abs(settle(one, 0.0, size).rest.error) for one in (design, ideal))
+    return abs(counted - smooth)
 
 
 def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, settle_ticks: int) -> Floats:
@@ -164,7 +155,7 @@ def _linearity(design: Design, ideal: Design, loops: Loops, output_rad: float, s
     gain = abs(complex(response_at(loops.plain_response, np.array([sine.omega_rad_s]))[0]))
     seen, there = [], np.ones(TRIED.size, dtype=bool)
     for one in (design, ideal):  # nothing else that is not linear: no play, no friction
-        rows = Rows.of(without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
+        rows = Rows.of(describing.without_nonlinearities(one), TRIED.size, friction_on=False, limits_on=False)
         rows.sine("command", output_rad / gain * TRIED, sine.frequency_hz)
         rows["ticks"] = np.ceil(settle_ticks * log(SETTLED) / TIME_CONSTANTS) + sine.ticks
         rows.window(sine.ticks, sine.cycles)

@@ -17,7 +17,7 @@ border: ``A = 2 q/(pi g)``, stable.
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import reduce
+from functools import partial, reduce
 from itertools import pairwise
 from math import exp, log, nan, pi
 from typing import Literal
@@ -80,11 +80,9 @@ def cycles_of_play(design: Design, *, friction: bool) -> tuple[Cycle, ...]:
         return ()
     half = 0.5 * coupling.play_rad
     grid = np.log(np.geomspace(LEAST * half, MOST * half, POINTS))
+    own = partial(_cycle, "play", design, friction=friction)
     found = kept_up(lambda log_A, near: _at_twist(design, exp(log_A), friction, near), grid)
-    return tuple(
-        _cycle("play", design, there, exp(log_A), there.shape["twist"], friction=friction, stable=stable)
-        for log_A, there, stable in found
-    )
+    return tuple(own(there, exp(log_A), there.shape["twist"], stable=s) for log_A, there, s in found)
 
 
 def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -> tuple[Cycle, ...]:
@@ -95,11 +93,9 @@ def cycles_of_friction(design: Design, load_Nm: float, top_speed_rad_s: float) -
         return mode_at(design, at)
 
     grid = log(top_speed_rad_s) - np.linspace(DECADES, 0.0, SPEEDS) * log(10.0)
-    found = (
-        _cycle("friction", design, there, exp(log_speed), there.shape["w"], friction=True, stable=stable)
-        for log_speed, there, stable in kept_up(mode, grid)
-    )
-    return tuple(replace(cycle, load_Nm=load_Nm) for cycle in found)
+    own, found = partial(_cycle, "friction", design, friction=True), kept_up(mode, grid)
+    cycles = (own(there, exp(speed), there.shape["w"], stable=stable) for speed, there, stable in found)
+    return tuple(replace(cycle, load_Nm=load_Nm) for cycle in cycles)
 
 
 def _cycle(
@@ -190,7 +186,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
     coupling, behind = design.coupling, design.load.friction or LoadFriction()
     assert coupling is not None
     half, (_, _, k), n = 0.5 * coupling.play_rad, coupling.pieces[0], dead_zone(0.5 * coupling.play_rad / A)
-    stiffness = n * k
+    stiffness, damping = n * k, n * coupling.damping_Nms_rad
     for _, twist, beyond in coupling.pieces[1:]:  # each bend is a dead zone of its own
         stiffness, k = stiffness + (beyond - k) * dead_zone((half + twist) / A), beyond
     own = replace(design.friction, load_coefficient=0.0)
@@ -199,9 +195,7 @@ def _equivalent(design: Design, A: float, W: float, W_l: float, friction: bool) 
         at = Operating(point="describing-function", speed_amplitude_rad_s=W)
         slope = slope_at(replace(design, friction=own), at)
         load_slope += described_dry(behind.dry_torque_Nm, W_l)
-    spring = Coupling(
-        stiffness_Nm_rad=stiffness, damping_Nms_rad=n * coupling.damping_Nms_rad, after=coupling.after
-    )
+    spring = Coupling(stiffness_Nm_rad=stiffness, damping_Nms_rad=damping, after=coupling.after)
     load = replace(design.load, friction=LoadFriction(viscous_Nms_rad=load_slope))
     return replace(design, coupling=spring, friction=Friction(viscous_Nms_rad=slope), load=load)
 

@@ -9,14 +9,7 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from analyses.large_signal.tones import ELASTIC, PLACES
-from analyses.limit_cycles.describing import (
-    SENSORS,
-    Cycle,
-    counts_matter,
-    cycles_of_play,
-    cycles_of_quantisation,
-    without_nonlinearities,
-)
+from analyses.limit_cycles import describing
 from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import without_counts
@@ -30,7 +23,7 @@ _STARTS = {**PLACES, **ELASTIC}
 class Confirmation:
     """A predicted cycle against the simulator, started in its shape at several sizes."""
 
-    cycle: Cycle
+    cycle: describing.Cycle
     # Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an unstable
     # one the size from which it grows; ``None``: refuted
     ratio: float | None
@@ -70,10 +63,7 @@ def limit_cycles(design: Design) -> LimitCycles:
     Cycles of play are predicted without dry friction and with it; those of dry friction alone are
     `analyses.friction_effects`.
 
-    Raises
-    ------
-    InputError
-        For a drive without a position loop.
+    Raises `InputError`: for a drive without a position loop.
 
     Examples
     --------
@@ -84,14 +74,15 @@ def limit_cycles(design: Design) -> LimitCycles:
     if design.controller.position is None:
         raise InputError("cycles: needs a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0
-    predicted = [*cycles_of_play(design, friction=False), *cycles_of_play(design, friction=True)]
-    predicted += cycles_of_quantisation(design)
-    looked_for = (*["play"] * has_play, *(cause for cause in SENSORS if counts_matter(design, cause)))
+    predicted = [one for rubs in (False, True) for one in describing.cycles_of_play(design, friction=rubs)]
+    predicted += describing.cycles_of_quantisation(design)
+    sensors = [cause for cause in describing.SENSORS if describing.counts_matter(design, cause)]
+    looked_for = (*["play"] * has_play, *sensors)
     confirmed = tuple(confirm(design, cycle) for cycle in predicted)
     return LimitCycles(design, confirmed, settlings_of(design), looked_for)
 
 
-def confirm(design: Design, cycle: Cycle) -> Confirmation:
+def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     """Start in the cycle's shape at many sizes; find where motion turns from growing to dying out, or back.
 
     Of several such sizes the one nearest to the predicted counts.
@@ -128,17 +119,17 @@ def confirm(design: Design, cycle: Cycle) -> Confirmation:
     return Confirmation(cycle, float(ratios[nearest]), hertz)
 
 
-def _tried(design: Design, cycle: Cycle) -> Design:
+def _tried(design: Design, cycle: describing.Cycle) -> Design:
     """The drive with the one nonlinearity that the cycle is of, and friction where it is in it."""
-    if cycle.cause in SENSORS:
-        return without_nonlinearities(without_counts(design, SENSORS[cycle.cause][1]))
+    if cycle.cause in describing.SENSORS:
+        return describing.without_nonlinearities(without_counts(design, describing.SENSORS[cycle.cause][1]))
     ideal = without_counts(design)
     if cycle.cause == "friction":
         return ideal
     return replace(ideal, friction=replace(design.friction, load_coefficient=0.0))
 
 
-def _speed_command(design: Design, cycle: Cycle) -> float:
+def _speed_command(design: Design, cycle: describing.Cycle) -> float:
     """The speed command before the start, where the drive holds one."""
     if design.controller.velocity is None:
         return 0.0

@@ -48,11 +48,9 @@ def check_code(design: Design) -> CodeCheck:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.so"
         try:
-            flags = ("-shared", "-fPIC")
-            texts = {"run.c": LIBRARY.text()}
-            path.write_bytes(
-                compiler.compile_files(texts, path.name, "this machine", flags, command=[command])
-            )
+            texts, flags = {"run.c": LIBRARY.text()}, ("-shared", "-fPIC")
+            made = compiler.compile_files(texts, path.name, "this machine", flags, command=[command])
+            path.write_bytes(made)
             with LIBRARY.borrowed(path):
                 validation = validate(design, CHECKS)
         except (InputError, NumericalError) as error:

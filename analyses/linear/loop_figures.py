@@ -22,6 +22,7 @@ from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loop, Loops
 from actuator_lti.loops.assemble import loops_at
+from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.step import StepFigures, step_figures
 from actuator_lti.systems.as_control import as_control
@@ -150,8 +151,6 @@ def _answering(
     figures: LoopFigures, response: Any, mean: CommandMean | None, *, bandwidth: bool = True, step: bool
 ) -> LoopFigures:
     """The same with bandwidth and step of a response, behind the mean of the command where there is one."""
-    from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
-
     notes: list[str] = []
 
     def band() -> Bandwidth:

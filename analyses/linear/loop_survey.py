@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
 from actuator_lti.drive.operating import Operating, OperatingPoint, slope_at
@@ -20,9 +19,11 @@ from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.delay_budget import DelayBudget, delay_budget
 from actuator_lti.loops.limiters import Onset, onset
 from actuator_lti.loops.result import Form
+from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.isolation import attempt
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
+from analyses.specification.capability import drive_figures
 
 if TYPE_CHECKING:
     import pandas
@@ -95,8 +96,6 @@ class LoopSurvey:
 
     def to_pandas(self) -> pandas.DataFrame:
         """A data frame with one row for each form and loop: margins, bandwidth, peaks (pandas needed)."""
-        from actuator_lti.start.extras import need
-
         names = ("stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s", "modulus_margin")
         rows = [
             {
@@ -114,22 +113,13 @@ class LoopSurvey:
         return frame
 
 
-def survey_loops(design: Design | str | PathLike[str], progress: Progress | None = None) -> LoopSurvey:
+def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
-    All margins are certified, see `stability_margins`.
+    All margins are certified, see `stability_margins`. ``progress`` gets (steps done, steps in all).
 
-    Parameters
-    ----------
-    design : Design
-    progress : callable, optional
-        Called with (steps done, steps in all).
-
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `loop_figures`; inside `analyses.isolation.isolated` only of the sampled
-        loops: what else fails is left out and noted.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `loop_figures`; inside
+    `analyses.isolation.isolated` only of the sampled loops: what else fails is left out and noted.
     """
 
     def step(done: int) -> None:
@@ -138,10 +128,8 @@ def survey_loops(design: Design | str | PathLike[str], progress: Progress | None
 
     design = as_design(design)
     loops = assemble_loops(design)
-    refused: list[str] = []
-    forms: dict[str, Mapping[str, LoopFigures]] = {
-        "sampled": all_loop_figures(loops, certify=True, locked=True)
-    }
+    refused, sampled = list[str](), all_loop_figures(loops, certify=True, locked=True)
+    forms: dict[str, Mapping[str, LoopFigures]] = {"sampled": sampled}
     for form in () if design.controller.sampled_only else FORMS[1:]:
         other = attempt(f"{form} form", partial(_other_form, design, form, refused), None)
         forms |= {} if other is None else {form: other}
@@ -150,13 +138,12 @@ def survey_loops(design: Design | str | PathLike[str], progress: Progress | None
     step(3)
     points = attempt("loops at the operating points", lambda: operating_points(design, refused), ())
     step(4)
-    budgets = attempt("delay budgets", lambda: _budgets(design, forms["sampled"]), {})
+    budgets = attempt("delay budgets", lambda: _budgets(design, sampled), {})
     step(5)
-    border = attempt("limit of linear validity", lambda: _onset(loops, forms["sampled"]), None)
+    border = attempt("limit of linear validity", lambda: _onset(loops, sampled), None)
     step(6)
-    return LoopSurvey(
-        design, loops, forms, break_points, points, budgets, border, tuple(dict.fromkeys(refused))
-    )
+    why = tuple(dict.fromkeys(refused))
+    return LoopSurvey(design, loops, forms, break_points, points, budgets, border, why)
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
@@ -190,8 +177,6 @@ def operating_points(
     ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
     small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    from analyses.specification.capability import drive_figures
-
     linear = design.axis == "linear"
 
     def point(
@@ -204,10 +189,8 @@ def operating_points(
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
-        points += [
-            point("load driven by the motor", None, "driving"),
-            point("motor driven by the load", None, "driven"),
-        ]
+        points.append(point("load driven by the motor", None, "driving"))
+        points.append(point("motor driven by the load", None, "driven"))
     if design.coupling is not None and design.coupling.play_rad:
         points.append(point("in the gap of the play", None, "gap"))
     top = drive_figures(design).output_rate_rad_s * design.total_ratio

@@ -127,9 +127,8 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
 
     Gives the frequencies, rad/s, and the values.
     """
-    omega, values = refined(
-        partial(response_at, system), omega_rad_s, partial(apart_about_minus_one, frame=frame)
-    )
+    apart = partial(apart_about_minus_one, frame=frame)
+    omega, values = refined(partial(response_at, system), omega_rad_s, apart)
     shown = np.where(np.abs(values + 1.0) < 2.5 * frame, values, np.nan + 0j)
     kept = [0]  # points that a figure needs: one outside the frame as a gap, none too near to be told apart
     for k, value in enumerate(shown[1:], 1):
@@ -141,7 +140,5 @@ def nyquist_curve(system: Any, omega_rad_s: np.ndarray, frame: float) -> tuple[n
 
 def nichols_curve(system: Any, omega_rad_s: np.ndarray, span_db: float) -> Curve:
     """Sample L(jw) closely enough for a Nichols chart that goes so far up and down."""
-    return curve(
-        system,
-        refined(partial(response_at, system), omega_rad_s, partial(apart_in_decibels, span_db=span_db))[0],
-    )
+    apart = partial(apart_in_decibels, span_db=span_db)
+    return curve(system, refined(partial(response_at, system), omega_rad_s, apart)[0])

@@ -51,10 +51,8 @@ class Measured:
 
     def __repr__(self) -> str:
         f, off = self.frequency_hz, np.abs(self.difference_db).max()
-        return (
-            f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
-            f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
-        )
+        said = f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
+        return said + f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
 
     @property
     def nearer(self) -> tuple[str, float] | None:
@@ -110,9 +108,8 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
     if np.count_nonzero(below) < 2:
-        raise InputError(
-            f"{read.name}: no two frequencies below half that of the sampling of the {name} loop"
-        )
+        told = f"no two frequencies below half that of the sampling of the {name} loop"
+        raise InputError(f"{read.name}: {told}")
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
     found = _with_spread(omega, values, read.deviation[below], loop.period_s)
@@ -188,16 +185,13 @@ class Margins:
 def margins(design: Design, asked: Asked | None = None) -> Margins:
     """Find the certified margins of every loop and judge the requirements.
 
+    Raises `InputError`, `NumericalError`: where loops cannot be assembled as asked, or margins not be found.
+
     Examples
     --------
     >>> from actuator_lti import load_design
     >>> str(margins(load_design("emps")).verdict)
     'met'
-
-    Raises
-    ------
-    InputError, NumericalError
-        Where the loops cannot be assembled as asked, or the margins of one not be found.
     """
     asked = asked or Asked()
     loops = assemble_loops(

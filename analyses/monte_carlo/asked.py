@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +11,7 @@ from analyses.request import LOAD, POINT, OnMachines, Option
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
+    from actuator_lti.types import Progress
     from analyses.monte_carlo.result import MonteCarloResult
 
 
@@ -40,7 +40,7 @@ class Asked(OnMachines):
         float | None,
         Option(
             "Probability that is enough, if its one-sided 95 % lower bound shows it; else every sample must "
-            "pass, and the worst case (with --no-worst: at least 59 samples, which show 95 %).",
+            "pass, and the worst case (with --no-worst: at least 59 samples, which show 95 %)."
         ),
     ] = None
     worst: Annotated[bool, Option("Seek the worst case of each requirement.", flag="worst/--no-worst")] = True
@@ -51,9 +51,7 @@ class Asked(OnMachines):
             raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
 
 
-def study(
-    design: Design, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
-) -> MonteCarloResult | Design:
+def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None) -> MonteCarloResult | Design:
     """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
 
     Raises `InputError`: if nothing has a tolerance, or what is asked is no study.

@@ -307,8 +307,7 @@ class MonteCarloResult:
 
     def __str__(self) -> str:
         lines = [f"{self.design_name}: {self.samples} samples, seed {self.seed}"]
-        lines += [
-            f"{o.id}: {100 * o.probability:.2f} % (at least {100 * o.low:.2f}, at most {100 * o.high:.2f})"
-            for o in self.odds
-        ]
+        for o in self.odds:
+            shares = f"at least {100 * o.low:.2f}, at most {100 * o.high:.2f}"
+            lines.append(f"{o.id}: {100 * o.probability:.2f} % ({shares})")
         return "\n".join(lines)

@@ -7,7 +7,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from operator import itemgetter
-from os import PathLike
 from pathlib import Path
 from typing import Any
 
@@ -15,28 +14,19 @@ import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
+from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.finite import finite
-from analyses.monte_carlo import judging
+from analyses.monte_carlo import judging, result
 from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
-from analyses.monte_carlo.result import (
-    MOST,
-    Driver,
-    MonteCarloResult,
-    Odds,
-    WorstCase,
-    clopper_pearson,
-    column_statistics,
-)
 from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug
@@ -87,13 +77,13 @@ def _task(design: Design, settings: MonteCarloSettings) -> SampleTask:
 
 
 def monte_carlo(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     folder: str | Path,
     settings: MonteCarloSettings | None = None,
     *,
     engine: Engine | None = None,
-    progress: Progress | None = None,
-) -> MonteCarloResult:
+    progress: Progress = None,
+) -> result.MonteCarloResult:
     """Sample the tolerances of a design and judge its requirements.
 
     Up to `KEPT` samples, every one goes to ``folder`` as Parquet. Of more, only what they come to leaves the
@@ -101,19 +91,10 @@ def monte_carlo(
     the folder before (same design, seed, settings and code) goes on, with more samples if asked for, where
     they are kept. The numbers do not depend on engine, workers or chunks.
 
-    Parameters
-    ----------
-    design : Design
-        With tolerances on some values.
-    engine : Engine, optional
-        Where to compute; by default threads of this process.
-    progress : callable, optional
-        Called with (samples done, samples to do).
+    ``engine``: where to compute; by default threads of this process.
+    ``progress``: called with (samples done, samples to do).
 
-    Raises
-    ------
-    InputError
-        If nothing has a tolerance, or the folder holds another study.
+    Raises `InputError`: if nothing has a tolerance, or the folder holds another study.
     """
     need("pyarrow", "tables", "a Monte Carlo study")
     design, settings = as_design(design), settings or MonteCarloSettings()
@@ -141,16 +122,17 @@ def monte_carlo(
     ]  # fmt: skip
     if tallies:
         odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
-    return MonteCarloResult(
+    units = task.units
+    return result.MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
-        {name: column_statistics(name, unit, whole.columns[name]) for name, unit in task.units.items()},
+        {name: result.column_statistics(name, unit, whole.columns[name]) for name, unit in units.items()},
         tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
         Path(folder), {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
         notes=_notes(task, settings.samples), drivers=_drivers(task, odds),
     )  # fmt: skip
 
 
-def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
+def _drivers(task: SampleTask, odds: Sequence[result.Odds]) -> tuple[result.Driver, ...]:
     """What each tolerance does alone to the figures that requirements look at, all others nominal."""
     factors, names = task.sampler.factors, list(dict.fromkeys(name for one in odds for name in one.columns))
     if not factors or not names:
@@ -160,20 +142,19 @@ def _drivers(task: SampleTask, odds: Sequence[Odds]) -> tuple[Driver, ...]:
         rows[2 * k : 2 * k + 2, k] = factor.box
     figures = task.figures(rows)
     made = [
-        Driver(name, factor.path, *factor.box, *map(finite, figures[name][2 * k : 2 * k + 2]))
+        result.Driver(name, factor.path, *factor.box, *map(finite, figures[name][2 * k : 2 * k + 2]))
         for name in names
         for k, factor in enumerate(factors)
     ]
     return tuple(sorted(made, key=lambda one: (names.index(one.column), -one.swing)))
 
 
-def _odds(id: str, words: str, unit: str, passed: int, count: int, **more: Any) -> Odds:
-    return Odds(id, words, unit, passed, count, passed / count, *clopper_pearson(passed, count), **more)
+def _odds(id: str, words: str, unit: str, passed: int, count: int, **more: Any) -> result.Odds:
+    bounds = result.clopper_pearson(passed, count)
+    return result.Odds(id, words, unit, passed, count, passed / count, *bounds, **more)
 
 
-def _reduced(
-    task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
-) -> Reduction:
+def _reduced(task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress) -> Reduction:
     """Reduce the samples where they are computed; what is done is noted every `NOTED_S` and at the end."""
     path = store.folder / f"reduced-{samples}.json.zlib"
     whole, done = judging.unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])
@@ -200,7 +181,7 @@ def _reduced(
 
 def _worst_cases(
     task: SampleTask, tallies: Sequence[tuple[Requirement, Tally]], folder: Path
-) -> Iterator[WorstCase]:
+) -> Iterator[result.WorstCase]:
     """The worst case of each requirement, with a design file of it."""
     design = task.design
     for place, (requirement, tally) in enumerate(tallies, 1):
@@ -223,7 +204,7 @@ def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
         "95 % confidence), which is on the safe side.": True,
         "The tolerance box of a normal distribution ends at 3 standard deviations or its bounds.": normal,
         "Worst cases of correlated parameters are sought in their ellipsoid, tied ones together.": correlated,
-        f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {MOST} bins; any"
+        f"More than {KEPT} samples: they are not kept. Quantiles are to one of up to {result.MOST} bins; any"
         " sample is made again by its number.": samples > KEPT,
     }
     return tuple(words for words, said in notes.items() if said)

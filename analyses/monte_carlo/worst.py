@@ -14,6 +14,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from scipy.optimize import differential_evolution, minimize
+from scipy.sparse.csgraph import connected_components
 from scipy.special import chdtri, ndtr, ndtri
 
 from actuator_lti.design.model import Requirement
@@ -71,8 +73,6 @@ class Region:
     @cached_property
     def sets(self) -> list[tuple[int, ...]]:
         """Columns that hang together by correlations; of a parameter without one it is alone."""
-        from scipy.sparse.csgraph import connected_components
-
         _, of = connected_components(self.sampler.correlation != 0.0, directed=False)
         return sorted(tuple(np.flatnonzero(of == one).tolist()) for one in set(of.tolist()))
 
@@ -193,8 +193,6 @@ def worst_case(task: SampleTask, requirement: Requirement, worst_samples: np.nda
 
 def _smallest(cost: Callable[[np.ndarray], np.ndarray], pool: np.ndarray, seed: int) -> np.ndarray:
     """The point of the unit cube with the smallest cost, from the best of a pool on."""
-    from scipy.optimize import differential_evolution, minimize
-
     found, size = cost(pool.T), pool.shape[1]
     many = max(12, min(40, 4 * size))
     chosen = pool[np.argsort(found, kind="stable")[:many]]

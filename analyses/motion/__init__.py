@@ -1,7 +1,5 @@
 """One motion of the nonlinear drive, as a command line asks for it."""
 
-from actuator_lti.start.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import from_rooms
 
-_ROOMS = {"Asked": f"{__name__}.asked"}
-_ROOMS |= dict.fromkeys(("Motion", "motion"), f"{__name__}.run")
-__getattr__, __dir__ = on_first_use(__name__, _ROOMS)
+__getattr__, __dir__ = from_rooms(__name__, asked="Asked", run="Motion motion")

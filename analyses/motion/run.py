@@ -1,6 +1,5 @@
 """Command and load of one motion, and the motion."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -9,6 +8,7 @@ import numpy as np
 from actuator_lti.bounds import TONES
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, whole_number
+from actuator_lti.types import Progress
 from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
 from analyses.motion.settling import Conduct, conduct
 from nonlinear import Trajectory, commands, loads, simulate
@@ -39,23 +39,18 @@ class Motion:
         return False if self.ended.status == "diverging" else None
 
 
-def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None] | None = None) -> Motion:
+def motion(design: Design, asked: Asked, *, progress: Progress = None) -> Motion:
     """Simulate one motion, and write its rows where that is asked for.
 
-    Raises
-    ------
-    InputError
-        For a command that does not fit the run, or a load that would not act in it.
+    Raises `InputError`: for a command that does not fit the run, or a load that would not act in it.
     """
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
     duration = asked.duration
     if asked.cycles is not None and asked.command != "stepped-sine":  # which has a duration of its own
         needed = asked.start + asked.cycles / asked.frequency
         if duration is not None and abs(duration - needed) > 1e-9 * needed:
-            raise InputError(
-                f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
-                f" {needed:g} s; allowed: one of the two options"
-            )
+            told = f"--cycles {asked.cycles}, --duration {duration:g}: {asked.cycles} periods take"
+            raise InputError(told + f" {needed:g} s; allowed: one of the two options")
         duration = needed
     command = _command(design, asked, USUAL_S if duration is None else duration, unit, 1.0 / per_SI)
     seconds = duration
@@ -63,14 +58,11 @@ def motion(design: Design, asked: Asked, *, progress: Callable[[int, int], None]
         tabled = command.kind in ("stepped_sine", "recorded", "sampled")
         seconds = command.end_s if tabled and 0.0 < command.end_s < float("inf") else USUAL_S
     elif command.kind == "stepped_sine" and 0.0 < seconds < command.end_s * (1.0 - 1e-9):
-        raise InputError(
-            f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
-            " allowed: that or more, or fewer --count or --cycles"
-        )
+        told = f"--duration {seconds:g}: the stepped sine takes {command.end_s:.6g} s;"
+        raise InputError(told + " allowed: that or more, or fewer --count or --cycles")
     if asked.start >= seconds > 0.0 and asked.start > 0.0:
-        raise InputError(
-            f"--start {asked.start:g}: the run ends at {seconds:g} s; allowed: less, or --duration"
-        )
+        told = f"the run ends at {seconds:g} s; allowed: less, or --duration"
+        raise InputError(f"--start {asked.start:g}: {told}")
     run = simulate(
         design,
         command,

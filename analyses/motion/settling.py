@@ -68,12 +68,17 @@ def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     >>> settle(load_design("ilr33-amber"), 8.0, 0.01).rest.verdict
     'at rest'
     """
-    rows = Rows.of(design)
-    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
-    rows.step("command", step_rad)
-    rest = judge(rows.running())
+    rest = judge(step_rows(design, load_Nm, step_rad).running())
     assert rest is not None  # a step and a load that stay
     return Settling(step_rad, load_Nm, rest)
+
+
+def step_rows(design: Design, load_Nm: float, step_rad: float, *, limits_on: bool = True) -> Rows:
+    """A step of the command from rest at zero, under a load that is there from the start; one run."""
+    rows = Rows.of(design, limits_on=limits_on)
+    rows["load"], rows["tanh_tolerance"] = load_Nm, TANH_TOLERANCE
+    rows.step("command", step_rad)
+    return rows
 
 
 def outcome(design: Design, load_Nm: float, step_rad: float) -> Settling:
@@ -263,9 +268,8 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
         longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # a period than the run
-        return Conduct(
-            rest.verdict, text, f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
-        )
+        beyond = f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
+        return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:
         return Conduct("sits on a limit", ", ".join(limits))
@@ -284,10 +288,8 @@ def _limited(run: Trajectory) -> str:
 
 def summary(run: Trajectory, ended: Conduct) -> Tree:
     """What happened, in numbers, SI, and what it ended in."""
-    limits = {
-        name: {"limit": u.limit, "unit": u.unit, "fraction": u.fraction, "first_time_s": u.first_time_s}
-        for name, u in run.limits.items()
-    }
+    told = ("limit", "unit", "fraction", "first_time_s")
+    limits = {name: {key: getattr(use, key) for key in told} for name, use in run.limits.items()}
     angle = "m" if run.axis == "linear" else "rad"
     si = {"position": angle, "velocity": f"{angle}_s", "current": "A", "voltage": "V"}[run.stage]
     followed = run.stage in ("velocity", "current")  # an angle is the output; a voltage has none

@@ -119,10 +119,7 @@ class Join:
 def load_campaign(path: str | Path) -> Campaign:
     """Read a campaign file.
 
-    Raises
-    ------
-    InputError
-        Names the file, the key, its value and what is allowed.
+    Raises `InputError`: names the file, the key, its value and what is allowed.
     """
     path = as_path(path)
     root = Table(read_campaign_toml(path), "", str(path))

@@ -1,11 +1,11 @@
 """A campaign's records: each run read and joined; a bad run set aside and named, the others go on."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_lti.errors import InputError, shown
+from actuator_lti.types import Progress
 from analyses.records.campaign_file import Campaign, RunEntry
 from analyses.records.clocks import ClockJoin, Mismatch, join_records
 from analyses.records.inputs import InputUse, account
@@ -94,17 +94,12 @@ def _over(one: InputUse, known: InputUse | None) -> InputUse:
     return replace(known, low=min(known.low, one.low), high=max(known.high, one.high))
 
 
-def import_campaign(
-    campaign: Campaign, *, progress: Callable[[int, int], None] | None = None
-) -> ImportedCampaign:
+def import_campaign(campaign: Campaign, *, progress: Progress = None) -> ImportedCampaign:
     """Read every run that the campaign lists.
 
     A run whose file is missing, broken, or cannot be joined is set aside with its reason.
 
-    Raises
-    ------
-    InputError
-        If no run at all can be used.
+    Raises `InputError`: if no run at all can be used.
     """
     if not isinstance(campaign, Campaign):
         raise InputError(f"campaign = {shown(campaign)}: allowed: a Campaign, as load_campaign gives")

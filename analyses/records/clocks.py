@@ -13,8 +13,7 @@ from analyses.records.campaign_file import Method
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
 
-RATE_SPREAD = 0.01
-"""Two clocks are taken to differ by less than 1 % in rate; anything else is no clock error."""
+RATE_SPREAD = 0.01  # two clocks are taken to differ by less than 1 % in rate; anything else is no clock error
 GRID = 4000
 MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
@@ -79,11 +78,8 @@ def join_records(
     together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
     second clock's zero.
 
-    Returns
-    -------
-    Record, ClockJoin
-        The first record with the second one's signals added (linear interpolation), cut to the time both
-        cover; and how it was done.
+    What comes back is the first record with the second one's signals added (linear interpolation), cut to the
+    time both cover; and how it was done.
     """
     if method == "given":
         if offset_s is None:
@@ -125,7 +121,6 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(0.0, 10.0, 0.1)
     >>> start, lasts = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
     >>> round(start, 6), lasts
@@ -156,10 +151,8 @@ def _check_durations(a: Series, b: Series, names: tuple[str, str], where: str) -
     if abs(ratio - 1.0) <= RATE_SPREAD + 3.0 * step:
         return
     factor = named_factor(ratio)
-    told = (
-        f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
-        'are of two runs; allowed: join.method = "given" with run.offset'
-    )
+    told = f"the {names[1]} came or went at another time than the {names[0]}, a clock is off, or the records "
+    told += 'are of two runs; allowed: join.method = "given" with run.offset'
     lasts = f"the {names[0]} lasts {span_a:.4g} s, the {names[1]} in the other record {span_b:.4g} s"
     told = f"factor {factor}" if factor else told
     raise Mismatch(f"{lasts}, {ratio:.4f} times as long: {told}", where=where)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 
 import numpy as np
+from scipy.signal import butter, sosfiltfilt
 
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
@@ -18,8 +19,7 @@ from analyses.records.record import Record
 
 RATE_TOLERANCE = 0.02
 """Disagreement of speed and rate above which no design is made; below it, it widens the intervals."""
-SURE = 4.0
-"""Standard errors beyond which noise explains no difference: by chance in one record of 16 000."""
+SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (
     "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
@@ -29,13 +29,10 @@ ALIKE = 0.9
 OVER = 1.2
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
-LEAST_ROWS = 10
-"""Smoothed and thinned, of a comparison."""
-STEADY = 0.1
-"""Relative difference of steps of the position beside a row that is missing or filled in."""
+LEAST_ROWS = 10  # smoothed and thinned, of a comparison
+STEADY = 0.1  # relative difference of steps of the position beside a row that is missing or filled in
 COPPER_1_K = 3.93e-3
-WINDING_K = (-75.0, 160.0)
-"""From 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H."""
+WINDING_K = (-75.0, 160.0)  # from 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H
 
 
 FOLLOWED = (
@@ -109,8 +106,6 @@ def _rate_name(design: Design) -> str:
 
 def _smooth(record: Record, values: Floats) -> Floats:
     """A signal without its fast part, no phase; the same filter for all signals that are compared."""
-    from scipy.signal import butter, sosfiltfilt
-
     share = 2.0 * SMOOTH_HZ * record.period_s
     if share >= 0.5 or len(values) < 60:
         return values

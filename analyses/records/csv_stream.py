@@ -10,6 +10,7 @@ import hashlib
 import math
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import BinaryIO
@@ -55,35 +56,124 @@ def stream_csv(
     Memory does not depend on the length of the file. ``counts`` is filled in on the way, ``digest`` fed with
     the bytes that are read.
     """
-    counts = RowCounts() if counts is None else counts
-    in_si = SiRows(spec, counts, str(path))
-    for block in _blocks(Path(path), spec, counts, digest or hashlib.sha256()):
-        rows = in_si(block)
-        if len(rows):
-            yield rows
+    origin, counts = str(path), RowCounts() if counts is None else counts
+    in_si, file = SiRows(spec, counts, origin), _File(spec, counts, origin)
+    with open_regular(Path(path), "CSV file") as stream:
+        for data in _line_blocks(stream, origin, digest or hashlib.sha256()):
+            block = file.block(data)
+            if block is not None and len(rows := in_si(block)):
+                yield rows
 
 
-def _blocks(path: Path, spec: RecordSpec, counts: RowCounts, digest: hashlib._Hash) -> Iterator[Block]:
-    layout, origin, header = spec.format, str(path), tuple[str, ...]()
-    with open_regular(path, "CSV file") as stream:
-        for data in _line_blocks(stream, origin, digest):
-            line = counts.lines + 1
-            counts.lines += data.count(b"\n") + (not data.endswith(b"\n"))
-            text = _clean(data, layout, counts)
-            if not header:
-                header, text, line = _read_header(text, line, layout, counts, origin)
-                if not header:
-                    continue
-                positions = spec.positions(header, origin)
-                counts.columns = header
-            if not text:
-                continue
-            block = _fast_rows(text, line, header, positions, layout)
-            if block is None:
-                block = _careful_rows(text, line, header, positions, spec, counts, origin)
+@dataclass
+class _File:
+    """A file while it is read, with the account of its lines and, once there, its columns."""
+
+    spec: RecordSpec
+    counts: RowCounts
+    origin: str
+    positions: tuple[int, ...] = ()  # of the wanted columns
+
+    def block(self, data: bytes) -> Block | None:
+        """The rows of some whole lines; None without any."""
+        counts, line = self.counts, self.counts.lines + 1
+        counts.lines += data.count(b"\n") + (not data.endswith(b"\n"))
+        text = _clean(data, self.spec.format, counts)
+        if not counts.columns:
+            counts.columns, text, line = self._header(text, line)
+            self.positions = self.spec.positions(counts.columns, self.origin) if counts.columns else ()
+        if not text:
+            return None
+        block = self._fast_rows(text, line)
+        if block is None:
+            return self._careful_rows(text, line)
+        counts.rows_in += len(block.lines)
+        return block
+
+    def _header(self, text: bytes, line: int) -> tuple[tuple[str, ...], bytes, int]:
+        """Column names, the text after the header, and the number of its first line.
+
+        Comment and blank lines before the header are passed over and counted. The text is empty where the
+        header has not come yet.
+        """
+        layout, counts = self.spec.format, self.counts
+        comment = layout.comment.encode(layout.encoding)
+        while text:
+            head, _, rest = text.partition(b"\n")
+            stripped = head.strip()
+            if line <= layout.skip_lines:
+                counts.header += 1
+            elif not stripped:
+                counts.blanks += 1
+            elif comment and stripped.startswith(comment):
+                counts.comments += 1
+            elif not layout.has_header:
+                return layout.names, text, line
             else:
-                counts.rows_in += len(block.lines)
-            yield block
+                counts.header += 1
+                try:
+                    cells = next(csv.reader([head.decode(layout.encoding)], delimiter=_separator(layout)))
+                except (UnicodeDecodeError, LookupError, csv.Error, StopIteration) as error:
+                    told = f"the line of column names cannot be read: {error}"
+                    raise InputError(told, where=f"{self.origin}:{line}") from None
+                return tuple(cell.strip() for cell in cells), rest, line + 1
+            text, line = rest, line + 1
+        return (), b"", line
+
+    def _fast_rows(self, data: bytes, first_line: int) -> Block | None:
+        """A whole cleaned block through Arrow's reader; None where any line needs a closer look."""
+        need("pyarrow", "tables", "a record")
+        import pyarrow as pa
+        import pyarrow.csv as pc
+
+        layout, positions = self.spec.format, self.positions
+        if layout.comment and layout.comment.encode(layout.encoding) in data:
+            return None
+        lines = data.count(b"\n") + (not data.endswith(b"\n"))
+        names = [str(position) for position in range(len(self.counts.columns))]
+        wanted = list(dict.fromkeys(names[position] for position in positions))
+        convert = pc.ConvertOptions(
+            column_types=dict.fromkeys(wanted, pa.float64()),
+            include_columns=wanted,
+            null_values=list(MISSING_TEXTS),
+            decimal_point=layout.decimal,
+        )
+        parse = pc.ParseOptions(delimiter=_separator(layout), quote_char=False, ignore_empty_lines=False)
+        read = pc.ReadOptions(column_names=names, use_threads=False, block_size=len(data) + 1)
+        try:
+            table = pc.read_csv(pa.BufferReader(data), read, parse, convert)
+        except (pa.ArrowException, UnicodeDecodeError):
+            return None
+        values = np.column_stack([table.column(names[position]).to_numpy() for position in positions])
+        if table.num_rows != lines or np.isnan(values).all(axis=1).any() or np.isinf(values).any():
+            return None
+        return Block(values=values, lines=np.arange(first_line, first_line + lines))
+
+    def _careful_rows(self, data: bytes, first_line: int) -> Block:
+        """A cleaned block line by line: comments and blanks counted, every faulty row named or dropped."""
+        layout, counts, header = self.spec.format, self.counts, self.counts.columns
+        text = data.decode(layout.encoding, errors="replace")
+        rows, numbers = [], []
+        for number, line in enumerate(text.removesuffix("\n").split("\n"), first_line):
+            stripped = line.strip()
+            if not stripped:
+                counts.blanks += 1
+            elif layout.comment and stripped.startswith(layout.comment):
+                counts.comments += 1
+            else:
+                counts.rows_in += 1
+                cells = line.split(_separator(layout))
+                try:
+                    if len(cells) != len(header):
+                        raise ValueError(f"{len(cells)} columns where {len(header)} are expected")
+                    rows.append([_number(cells[k], header[k], layout.decimal) for k in self.positions])
+                    numbers.append(number)
+                except ValueError as error:
+                    if self.spec.bad_rows == "error":
+                        raise InputError(str(error), where=f"{self.origin}:{number}") from None
+                    counts.drop("not a row of numbers", f"line {number}, {error}")
+        values = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.positions))
+        return Block(values=values, lines=np.array(numbers, dtype=np.int64))
 
 
 def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterator[bytes]:
@@ -140,72 +230,6 @@ def _separator(layout: CsvFormat) -> str:
     return "\t" if layout.separator == "whitespace" else layout.separator
 
 
-def _fast_rows(
-    data: bytes, first_line: int, header: tuple[str, ...], positions: tuple[int, ...], layout: CsvFormat
-) -> Block | None:
-    """A whole cleaned block through Arrow's reader; None where any line needs a closer look."""
-    need("pyarrow", "tables", "a record")
-    import pyarrow as pa
-    import pyarrow.csv as pc
-
-    if layout.comment and layout.comment.encode(layout.encoding) in data:
-        return None
-    lines = data.count(b"\n") + (not data.endswith(b"\n"))
-    names = [str(position) for position in range(len(header))]
-    wanted = list(dict.fromkeys(names[position] for position in positions))
-    convert = pc.ConvertOptions(
-        column_types=dict.fromkeys(wanted, pa.float64()),
-        include_columns=wanted,
-        null_values=list(MISSING_TEXTS),
-        decimal_point=layout.decimal,
-    )
-    parse = pc.ParseOptions(delimiter=_separator(layout), quote_char=False, ignore_empty_lines=False)
-    read = pc.ReadOptions(column_names=names, use_threads=False, block_size=len(data) + 1)
-    try:
-        table = pc.read_csv(pa.BufferReader(data), read, parse, convert)
-    except (pa.ArrowException, UnicodeDecodeError):
-        return None
-    values = np.column_stack([table.column(names[position]).to_numpy() for position in positions])
-    if table.num_rows != lines or np.isnan(values).all(axis=1).any() or np.isinf(values).any():
-        return None
-    return Block(values=values, lines=np.arange(first_line, first_line + lines))
-
-
-def _careful_rows(
-    data: bytes,
-    first_line: int,
-    header: tuple[str, ...],
-    positions: tuple[int, ...],
-    spec: RecordSpec,
-    counts: RowCounts,
-    origin: str,
-) -> Block:
-    """A cleaned block line by line: comments and blanks counted, every faulty row named or dropped."""
-    layout = spec.format
-    text = data.decode(layout.encoding, errors="replace")
-    rows, numbers = [], []
-    for number, line in enumerate(text.removesuffix("\n").split("\n"), first_line):
-        stripped = line.strip()
-        if not stripped:
-            counts.blanks += 1
-        elif layout.comment and stripped.startswith(layout.comment):
-            counts.comments += 1
-        else:
-            counts.rows_in += 1
-            cells = line.split(_separator(layout))
-            try:
-                if len(cells) != len(header):
-                    raise ValueError(f"{len(cells)} columns where {len(header)} are expected")
-                rows.append([_number(cells[k], header[k], layout.decimal) for k in positions])
-                numbers.append(number)
-            except ValueError as error:
-                if spec.bad_rows == "error":
-                    raise InputError(str(error), where=f"{origin}:{number}") from None
-                counts.drop("not a row of numbers", f"line {number}, {error}")
-    values = np.array(rows, dtype=np.float64).reshape(len(rows), len(positions))
-    return Block(values=values, lines=np.array(numbers, dtype=np.int64))
-
-
 def _number(cell: str, name: str, decimal: str) -> float:
     text = cell.strip().strip('"').strip()
     if text in MISSING_TEXTS:
@@ -222,38 +246,6 @@ def _number(cell: str, name: str, decimal: str) -> float:
     return value
 
 
-def _read_header(
-    text: bytes, line: int, layout: CsvFormat, counts: RowCounts, origin: str
-) -> tuple[tuple[str, ...], bytes, int]:
-    """Column names, the text after the header, and the number of its first line.
-
-    Comment and blank lines before the header are passed over and counted. The text is empty where the header
-    has not come yet.
-    """
-    comment = layout.comment.encode(layout.encoding)
-    while text:
-        head, _, rest = text.partition(b"\n")
-        stripped = head.strip()
-        if line <= layout.skip_lines:
-            counts.header += 1
-        elif not stripped:
-            counts.blanks += 1
-        elif comment and stripped.startswith(comment):
-            counts.comments += 1
-        elif not layout.has_header:
-            return layout.names, text, line
-        else:
-            counts.header += 1
-            try:
-                cells = next(csv.reader([head.decode(layout.encoding)], delimiter=_separator(layout)))
-            except (UnicodeDecodeError, LookupError, csv.Error, StopIteration) as error:
-                told = f"the line of column names cannot be read: {error}"
-                raise InputError(told, where=f"{origin}:{line}") from None
-            return tuple(cell.strip() for cell in cells), rest, line + 1
-        text, line = rest, line + 1
-    return (), b"", line
-
-
 class BoundedRows:
     """Collects rows; never holds more than ``2 * limit`` of them.
 
@@ -263,7 +255,6 @@ class BoundedRows:
 
     Examples
     --------
-    >>> import numpy as np
     >>> rows = BoundedRows(columns=1, limit=4)
     >>> rows.add(np.arange(8.0).reshape(-1, 1))
     >>> rows.array()[:, 0].tolist(), rows.factor

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import butter, cheby1, filtfilt, sosfiltfilt
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -56,8 +57,6 @@ def filtered_motion(
     The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a filter
     of this order. A cut-off so low that the filter's coefficients cancel is refused.
     """
-    from scipy.signal import butter, filtfilt
-
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
     if (2.0 * cutoff_hz * period_s) ** order < np.finfo(float).eps:
@@ -81,8 +80,6 @@ def decimated(columns: Floats, factor: int) -> Floats:
     Chebyshev type I of 8th order, 0.05 dB ripple, cut at 0.8 of the new Nyquist frequency, forward and
     backward with 24 samples of padding. For n rows the result has ceil(n / factor).
     """
-    from scipy.signal import cheby1, filtfilt, sosfiltfilt
-
     if factor == 1:
         return columns
     if len(columns) <= 24:

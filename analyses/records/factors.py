@@ -42,11 +42,7 @@ def named_factor(ratio: float, more: Mapping[float, str] | None = None) -> str |
         return "-1 (the sign is turned)"
     size = max(abs(ratio), 1.0 / abs(ratio))
     known = {**_PLAIN, **(more or {})}
-    near = [
-        factor
-        for factor in known
-        if factor > 1.0 + NEAR and abs(size / factor - 1.0) <= (NEAR if factor > 2.0 else NEAR_ONE)
-    ]
+    near = [f for f in known if f > 1.0 + NEAR and abs(size / f - 1.0) <= (NEAR if f > 2.0 else NEAR_ONE)]
     if not near:
         return None
     best = min(near, key=lambda factor: abs(size / factor - 1.0))

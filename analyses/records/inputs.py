@@ -58,14 +58,12 @@ def inputs_of(spec: RecordSpec, columns: Sequence[str]) -> tuple[InputColumn, ..
         return columns[column - 1] if isinstance(column, int) and column <= len(columns) else str(column)
 
     time = spec.time
-    result = [
-        InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals
-    ]
+    made = [InputColumn(column=name(s.column), signal=s.name, unit=s.unit, note=s.note) for s in spec.signals]
     if time.column is not None:
         unit = f"ticks of {time.tick_s:g} s" if time.tick_s else time.unit
-        result.insert(0, InputColumn(column=name(time.column), signal="time", unit=unit))
+        made.insert(0, InputColumn(column=name(time.column), signal="time", unit=unit))
     read = {name(column) for column in spec.columns(columns)}
-    return (*result, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
+    return (*made, *(InputColumn(column=c, note=NO_SIGNAL) for c in columns if c not in read))
 
 
 def spec_of_names(

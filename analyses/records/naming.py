@@ -156,10 +156,7 @@ def signal_of(base: str, unit: str) -> Signal | None:
 def canonical(name: str, unit: str) -> str:
     """The name by which the analyses know a signal of a record file.
 
-    Raises
-    ------
-    InputError
-        For a name that nothing reads, or one whose unit does not fit.
+    Raises `InputError`: for a name that nothing reads, or one whose unit does not fit.
     """
     base = "_".join(word for word in re.split(r"[^a-z0-9]+", name.lower()) if word)
     result = signal_of(base, unit)

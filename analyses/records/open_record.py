@@ -70,10 +70,7 @@ def open_records(path: str | Path) -> list[Record]:
     A record file is TOML: ``docs/records.md`` says what it may hold. Several records stand in ``[[record]]``
     tables, each with what is its own beside what all share.
 
-    Raises
-    ------
-    InputError
-        Names the file and what is wrong, or how to describe it.
+    Raises `InputError`: names the file and what is wrong, or how to describe it.
     """
     path = as_path(path)
     suffix = path.suffix.lower()
@@ -90,9 +87,8 @@ def open_records(path: str | Path) -> list[Record]:
         signals = {**record.signals, "force": gain * record["voltage"]}
         record = replace(record, signals=signals, units={**record.units, "force": "N"})
     notes = ("" if one.signal else why.get(one.column, "") for one in record.inputs)
-    inputs = tuple(
-        replace(one, note=note or one.note) for one, note in zip(record.inputs, notes, strict=True)
-    )
+    pairs = zip(record.inputs, notes, strict=True)
+    inputs = tuple(replace(one, note=note or one.note) for one, note in pairs)
     return [replace(record, inputs=inputs)]
 
 

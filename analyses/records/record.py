@@ -137,11 +137,9 @@ class Record:
         gap = float(steps[widest] / period)
         errors = ((line_error(self.time_s, values, gap), name) for name, values in self.signals.items())
         error, worst = max(errors, key=lambda one: one[0])
-        note = (
-            f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
-            f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
-            f"{100.0 * error:.2g} % of the range ({worst})"
-        )
+        note = f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
+        note += f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
+        note += f"{100.0 * error:.2g} % of the range ({worst})"
         check_error(error, self.resample_tolerance, note, self.name)
         return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
 
@@ -189,10 +187,8 @@ def prepared(record: Record) -> Record:
         raise InputError("the drive is never enabled", where=record.name)
     if stop - start == len(record):
         return record
-    note = (
-        f"enabled from {record.time_s[start]:.4g} s to {record.time_s[stop - 1]:.4g} s: "
-        f"{stop - start} of {len(record)} rows used"
-    )
+    note = f"enabled from {record.time_s[start]:.4g} s to {record.time_s[stop - 1]:.4g} s: "
+    note += f"{stop - start} of {len(record)} rows used"
     return replace(record.slice(start, stop), notes=(*record.notes, note))
 
 

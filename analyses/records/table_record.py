@@ -32,10 +32,8 @@ def filled(
         if count < 3:
             raise InputError(f"{name}: {count} values, three wanted", where=where)
         error = 0.25 * line_error(time_s[there], values[there], 2.0)
-        note = (
-            f"{name}: {len(values) - count} of {len(values)} values missing, linear between the others, "
-            f"error up to {100.0 * error:.2g} % of the range"
-        )
+        note = f"{name}: {len(values) - count} of {len(values)} values missing, linear between the others, "
+        note += f"error up to {100.0 * error:.2g} % of the range"
         check_error(error, tolerance, note, where)
         whole[name] = np.interp(time_s, time_s[there], values[there])
         notes.append(note)

@@ -44,10 +44,8 @@ def said_of(design: Design, frequency_hz: float | None) -> str:
     run = run_tones(design, (chosen,), np.zeros(1, dtype=int), amplitude, start, nothing, insist=True)
     gain = float(abs(run.phasor("output_angle_rad")[0])) / full
     share = float(run.window_limit_fraction("profile")[0])
-    return (
-        f"{said}; simulated at {scale * full:.3g} {unit} and {chosen.frequency_hz:.3g} Hz: "
-        f"{20.0 * log10(gain) if gain else -inf:.3g} dB, {100.0 * share:.0f} % of the time limited"
-    )
+    said = f"{said}; simulated at {scale * full:.3g} {unit} and {chosen.frequency_hz:.3g} Hz: "
+    return said + f"{20.0 * log10(gain) if gain else -inf:.3g} dB, {100.0 * share:.0f} % of the time limited"
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
 from math import inf
-from os import PathLike
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
@@ -27,20 +26,13 @@ if TYPE_CHECKING:
 
 
 def evaluate_requirements(
-    design: Design | str | PathLike[str], figures: Mapping[str, LoopFigures] | None = None
+    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 
-    Parameters
-    ----------
-    design : Design
-    figures : mapping of str to LoopFigures, optional
-        Of the sampled, sliding loops; computed where left out.
+    ``figures`` are those of the sampled, sliding loops, computed where left out.
 
-    Raises
-    ------
-    InputError
-        If a requirement names a quantity or a loop that is not known.
+    Raises `InputError`: if a requirement names a quantity or a loop that is not known.
     """
     design = as_design(design)
     if figures is None:
@@ -110,11 +102,8 @@ def judged(
     """Judge one requirement wherever it holds; ``asked`` finds what only an analysis finds."""
     quantity = QUANTITIES.get(requirement.quantity)
     if quantity is None:
-        raise InputError(
-            f"requirement {requirement.id}: quantity = {requirement.quantity!r}: allowed are "
-            f"{', '.join(QUANTITIES)}",
-            where=design.origin or None,
-        )
+        told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if quantity.scope == "analysis":
         verdicts = [_verdict(requirement, None, *asked(quantity.name))]
     elif quantity.scope == "drive":
@@ -134,10 +123,8 @@ def _judge_loop(
     """Judge one requirement on one loop; an unstable loop meets none."""
     rotor = requirement.rotor or (found.rotor if found else "") if name == "current" else ""
     if name not in LOOPS:
-        raise InputError(
-            f"requirement {requirement.id}: loop = {name!r}: allowed are {', '.join(LOOPS)}, every",
-            where=design.origin or None,
-        )
+        told = f"loop = {name!r}: allowed are {', '.join(LOOPS)}, every"
+        raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if found is None:
         return _verdict(requirement, name, None, f"the design has no {name} loop", rotor)
     result = found.asked(requirement)

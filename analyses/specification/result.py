@@ -2,11 +2,10 @@
 
 import math
 from dataclasses import dataclass
-from os import PathLike
 
 import numpy as np
 
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
@@ -92,19 +91,12 @@ class Specification:
     manoeuvres: tuple[Manoeuvre, ...]  # by load torque
 
 
-def specification(design: Design | str | PathLike[str], loops: Loops | None = None) -> Specification:
+def specification(design: AnyDesign, loops: Loops | None = None) -> Specification:
     """Work out and simulate the figures at each load torque of the design.
 
-    Parameters
-    ----------
-    design : Design
-    loops : Loops, optional
-        Sampled and sliding, of this design, if they are there already.
+    ``loops``: sampled and sliding, of this design, if they are there already.
 
-    Raises
-    ------
-    InputError, NumericalError
-        As `assemble_loops` and `simulate`.
+    Raises `InputError`, `NumericalError`: as `assemble_loops` and `simulate`.
     """
     design = as_design(design)
     loops = assemble_loops(design) if loops is None else loops
@@ -114,10 +106,7 @@ def specification(design: Design | str | PathLike[str], loops: Loops | None = No
     rates = [one.figures.output_rate_rad_s for one in result]
     pushes = [one.figures.acceleration_rad_s2 for one in result]
     times = step_times(design, min(rates), min(pushes), settling_s)
-    moves = tuple(
-        move
-        for load, rate, push in zip(loads, rates, pushes, strict=True)
-        for move in manoeuvres(design, load, rate, push, settling_s)
-    )
+    each = zip(loads, rates, pushes, strict=True)
+    moves = tuple(move for at in each for move in manoeuvres(design, *at, settling_s))
     top = max(rates) * design.total_ratio
     return Specification(design, result, times, torque_speed_plane(design, top), moves)

@@ -70,20 +70,13 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
     0.38
     """
     every = {path: parameter_value(design, path) for path in paths or variable_paths(design)}
-    nominal = {
-        path: value
-        for path, value in every.items()
-        if value != 0.0 and np.isfinite(value) and not path.startswith("friction.breakaway")
-    }
+    there = {path: value for path, value in every.items() if value != 0.0 and np.isfinite(value)}
+    nominal = {path: value for path, value in there.items() if not path.startswith("friction.breakaway")}
     ends = {path: (value * (1 - SWING), value * (1 + SWING)) for path, value in nominal.items()}
     for path, _, tolerance in tolerances(design):
         if path in nominal:
             ends[path] = Factor(path, nominal[path], tolerance).box
-    moves = [
-        {path: to}
-        for path, value in nominal.items()
-        for to in (value * (1 - STEP), value * (1 + STEP), *ends[path])
-    ]
+    moves = [{p: to} for p, v in nominal.items() for to in (v * (1 - STEP), v * (1 + STEP), *ends[p])]
     figures = population_figures(moved(design, nominal, moves), design)
     entries = []
     for k, path in enumerate(nominal):
@@ -100,9 +93,7 @@ def _rise(low: float, high: float) -> float:
 
 def moved(design: Design, base: Mapping[str, float], moves: Sequence[Mapping[str, float]]) -> Population:
     """The design, and once for each move the same with some of its numbers at other values (SI)."""
-    values = {
-        path: np.array([value, *(one.get(path, value) for one in moves)]) for path, value in base.items()
-    }
+    values = {p: np.array([value, *(one.get(p, value) for one in moves)]) for p, value in base.items()}
     return Population(design, values, 1 + len(moves))
 
 

@@ -5,22 +5,18 @@ operating points, and the corners of temperature, supply and tolerances. Margins
 by how near they let L come to -1 (`actuator_lti.asked.quantities.reserve`), not by shares of decibels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isinf, log10
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, reserve
-
-if TYPE_CHECKING:
-    from actuator_lti.design.model import Design
-    from actuator_lti.drive.operating import OperatingPoint
-    from actuator_lti.margins import StabilityMargins
-    from analyses.corners.run import Corners
-    from analyses.linear.loop_figures import LoopFigures
-    from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
+from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import OperatingPoint
+from actuator_lti.margins import StabilityMargins
+from analyses.corners.run import Corners
+from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFigures
 
 
 @dataclass(frozen=True)
@@ -153,9 +149,7 @@ def spread(
     seen = [point for point in points if point.kind != "describing-function"]
     made: dict[str, dict[str, Spread]] = {}
     for loop in dict.fromkeys(name for point in points for name in point.figures):
-        judged = [
-            (point.place or "sliding", point.figures[loop].judged) for point in seen if loop in point.figures
-        ]
+        judged = [(at.place or "sliding", at.figures[loop].judged) for at in seen if loop in at.figures]
         if not all(one.stable for _, one in judged):
             continue
         rows = [(place, _signed(one.margins)) for place, one in judged]

@@ -7,25 +7,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import ceil, sqrt
-from os import PathLike
 from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.operating import Operating
 from actuator_lti.errors import InputError, UnstableError
-from actuator_lti.loops.stiffness import (
-    LOST_MOTION_SHARE,
-    compliance,
-    frequencies_hz,
-    lost_motion_rad,
-    static_stiffness,
-    stiffness_at,
-)
+from actuator_lti.loops import stiffness as linear
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import HELD, LoopSetup
 from nonlinear.bench.operating_motion import on_the_bench, standing
@@ -148,7 +140,8 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
     coupling = None if coupling is None else replace(coupling, play_rad=0.0)
     bench = replace(bench, coupling=coupling, friction=friction)
     setup = LoopSetup(bench, "load", standing(bench), limits_on=False)
-    response, hertz = compliance(bench, setup.bias.operating(bench)), np.asarray(frequencies_hz, dtype=float)
+    response = linear.compliance(bench, setup.bias.operating(bench))
+    hertz = np.asarray(frequencies_hz, dtype=float)
     if float(response.slowest) >= 1.0:
         raise UnstableError("stiffness: the closed loop is not stable")
     if not response.moves:
@@ -156,7 +149,7 @@ def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Ch
         return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad) for one in pushed)
     found = tangent(bench, "load", setup=setup)
     seen = 1.0 / found.closed(np.exp(2j * np.pi * hertz * found.hold_s))
-    foreseen = [complex(stiffness_at(response, each)[0]) for each in hertz]
+    foreseen = [complex(linear.stiffness_at(response, each)[0]) for each in hertz]
     return tuple(map(Check, hertz.tolist(), foreseen, seen.tolist()))
 
 
@@ -181,7 +174,7 @@ def lost_motion(design: Design, *, seen: bool = False) -> LostMotion | None:
         return None
     play = design.coupling.play_rad / design.ratio_behind_coupling
     read = lost_motion_seen(design) if seen and design.load.moment_max_Nm > 0.0 else None
-    return LostMotion(play, lost_motion_rad(design), read)
+    return LostMotion(play, linear.lost_motion_rad(design), read)
 
 
 def lost_motion_seen(design: Design) -> float:
@@ -197,7 +190,7 @@ def lost_motion_seen(design: Design) -> float:
     if coupling is None or design.controller.position is None or rated <= 0.0:
         raise InputError("stiffness: lost motion needs a coupling, a position loop and load.moment_max")
     J, k, period = design.load_side_inertia_kgm2, coupling.stiffness_Nm_rad, design.controller.period_s
-    damping, m = 2.0 * sqrt(k * J), LOST_MOTION_SHARE * rated
+    damping, m = 2.0 * sqrt(k * J), linear.LOST_MOTION_SHARE * rated
     held = replace(
         design,
         motor=replace(design.motor, rotor_inertia_kgm2=HELD * design.motor.rotor_inertia_kgm2),
@@ -223,19 +216,13 @@ REST_HZ = (2.0, 20.0)
 REST_FRACTIONS = (0.01, 0.1, 1.0)  # of the largest moment
 
 
-def stiffness(design: Design | str | PathLike[str], *, simulated: bool = True) -> Stiffness:
+def stiffness(design: AnyDesign, *, simulated: bool = True) -> Stiffness:
     """Dynamic and static stiffness and lost motion of a design.
 
-    Parameters
-    ----------
-    design : Design
-    simulated : bool
-        Put them to the simulator: a moment injected at three frequencies, and a slow one to either side.
+    ``simulated``: put them to the simulator, by a moment injected at three frequencies, and a slow one to
+    either side.
 
-    Raises
-    ------
-    InputError
-        For a loop that is not stable.
+    Raises `InputError`: for a loop that is not stable.
     """
     design = as_design(design)
     held = design.controller.position is not None
@@ -286,8 +273,8 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     for load, state in product(_telling_loads(design), STATES):
         if state != "shorted" or design.motor.has_electrical_dynamics:
             seen = design if state == "powered" else unpowered(design, state)
-            response = compliance(seen, Operating(load_Nm=load))
-            hertz = frequencies_hz(response)
-            K, static = stiffness_at(response, hertz), static_stiffness(response)
+            response = linear.compliance(seen, Operating(load_Nm=load))
+            hertz = linear.frequencies_hz(response)
+            K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
             curves.append(StiffnessCurve(state, hertz, K, static, load))
     return tuple(curves)

@@ -37,6 +37,8 @@ IN_FLIGHT = 3  # parts a worker that are under way or waiting to be written
 CONNECT_S = 10.0
 TLS_FILES = {"tls_ca_file": "ca.pem", "tls_client_cert": "cert.pem", "tls_client_key": "key.pem"}
 PARTS = ("scheduler", "worker", "nanny")
+Work = Callable[[Any], Any]
+Sink = Callable[[Any, Any], None]  # of a part and what comes of it
 
 
 def is_open(address: str) -> bool:
@@ -131,9 +133,7 @@ def _closed_is_lost() -> Iterator[None]:
 
 
 @_closed_is_lost()
-def submit(
-    client: Any, work: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None]
-) -> None:
+def submit(client: Any, work: Work, todo: list[Any], sink: Sink) -> None:
     """Compute on a Dask cluster, with a few parts a worker under way; a lost worker's parts run again."""
     import distributed
 
@@ -176,7 +176,7 @@ def _the_same(work: Any) -> Any:
     return work
 
 
-def _answered(work: Callable[[Any], Any], proof: Proof, part: Any) -> tuple[Any, Exception | None]:
+def _answered(work: Work, proof: Proof, part: Any) -> tuple[Any, Exception | None]:
     """The result or the error of a part: tried again is only what a dying worker took along.
 
     A worker proves itself before its first part, also one that has joined late.
@@ -232,7 +232,7 @@ class Engine:
 
     def map(
         self, work: Callable[[Item], Result], items: Iterable[Item], sink: Callable[[Item, Result], None],
-        progress: Progress | None = None, size: Callable[[Item], int] = lambda _: 1,
+        progress: Progress = None, size: Callable[[Item], int] = lambda _: 1,
     ) -> None:  # fmt: skip
         """Apply a function of a module, or a task that is called like one, to every item once.
 
@@ -285,19 +285,17 @@ class Engine:
                 yield stack.enter_context(distributed.Client(here))
 
 
-def _threads(
-    call: Callable[[Any], Any], todo: list[Any], sink: Callable[[Any, Any], None], threads: int
-) -> None:
+def _threads(work: Work, todo: list[Any], sink: Sink, threads: int) -> None:
     """Compute in threads of this process (the compiled parts run without the interpreter's lock)."""
     waiting = iter(todo)
     pool = ThreadPoolExecutor(threads)
     try:
-        running = {pool.submit(call, part): part for part in islice(waiting, threads * IN_FLIGHT)}
+        running = {pool.submit(work, part): part for part in islice(waiting, threads * IN_FLIGHT)}
         while running:
             finished, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in sorted(finished, key=lambda one: one.exception() is not None):  # keep the good
                 sink(running.pop(future), future.result())
                 for part in islice(waiting, 1):
-                    running[pool.submit(call, part)] = part
+                    running[pool.submit(work, part)] = part
     finally:
         pool.shutdown(wait=False, cancel_futures=True)  # who holds a part that never ends can end it now

@@ -254,9 +254,8 @@ def _located(place: str, where: str, make: Callable[[], Design]) -> Design:
     try:
         return make()
     except InputError as error:
-        told = [
-            one.message if one.where == where else str(one) for one in getattr(error, "mistakes", [error])
-        ]
+        each = getattr(error, "mistakes", [error])
+        told = [one.message if one.where == where else str(one) for one in each]
         raise as_one([InputError(f"{place}: {one}", where=where) for one in told]) from error
 
 

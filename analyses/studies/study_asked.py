@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,6 +11,7 @@ from actuator_lti.files.tree import Tree
 from analyses.request import OnMachines, Option
 
 if TYPE_CHECKING:
+    from actuator_lti.types import Progress
     from analyses.comparison.variants import Comparison
     from analyses.studies.study import Study
 
@@ -31,9 +31,7 @@ class Asked(OnMachines):
     ] = None
 
 
-def compared(
-    study: Study | None, asked: Asked, *, out: Path, progress: Callable[[int, int], None] | None = None
-) -> Comparison:
+def compared(study: Study | None, asked: Asked, *, out: Path, progress: Progress = None) -> Comparison:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
     Raises `InputError`: without a study.

@@ -9,7 +9,9 @@ value is taken back towards home by itself. What is returned meets every corner,
 """
 
 import numpy as np
+from scipy.optimize import NonlinearConstraint, differential_evolution, minimize
 
+from actuator_lti.types import Floats
 from analyses.tuning.problem import Problem
 from analyses.tuning.solve import Program, Solution, Spent, rounds, solve, violated
 
@@ -42,7 +44,7 @@ def least_change(problem: Problem, *, give_up: bool = False) -> Solution:
     return again if again.slack >= 0.0 else _between(problem, firm, again.gains)
 
 
-def _met(problem: Problem, firm: np.ndarray | None, working: np.ndarray) -> Solution | None:
+def _met(problem: Problem, firm: Floats | None, working: Floats) -> Solution | None:
     """Nearest gains, the working set growing until they meet every corner; None where there are none."""
     last: Solution | None = None
     for last in rounds(problem, working, lambda gains, corners: _nearest(problem, gains, firm, corners)):
@@ -51,9 +53,7 @@ def _met(problem: Problem, firm: np.ndarray | None, working: np.ndarray) -> Solu
     return last
 
 
-def _nearest(
-    problem: Problem, start: np.ndarray | None, firm: np.ndarray | None, working: np.ndarray
-) -> np.ndarray | None:
+def _nearest(problem: Problem, start: Floats | None, firm: Floats | None, working: Floats) -> Floats | None:
     """Nearest gains to home that meet the working set; those of `firm` are known to. None without any."""
     begins = [row for row in (problem.present, firm if start is None else start, firm) if row is not None]
     best = _nearer(problem, firm, np.vstack([_descend(problem, row, working) for row in begins]), working)
@@ -65,10 +65,8 @@ def _nearest(
     return _taken_back(problem, best, working)
 
 
-def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.ndarray:
+def _descend(problem: Problem, start: Floats, working: Floats) -> Floats:
     """Minimise the change by sequential quadratic programming; rows from there back to the start."""
-    from scipy.optimize import minimize
-
     program = Program(problem, lambda x: problem.rows(x, working) - MET)
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     begin = np.clip(problem.coordinates(start), low, high)
@@ -85,9 +83,7 @@ def _descend(problem: Problem, start: np.ndarray, working: np.ndarray) -> np.nda
     return np.clip(problem.values(np.clip(rows, low, high)), problem.lower, problem.upper)
 
 
-def _nearer(
-    problem: Problem, known: np.ndarray | None, rows: np.ndarray, working: np.ndarray
-) -> np.ndarray | None:
+def _nearer(problem: Problem, known: Floats | None, rows: Floats, working: Floats) -> Floats | None:
     """Of some gains the nearest to home that meets the working set, or those known to meet it if nearer."""
     bound = np.inf if known is None else problem.change(known[None, :])[0]
     rows = rows[problem.change(rows) < bound]
@@ -96,21 +92,19 @@ def _nearer(
             rows = rows[problem.distances(rows, corners).min(axis=(1, 2)) >= 0.0]
     if not len(rows):
         return known
-    result: np.ndarray = rows[int(np.argmin(problem.change(rows)))]
+    result: Floats = rows[int(np.argmin(problem.change(rows)))]
     return result
 
 
-def _evolved(problem: Problem, best: np.ndarray, working: np.ndarray) -> np.ndarray:
+def _evolved(problem: Problem, best: Floats, working: Floats) -> Floats:
     """What evolution finds in the box about home that holds every gain whose change is smaller."""
-    from scipy.optimize import NonlinearConstraint, differential_evolution
-
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
     here, free = problem.coordinates(best), [item.home is None for item in problem.variables]
     centre = np.where(free, here, problem.coordinates(problem.present))
     reach = np.where(free, WIDEST, np.sqrt(problem.change(best[None, :])[0]))
     box = np.clip([centre - reach, centre + reach], low, high)
 
-    def limits(x: np.ndarray) -> np.ndarray:
+    def limits(x: Floats) -> Floats:
         made = (problem.rows(np.atleast_2d(x.T), working) - MET).T
         return made if x.ndim > 1 else made[:, 0]
 
@@ -123,7 +117,7 @@ def _evolved(problem: Problem, best: np.ndarray, working: np.ndarray) -> np.ndar
     return np.clip(problem.values(result.x), problem.lower, problem.upper)
 
 
-def _taken_back(problem: Problem, gains: np.ndarray, working: np.ndarray) -> np.ndarray:
+def _taken_back(problem: Problem, gains: Floats, working: Floats) -> Floats:
     """Each value by itself, then all together, as far back home as the working set allows."""
     home = problem.coordinates(problem.present)
     for mask in (*np.eye(len(home), dtype=bool), np.ones(len(home), dtype=bool)):
@@ -135,7 +129,7 @@ def _taken_back(problem: Problem, gains: np.ndarray, working: np.ndarray) -> np.
     return gains
 
 
-def _between(problem: Problem, firm: Solution, gains: np.ndarray) -> Solution:
+def _between(problem: Problem, firm: Solution, gains: Floats) -> Solution:
     """The point nearest to gains on the way from a firm solution to them that meets every corner."""
     one, other = problem.coordinates(firm.gains), problem.coordinates(gains)
     low, high = 0.0, 1.0

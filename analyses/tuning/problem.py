@@ -17,6 +17,7 @@ from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import drawn
 from actuator_lti.design.units import parse_limit
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
@@ -51,11 +52,11 @@ class Problem:
     # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
     # element neutral ones), and ends of what may be set
     paths: tuple[str, ...] = field(init=False)
-    start: np.ndarray = field(init=False)
-    present: np.ndarray = field(init=False)
-    lower: np.ndarray = field(init=False)
-    upper: np.ndarray = field(init=False)
-    _linear: np.ndarray = field(init=False)
+    start: Floats = field(init=False)
+    present: Floats = field(init=False)
+    lower: Floats = field(init=False)
+    upper: Floats = field(init=False)
+    _linear: Floats = field(init=False)
 
     def __post_init__(self) -> None:
         self.paths = tuple(item.path for item in self.variables)
@@ -71,15 +72,15 @@ class Problem:
         """Whether as many designs were looked at as one search may."""
         return self.evaluations >= self.most
 
-    def coordinates(self, values: np.ndarray) -> np.ndarray:
+    def coordinates(self, values: Floats) -> Floats:
         """What the search moves: ln of a value; a share itself."""
         return np.where(self._linear, values, np.log(np.where(self._linear, 1.0, values)))
 
-    def values(self, coordinates: np.ndarray) -> np.ndarray:
+    def values(self, coordinates: Floats) -> Floats:
         """SI values from coordinates."""
         return np.where(self._linear, coordinates, np.exp(np.where(self._linear, 0.0, coordinates)))
 
-    def change(self, values: np.ndarray) -> np.ndarray:
+    def change(self, values: Floats) -> Floats:
         """How far each row is from the design as it came, see `analyses.tuning.start.change`."""
         return change(self.variables, values)
 
@@ -103,7 +104,7 @@ class Problem:
         return tuple(self.toleranced[k] for k in chosen)
 
     @cached_property
-    def all_corners(self) -> np.ndarray:
+    def all_corners(self) -> Floats:
         """Nominal point, then the corners of the tolerance box, shape (corners, factors).
 
         Of correlated parameters the corners are moved as they are correlated (the root of their correlation
@@ -121,17 +122,17 @@ class Problem:
         half_range = np.where(moved > 0.0, upper - nominal, nominal - lower)
         return np.vstack([nominal, np.unique(nominal + moved * half_range, axis=0)])
 
-    def distances(self, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    def distances(self, gains: Floats, corners: Floats) -> Floats:
         """`exact_distances` as far as the search looks."""
         return np.minimum(self.exact_distances(gains, corners), PLENTY)
 
-    def rows(self, coordinates: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    def rows(self, coordinates: Floats, corners: Floats) -> Floats:
         """Distances at coordinates, one row for each: shape (candidates, corners * requirements)."""
         return self.distances(self.values(coordinates), corners).reshape(len(coordinates), -1)
 
     def exact_distances(
-        self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...] | None = None
-    ) -> np.ndarray:
+        self, gains: Floats, corners: Floats, factors: tuple[Factor, ...] | None = None
+    ) -> Floats:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).
 
         Unstable designs get a number below -3 that falls with the distance of the poles from the circle; inf
@@ -147,13 +148,13 @@ class Problem:
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
 
-    def figure(self, quantity: str, loop: str, gains: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    def figure(self, quantity: str, loop: str, gains: Floats, corners: Floats) -> Floats:
         """One figure of one loop, shape (candidates, corners)."""
         linear = self._looked_at(gains, corners, self.factors, QUANTITIES[quantity].timed)
         return linear.quantity(quantity, loop).reshape(len(gains), len(corners))
 
     def _looked_at(
-        self, gains: np.ndarray, corners: np.ndarray, factors: tuple[Factor, ...], timed: bool
+        self, gains: Floats, corners: Floats, factors: tuple[Factor, ...], timed: bool
     ) -> LinearFigures:
         """Linear figures of every candidate at every corner, and the search's account of them."""
         count, many = len(gains), len(corners)
@@ -187,10 +188,8 @@ def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tu
     every = asked_for(design, extra)
     chosen = tuple(r for r in every if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
     if not chosen:
-        raise InputError(
-            "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
-            'file, or as --require "position.bandwidth>=30 Hz"'
-        )
+        told = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
+        raise InputError(told + 'file, or as --require "position.bandwidth>=30 Hz"')
     return chosen
 
 

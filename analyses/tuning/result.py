@@ -12,6 +12,7 @@ from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Floats
 from analyses.comparison.found import LargeSignal
 from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
@@ -148,7 +149,7 @@ def hunting(tuned: Design) -> str:
     return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
-def nonlinear_checks(tuned: Design, problem: Problem, result: np.ndarray) -> tuple[NonlinearCheck, ...]:
+def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[NonlinearCheck, ...]:
     """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]

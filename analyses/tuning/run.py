@@ -3,17 +3,16 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
-from os import PathLike
 
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import Structure, field_of
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
-from actuator_lti.types import Progress
+from actuator_lti.types import Floats, Progress
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
@@ -42,10 +41,7 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 
 def tune(
-    design: Design | str | PathLike[str],
-    settings: TuningSettings | None = None,
-    *,
-    progress: Progress | None = None,
+    design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress = None
 ) -> TuningResult:
     """Find gains that meet the requirements on loops over all corners of the tolerances.
 
@@ -55,15 +51,9 @@ def tune(
     all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
     say by how much it misses. What is returned is judged once more by certified margins.
 
-    Parameters
-    ----------
-    progress : callable, optional
-        Called with (stages done, stages in all).
+    ``progress`` is called with (stages done, stages in all).
 
-    Raises
-    ------
-    InputError
-        If there is no requirement on a loop, or an element has no place in the drive.
+    Raises `InputError`: if there is no requirement on a loop, or an element has no place in the drive.
     """
     design, settings = as_design(design), settings or TuningSettings()
     if not isinstance(settings, TuningSettings):
@@ -138,7 +128,7 @@ def _tried(
             return
 
 
-def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
+def _rounded(problem: Problem, solution: Solution, aim: Aim) -> Floats:
     """Of all roundings up and down: the least change that meets all, or else the one farthest from limits."""
     choices = neighbours(problem.design, problem.paths, solution.gains)
     slack = problem.distances(choices, solution.working).min(axis=(1, 2))
@@ -152,9 +142,7 @@ def _rounded(problem: Problem, solution: Solution, aim: Aim) -> np.ndarray:
     return choices[best[int(np.argmax(whole))]]
 
 
-def _binding(
-    problem: Problem, gains: np.ndarray, result: np.ndarray, aim: Aim
-) -> tuple[BindingRequirement, ...]:
+def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple[BindingRequirement, ...]:
     """Every requirement at its worst corner."""
     smallest = float(result.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
@@ -176,7 +164,7 @@ def _binding(
 
 
 def _settings(
-    problem: Problem, before: Design, rules: RuleGains, tuned: np.ndarray, rounded: np.ndarray
+    problem: Problem, before: Design, rules: RuleGains, tuned: Floats, rounded: Floats
 ) -> Iterator[GainSetting]:
     there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
@@ -197,7 +185,7 @@ def _settings(
 
 
 def _notes(
-    problem: Problem, gains: np.ndarray, result: np.ndarray, confirmed: tuple[RequirementVerdict, ...]
+    problem: Problem, gains: Floats, result: Floats, confirmed: tuple[RequirementVerdict, ...]
 ) -> Iterator[str]:
     """What was missed, what was not looked at, what a certified margin does not bear out."""
     if result.min() < 0.0:

@@ -12,7 +12,9 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
+from scipy.optimize import minimize
 
+from actuator_lti.types import Floats
 from analyses.monte_carlo.judging import loops_of
 from analyses.tuning.problem import Problem
 from analyses.tuning.result import TradeOffPoint
@@ -21,7 +23,7 @@ ROUNDS = 6
 STEP = 1e-4  # of a coordinate (ln of a gain), central differences
 TIE = 2e-3  # what a deviation from the rules by a factor e costs
 RESERVE = 0.3  # relative distance to a limit that is enough
-Functions = Callable[[np.ndarray], np.ndarray]
+Functions = Callable[[Floats], Floats]
 
 
 @dataclass(frozen=True)
@@ -32,15 +34,15 @@ class Solution:
     missed; ``working`` are the corners that mattered.
     """
 
-    gains: np.ndarray
+    gains: Floats
     slack: float
-    working: np.ndarray
+    working: Floats
 
 
-Seeking = Callable[[np.ndarray | None, np.ndarray], np.ndarray | None]
+Seeking = Callable[[Floats | None, Floats], Floats | None]
 
 
-def rounds(problem: Problem, working: np.ndarray, seek: Seeking) -> Iterator[Solution]:
+def rounds(problem: Problem, working: Floats, seek: Seeking) -> Iterator[Solution]:
     """Solutions on a working set that grows by the corners that each of them misses.
 
     ``seek`` gives gains from those of the round before (None in the first) and the working set; None ends it.
@@ -63,7 +65,7 @@ def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     With ``give_up`` it stops where already the nominal design misses a limit.
     """
 
-    def seek(gains: np.ndarray | None, working: np.ndarray) -> np.ndarray:
+    def seek(gains: Floats | None, working: Floats) -> Floats:
         starts = start_points(problem, working) if gains is None else gains[None, :]
         rows = partial(problem.rows, corners=working)
         found = np.array([maximise(problem, start, rows) for start in starts])
@@ -79,7 +81,7 @@ def solve(problem: Problem, *, give_up: bool = False) -> Solution:
     return max(made, key=lambda one: one.slack)
 
 
-def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
+def start_points(problem: Problem, working: Floats) -> Floats:
     """The rule gains, those of the design, and the best of a coarse search around both."""
     rng = np.random.default_rng(0)
     centres = np.vstack([problem.coordinates(problem.start), problem.coordinates(problem.present)])
@@ -91,9 +93,7 @@ def start_points(problem: Problem, working: np.ndarray) -> np.ndarray:
     return np.vstack([cloud[:1], cloud[order[:2]]])
 
 
-def violated(
-    result: np.ndarray, problem: Problem, gains: np.ndarray, corners: np.ndarray, working: np.ndarray
-) -> np.ndarray:
+def violated(result: Floats, problem: Problem, gains: Floats, corners: Floats, working: Floats) -> Floats:
     """For each requirement its worst corner, where it is worse than in the working set."""
     known = problem.distances(gains[None, :], working)[0].min()
     fresh = []
@@ -118,11 +118,11 @@ class Program:
     problem: Problem
     goals: Functions
     limits: Functions | None = None
-    seen: list[tuple[np.ndarray, float]] = field(default_factory=list, repr=False)
+    seen: list[tuple[Floats, float]] = field(default_factory=list, repr=False)
     aims: int = 0  # how many functions are goals, the first ones
-    _last: tuple[np.ndarray, np.ndarray] | None = field(default=None, repr=False)
+    _last: tuple[Floats, Floats] | None = field(default=None, repr=False)
 
-    def model(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def model(self, x: Floats) -> tuple[Floats, Floats]:
         """Values and slopes of all functions at coordinates."""
         if self.problem.spent:
             raise Spent
@@ -139,26 +139,20 @@ class Program:
         return self._last
 
     @property
-    def best(self) -> np.ndarray:
+    def best(self) -> Floats:
         """Coordinates seen so far whose smallest value is largest."""
         return max(self.seen, key=lambda each: each[1])[0]
 
 
 def maximise(
-    problem: Problem,
-    start: np.ndarray,
-    limits: Functions,
-    free: Functions | None = None,
-    most_rounds: int = 80,
-) -> np.ndarray:
+    problem: Problem, start: Floats, limits: Functions, free: Functions | None = None, most_rounds: int = 80
+) -> Floats:
     """Maximise the smallest of some functions of the gains, from a start; all gains in SI.
 
     ``limits`` and ``free``: (candidates, coordinates) -> (candidates, functions). Without ``free`` the
     smallest limit is made as large as can be, up to the reserve of 30 %; with it the limits are constraints,
     and the smallest of ``free`` is maximised.
     """
-    from scipy.optimize import minimize
-
     program = Program(problem, limits) if free is None else Program(problem, free, limits)
     most = RESERVE if free is None else None
     low, high = problem.coordinates(problem.lower), problem.coordinates(problem.upper)
@@ -190,7 +184,7 @@ _SPAN = (0.6, 1.6)
 _MET = -1e-3
 
 
-def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple[TradeOffPoint, ...]:
+def trade_off(problem: Problem, gains: Floats, working: Floats) -> tuple[TradeOffPoint, ...]:
     """Largest smallest phase margin (all loops, worst corner) for position bandwidths around the tuned one.
 
     From gains in SI; the result holds for the corners that are looked at, ``working``.
@@ -204,7 +198,7 @@ def trade_off(problem: Problem, gains: np.ndarray, working: np.ndarray) -> tuple
     if not np.isfinite(centre):
         return ()
     targets = [float(hz) for hz in centre * np.geomspace(*_SPAN, POINTS)]
-    result: list[np.ndarray] = []
+    result: list[Floats] = []
     for wanted in targets:
         starts = [gains, *result[-1:]]
         tried = [trade.best(start, wanted) for start in starts]
@@ -220,19 +214,19 @@ class _TradeOff:
     """Bandwidth, phase margins and the ``others`` of the requirements at some corners, of rows of gains."""
 
     problem: Problem
-    working: np.ndarray
+    working: Floats
     others: list[int]
 
-    def width(self, rows: np.ndarray) -> np.ndarray:
+    def width(self, rows: Floats) -> Floats:
         return self.problem.figure("bandwidth", "position", rows, self.working)
 
-    def margins(self, rows: np.ndarray) -> np.ndarray:
+    def margins(self, rows: Floats) -> Floats:
         """Phase margins, shape (candidates, loops * corners); 180 without crossing."""
         loops = loops_of(self.problem.design)
         result = [self.problem.figure("phase_margin", loop, rows, self.working) for loop in loops]
         return np.clip(np.concatenate(result, axis=1), -180.0, 180.0)
 
-    def kept(self, rows: np.ndarray, wanted_hz: float) -> list[np.ndarray]:
+    def kept(self, rows: Floats, wanted_hz: float) -> list[Floats]:
         """How far bandwidth, and the other figures, are from their limits, each (candidates, distances)."""
         width = self.width(rows)
         made = [np.where(np.isnan(width), -3.0, width / wanted_hz - 1.0)]
@@ -240,25 +234,25 @@ class _TradeOff:
             made.append(self.problem.distances(rows, self.working)[:, :, self.others].reshape(len(rows), -1))
         return made
 
-    def better(self, candidates: list[np.ndarray], wanted_hz: float) -> np.ndarray:
+    def better(self, candidates: list[Floats], wanted_hz: float) -> Floats:
         """Of some gains those with the largest phase margin that keep the bandwidth and the other limits."""
         rows = np.array(candidates)
         margin = self.margins(rows).min(axis=1)
         short = sum(np.minimum(part.min(axis=1) - _MET, 0.0) for part in self.kept(rows, wanted_hz))
         return rows[int(np.lexsort((-margin, -np.asarray(short)))[0])]
 
-    def best(self, start: np.ndarray, wanted_hz: float) -> np.ndarray:
+    def best(self, start: Floats, wanted_hz: float) -> Floats:
         """Largest phase margin at a bandwidth or above, other requirements kept."""
 
-        def limits(x: np.ndarray) -> np.ndarray:
+        def limits(x: Floats) -> Floats:
             return np.concatenate(self.kept(self.problem.values(x), wanted_hz), axis=1)
 
-        def free(x: np.ndarray) -> np.ndarray:
+        def free(x: Floats) -> Floats:
             return self.margins(self.problem.values(x)) / 45.0
 
         return maximise(self.problem, start, limits, free, most_rounds=30)
 
-    def point(self, row: np.ndarray) -> TradeOffPoint:
+    def point(self, row: Floats) -> TradeOffPoint:
         width, margin = float(np.min(self.width(row))), float(self.margins(row).min())
         kept = self.problem.distances(row, self.working)[0][:, self.others]
         return TradeOffPoint(width, margin, bool(kept.size == 0 or kept.min() >= _MET))

@@ -19,6 +19,7 @@ from actuator_lti.design.objects import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
 from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 
 WIDE = 2.0 + 3.0**0.5  # a of the symmetric optimum for a phase margin of 60 deg
 SEPARATION = 4.0  # crossover of the velocity loop over the gain of the position loop
@@ -122,7 +123,7 @@ def allowed_range(design: Design, path: str) -> tuple[float, float]:
     return (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
 
 
-def neighbours(design: Design, paths: tuple[str, ...], gains: np.ndarray) -> np.ndarray:
+def neighbours(design: Design, paths: tuple[str, ...], gains: Floats) -> Floats:
     """All roundings of gains to the steps of their objects, up and down, shape (roundings, gains).
 
     A gain without an object stays as it is.
@@ -169,9 +170,8 @@ def checked(design: Design, wanted: Sequence[str]) -> tuple[Element, ...]:
         if control.velocity is None:
             raise InputError(f"place = {word}: the design {name} has no control.velocity to hold it")
         if word == "feedforward" and control.position is None:
-            raise InputError(
-                f"place = {word}: the design {name} has no control.position, whose command it needs"
-            )
+            told = f"the design {name} has no control.position, whose command it needs"
+            raise InputError(f"place = {word}: {told}")
     return tuple(item for item in ELEMENTS if item in wanted)
 
 
@@ -217,14 +217,11 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
 
 def _feedforward(design: Design) -> list[Variable]:
     position = design.controller.position_loop
-    return [
-        Variable(f"control.position.{key}", value, 0.0, max(1.2, value), value, linear=True)
-        for key in ("feedforward", "acceleration_feedforward")
-        for value in [getattr(position, key)]
-    ]
+    own = {key: getattr(position, key) for key in ("feedforward", "acceleration_feedforward")}
+    return [Variable(f"control.position.{k}", v, 0.0, max(1.2, v), v, linear=True) for k, v in own.items()]
 
 
-def change(variables: tuple[Variable, ...], values: np.ndarray) -> np.ndarray:
+def change(variables: tuple[Variable, ...], values: Floats) -> Floats:
     """How far values are from home: squares of ln ratios, of shares, and of widths over their frequency.
 
     Of rows in SI, shape (candidates, variables); shape (candidates,).

@@ -44,10 +44,8 @@ def bench_sweep(bench: Bench, place: Place) -> BenchSweep:
     turns = sorted({_turns(share) for share in shares}, key=lambda turn: turn[0] / turn[1])
     angles = np.array([2.0 * np.pi * cycles / samples for cycles, samples in turns])
     found = [_found(setup, place, angle, samples) for angle, (_, samples) in zip(angles, turns, strict=True)]
-    linear = bench.loop(place.name).plain_open(np.exp(1j * angles))
-    return BenchSweep(
-        place.name, angles / (2.0 * np.pi * hold_s), np.array(found), np.asarray(linear, complex)
-    )
+    linear = np.asarray(bench.loop(place.name).plain_open(np.exp(1j * angles)), complex)
+    return BenchSweep(place.name, angles / (2.0 * np.pi * hold_s), np.array(found), linear)
 
 
 def _turns(share: float) -> tuple[int, int]:

@@ -21,12 +21,7 @@ from nonlinear.rows import Rows
 def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
     """Rows of the drive's numbers, in the order of the power: mechanics first, command last.
 
-    Parameters
-    ----------
-    design : Design
-        What is simulated.
-    model : Design, optional
-        What is predicted; by default the same.
+    ``design`` is simulated, ``model`` (by default the same) predicted.
 
     Examples
     --------
@@ -61,9 +56,7 @@ def _profile(pair: Pair) -> Iterator[Row]:
         for column in columns:
             if column != columns[n + first]:
                 alone[column] = inf
-        drive = alone.running()
-        drive.command(FAR * min(limit, there) * T)
-        drive.begin()
+        drive = alone.running().begin(FAR * min(limit, there) * T)
         found = drive.value("PROFILE_SPEED" if n + first else "PROFILE") / (T if n + first == 2 else 1.0)
         unit = f"{angle}/s" + ("", "^2", "^3")[n]
         name = f"command_{key.split('_')[0]}"
@@ -77,9 +70,7 @@ def _jerk(pair: Pair, rows: Rows, T: float) -> Row:
     model = pair.model.command
     for column in ("profile_range", "profile_rate", "profile_acceleration"):
         rows[column] = inf
-    drive = rows.running()
-    drive.command(1.0)
-    drive.begin()
+    drive = rows.running().begin(1.0)
     samples = pair.design.total_ratio / drive.value("REFERENCE")
     wanted = max(ceil(2.0 * model.acceleration_rad_s2 / (model.jerk_rad_s3 * T) - 1e-9), 1)
     return pair.judged("command_jerk", float(wanted), samples, "1", "samples of the mean that limits it")
@@ -94,9 +85,7 @@ def _feedforward(pair: Pair) -> Iterator[Row]:
     rows = pair.rows()
     rows["acceleration_feedforward"] = 0.0
     for side in (1.0, -1.0):
-        drive = rows.running()
-        drive.command(side)
-        drive.begin()
+        drive = rows.running().begin(side)
         unit = "V" if pair.design.controller.current is None else "A"
         yield pair.judged("friction_feedforward", side * wanted, drive.value("TORQUE_FEEDFORWARD"), unit,
                           f"command moving {'forward' if side > 0.0 else 'backward'}")  # fmt: skip
@@ -111,8 +100,7 @@ def _counts(pair: Pair) -> Iterator[Row]:
     if position is not None and position.sensor == "output" and quantum is not None and own is not None:
         rows = pair.rows()
         rows["angle_start"] = 1.5 * quantum * N
-        drive = rows.running()
-        drive.begin()
+        drive = rows.running().begin()
         yield pair.judged("output_count", quantum, -drive.value("ERROR") / N, unit, "position loop")
     if velocity is None or design.encoder.speed == "ideal":
         return
@@ -124,8 +112,7 @@ def _counts(pair: Pair) -> Iterator[Row]:
     rows, name = pair.rows(), "output_count" if behind else "count"
     if design.encoder.speed == "tracking":
         rows["angle_start"] = 1.5 * quantum * scale
-        drive = rows.running()
-        drive.begin()
+        drive = rows.running().begin()
         yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
         return
     rows["angle_start"] = 0.5 * quantum * scale

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import eig
 
 from actuator_lti.errors import NumericalError
 from actuator_lti.systems.plain_system import PlainSystem
@@ -210,8 +211,6 @@ def _at_gain(setup: LoopSetup, gain: float) -> Rows:
 
 def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes]:
     """Left and right eigenvector of the eigenvalue nearest to a pole, their product 1."""
-    from scipy.linalg import eig
-
     even, scale = balanced(A)
     values, left, right = eig(even, left=True)
     k = int(np.argmin(np.abs(values - pole)))

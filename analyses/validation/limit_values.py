@@ -76,13 +76,10 @@ def limit_rows(pair: Pair) -> Iterator[Row]:
 
 def _pushed(rows: Rows, pair: Pair, stage: str, size: float) -> Running:
     """One tick in which a stage is asked for ``size`` times its gain; 0 for the command of the drive."""
-    if stage in ("velocity", "current"):
-        rows.step("w_ref" if stage == "velocity" else "i_ref", size, -1.0)
-    drive = rows.running()
-    if stage not in ("velocity", "current"):
-        drive.command(size)
-    drive.begin()
-    return drive
+    point = {"velocity": "w_ref", "current": "i_ref"}.get(stage)
+    if point is not None:
+        rows.step(point, size, -1.0)
+    return rows.running().begin(size if point is None else None)
 
 
 def _gain(design: Design, stage: str) -> float:
@@ -146,9 +143,8 @@ def _windup(pair: Pair, stage: str) -> Iterator[Row]:
         extra = 0.0
         if isinstance(model, CurrentLoop):
             extra = model.resistance_feedforward * (pair.model.effective_motor.resistance_ohm or 0.0) * asked
-        wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * (
-            limit - gain * asked - integral - extra
-        )
+        over = limit - gain * asked - integral - extra
+        wanted = integral + T / (model.tracking_time_s or model.integral_time_s) * over
     yield judged(f"{stage}_anti_windup", "drive", wanted, found, WITHIN * max(limit, abs(wanted)),
                  unit=unit, condition=f"integral after one update at {OVER:g} times the limit")  # fmt: skip
 
@@ -204,9 +200,8 @@ def _supply(pair: Pair) -> Iterator[Row]:
     yield pair.judged("bus_voltage", wanted, bus(braking), "V", f"{-braking:.4g} A fed back")
     if supply.brake_voltage_V is not None:
         drive.change("brake_voltage", own.brake_voltage_V or inf)
-        yield pair.judged(
-            "brake_voltage", supply.brake_voltage_V, bus(1e3 * braking), "V", "fed back at once"
-        )
+        found = bus(1e3 * braking)
+        yield pair.judged("brake_voltage", supply.brake_voltage_V, found, "V", "fed back at once")
 
 
 def _resolution(pair: Pair) -> Iterator[Row]:
@@ -216,9 +211,7 @@ def _resolution(pair: Pair) -> Iterator[Row]:
     if current is None or current.law is not None or not (wanted and own):
         return
     rows = pair.rows(instruments=Instruments(current_resolution_A=own))
-    drive = rows.running()
-    drive.begin(CURRENT=1.6 * wanted)
+    drive = rows.running().begin(CURRENT=1.6 * wanted)
     gain = rows.value("current_gain") + rows.value("current_integral")
-    yield pair.judged(
-        "current_resolution", wanted, -0.5 * drive.value("VOLTAGE_BEFORE") / gain, "A", "1.6 steps"
-    )
+    found = -0.5 * drive.value("VOLTAGE_BEFORE") / gain
+    yield pair.judged("current_resolution", wanted, found, "A", "1.6 steps")

@@ -5,35 +5,28 @@ supply, which are no part of a loop.  The linear writing may be that of another 
 one shows what a validation sees.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import inf, isfinite
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
-from actuator_lti.loops import assemble_loops, exact_margins, periodic_loop
+from actuator_lti.loops import Loop, Loops, assemble_loops, exact_margins, periodic_loop
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.limiters import LimiterPath, limiter_places
+from actuator_lti.loops.limiters import Place as LimiterPlace
 from actuator_lti.types import Complexes
 from analyses.linear.loop_figures import LoopFigures, loop_figures
 from analyses.validation.small_signal import Place
-from nonlinear import tangent
+from nonlinear import Tangent, tangent
 from nonlinear.bench.derivative import tangents
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.loop_setup import PATHS, LoopSetup, loop_setup
 from nonlinear.bench.operating_motion import may_stand, on_its_stand, on_the_bench, standing
-
-if TYPE_CHECKING:
-    from actuator_lti.drive.operating import Operating
-    from actuator_lti.loops import Loop, Loops
-    from actuator_lti.loops.limiters import Place as LimiterPlace
-    from nonlinear import Tangent
 
 
 @dataclass(frozen=True)
@@ -132,8 +125,8 @@ class Bench:
             )  # fmt: skip
         loops = self.loops(name)
         if name in PATHS:
-            response, poles = self._path(name, loops)
-            return Place(name=name, condition=setup.condition, tangent=found, predicted=response, poles=poles)
+            predicted = self._path(name, loops)
+            return Place(name=name, condition=setup.condition, tangent=found, predicted=predicted)
         return self._point(name, setup, found, loops)
 
     def _tangent(self, name: str, setup: LoopSetup) -> Tangent:
@@ -158,7 +151,7 @@ class Bench:
             path = loops.limiters[limiter.limiter.name]
             yield Place(
                 name="command", condition=setup.condition, tangent=found,
-                predicted=partial(self._last, path, found.hold_s, k), poles=np.empty(0, complex),
+                predicted=partial(self._last, path, found.hold_s, k),
                 quantity=name if seen.signal == limiter.signals[0] else f"{name}_integral",
             )  # fmt: skip
 
@@ -184,17 +177,16 @@ class Bench:
         """The row of a limiter's path at its last update."""
         return np.asarray(path.responses(np.angle(z) / hold_s)[k], dtype=complex)
 
-    def _path(self, name: str, loops: Loops) -> tuple[Callable[[Complexes], Complexes], Complexes]:
-        """Response of the output to command or load, and no poles: those of the loops are its own."""
-        none = np.empty(0, complex)
+    def _path(self, name: str, loops: Loops) -> Callable[[Complexes], Complexes]:
+        """Response of the output to command or load; its poles are those of the loops."""
         if name == "load":
             assert loops.moment_system is not None
-            return loops.moment_system(), none
+            return loops.moment_system()
         plain = loops.plain_response
         assert plain is not None
         # the reference of a speed drive is the motor's
         geared = self.linear.total_ratio if self.linear.controller.outermost == "velocity" else 1.0
-        return (lambda z: np.asarray(geared * plain(z), dtype=complex)), none
+        return lambda z: np.asarray(geared * plain(z), dtype=complex)
 
     def _point(self, name: str, setup: LoopSetup, found: Tangent, loops: Loops) -> Place:
         """A break point with all loops closed."""
@@ -225,6 +217,5 @@ def _later(design: Design, more_s: float) -> Design:
 
 def _faint(bench: Design, design: Design) -> Design:
     """With the filter of the command; a faint one does not reach its rates."""
-    return replace(
-        bench, command=replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
-    )
+    faint = replace(design.command, rate_rad_s=inf, acceleration_rad_s2=inf, jerk_rad_s3=inf)
+    return replace(bench, command=faint)

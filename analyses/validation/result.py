@@ -1,27 +1,22 @@
 """What a validation finds."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
+from analyses.friction_effects import FrictionEffects
 from analyses.large_signal.conditional import Conditional
 from analyses.large_signal.from_rest import AmplitudeMargin, RestSweep
+from analyses.large_signal.result import LargeSignals
 from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
 from analyses.motion.settling import Settling, ending_of, noticed, verdict_of, waiver_of_rest
+from analyses.specification import Specification
 from analyses.validation.bench_sweep import BenchSweep
 from analyses.validation.in_time import MarginShown, StepShown
 from analyses.validation.row import Row
-
-if TYPE_CHECKING:
-    from analyses.friction_effects import FrictionEffects
-    from analyses.large_signal.result import LargeSignals
-    from analyses.specification import Specification
 
 REST = {
     Verdict.MET: "",

@@ -14,11 +14,11 @@ pole moves with K says on which side of the circle it lies at K (1 - 1e-6) and a
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import degrees, pi
 
 import numpy as np
-import numpy.typing as npt
+from scipy.linalg import eig
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.loops import ExactMargins
@@ -45,7 +45,7 @@ class Place:
 
     ``condition``: the motion that it is tested on, in words.
     ``predicted``: T at points z of the place's own rate, by the linear writing.
-    ``poles``: closed-loop poles over one base period, by the linear writing.
+    ``poles``: closed-loop poles over one base period, by the linear writing; of a loop or a break point.
     ``figures``: of a loop; its margins are judged where it is not periodic.
     ``exact``: of a break point with all loops closed.
     ``critical``: eigenvalues over one base period at a gain, by the linear writing.
@@ -58,7 +58,7 @@ class Place:
     condition: str
     tangent: Tangent
     predicted: Callable[[Complexes], Complexes]
-    poles: Complexes
+    poles: Complexes = field(default_factory=lambda: np.empty(0, complex))
     figures: LoopFigures | None = None
     exact: ExactMargins | None = None
     critical: Callable[[float], Complexes] | None = None
@@ -69,6 +69,14 @@ class Place:
     def within(self) -> float:
         """Relative difference that is agreement, by the error stated of the whole response."""
         return max(WITHIN, SURE * self.tangent.stated_error)
+
+    def repeats(self, other: "Place | None") -> bool:
+        """Whether the same loop is seen here, in both writings."""
+        if other is None or self.tangent.hold_s != other.tangent.hold_s:
+            return False
+        z = np.exp(1j * GRID)
+        pairs = ((self.predicted, other.predicted), (self.tangent.closed, other.tangent.closed))
+        return all(np.max(relative(here(z), there(z))) <= WITHIN for here, there in pairs)
 
     def within_at(self, angle: float) -> float:
         """The same of the response at an angle a sample: a faint or a sharp part is known less well."""
@@ -177,8 +185,6 @@ class _Crossing:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
     """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
-    from scipy.linalg import eig
-
     if angle < LEAST_ANGLE:
         return _crossing_at_rest(t, gain)
 
@@ -245,7 +251,7 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
 
     ``outward``: 1 where the pole leaves the circle with rising gain, -1 with falling; None: not said.
     """
-    t, scale = place.tangent, ratio * _lever(ratio)
+    t, scale = place.tangent, max(ratio, abs(ratio - 1.0))  # what T = -1/(K - 1) moves K by, at least K
     found = _crossing(t, ratio, angle)
     if found is None:
         return place.judged(name, ratio, None, place.within, scale, "1", "no closed-loop pole crosses there")
@@ -264,11 +270,6 @@ def _gain_row(place: Place, name: str, ratio: float, angle: float, outward: int 
     if outward is not None and row.error < 0.1 * BESIDE * ratio and outward * side < 0.0:
         return replace(row, verdict=Verdict.NOT_MET, because=f"{words}: it crosses the other way")
     return row
-
-
-def _lever(ratio: float) -> float:
-    """What a relative change of T makes of a gain margin K, where T = -1/(K - 1), at least 1."""
-    return max(1.0, abs(ratio - 1.0) / ratio)
 
 
 def _exact_margins(place: Place, exact: ExactMargins) -> Iterator[Row]:
@@ -351,9 +352,7 @@ def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
         yield place.judged(name, value, seen, place.within_at(at * t.hold_s), DB * max(lever, 1.0), "dB")
 
 
-def _fall(
-    place: Place, name: str, at: float | None, off: Callable[[Complexes], npt.NDArray[np.float64]]
-) -> Iterator[Row]:
+def _fall(place: Place, name: str, at: float | None, off: Callable[[Complexes], Floats]) -> Iterator[Row]:
     """The frequency at which ``off`` of T is zero, by one Newton step from the predicted one."""
     hold = place.tangent.hold_s
     if at is None or not 0.0 < at * hold < pi:

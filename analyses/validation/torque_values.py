@@ -91,9 +91,7 @@ def _inertias(design: Design, model: Design) -> Iterator[Row]:
     rows["coupling_damping"], rows["half_play"] = 0.0, 1e9
     torque = design.inertia_kgm2
     rows["load"] = design.load_side_inertia_kgm2 * design.ratio_behind_coupling if design.coupling else 0.0
-    drive = rows.running()
-    drive.command(torque)
-    drive.begin()
+    drive = rows.running().begin(torque)
     Ts = design.controller.period_s
     unit = "kg" if design.axis == "linear" else "kg*m^2"
     pairs = [("inertia", model.inertia_kgm2, torque * Ts / drive.value("SPEED"))]
@@ -160,9 +158,7 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     elastic = design.coupling is not None
     rows["load"], rows["speed_start"], rows["load_speed_start"] = load, speed, speed / N_c
     rows["twist_start"], rows["angle_start"] = motion.twist_rad, N_c * motion.twist_rad
-    drive = rows.running()
-    drive.command(wanted.torque_Nm)
-    drive.begin()
+    drive = rows.running().begin(wanted.torque_Nm)
     unit = torque_unit(design)
     condition = f"at {speed:.4g} {'m/s' if unit == 'N' else 'rad/s'} under {load:g} {unit}"
     J = design.motor_side_inertia_kgm2 if elastic else design.inertia_kgm2
@@ -170,11 +166,9 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     floor, behind = ULPS * J * unbalanced * float(np.spacing(abs(speed))) / Ts + _weight_rounding(model), 0.0
     if design.coupling is not None:
         W, coupling = abs(speed) / N_c, design.coupling
-        stretch = float(np.spacing(max(abs(motion.twist_rad), Ts * W)))
-        behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * float(
-            np.spacing(W)
-        )
-        behind = ULPS * (behind + design.load_side_inertia_kgm2 * float(np.spacing(W)) / Ts)
+        stretch, ulp = float(np.spacing(max(abs(motion.twist_rad), Ts * W))), float(np.spacing(W))
+        behind = coupling.stiffness_at(motion.twist_rad) * stretch + coupling.damping_Nms_rad * ulp
+        behind = ULPS * (behind + design.load_side_inertia_kgm2 * ulp / Ts)
         floor += behind / N_c
     found = wanted.torque_Nm - J * (drive.value("SPEED") - speed) / Ts
     allowed = WITHIN * abs(wanted.torque_Nm) + EXACT * wanted.largest_Nm + floor
@@ -217,8 +211,7 @@ def _breakaways(design: Design, model: Design) -> Iterator[Row]:
             wanted = middle + side * held
 
             def moves(torque: float, drive: Running = drive, side: int = side) -> bool:
-                drive.command(torque)
-                drive.begin()
+                drive.begin(torque)
                 turned = drive.value("ANGLE") - drive.start_value("ANGLE")  # it may stand again by now
                 return drive.value("SPEED") * side > 0.0 or turned * side > 0.0
 

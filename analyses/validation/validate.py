@@ -3,29 +3,29 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from os import PathLike
 from typing import Any, TypeVar
 
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.design.loader import as_design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
+from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.types import Progress
 from analyses.friction_effects import friction_effects
 from analyses.isolation import attempt
-from analyses.large_signal.conditional import Conditional, conditional_stability
+from analyses.large_signal.conditional import conditional_stability
 from analyses.large_signal.from_rest import RestSweep, free_amplitude, margins_by_amplitude, sweep_from_rest
 from analyses.large_signal.result import large_signals
 from analyses.large_signal.tones import settling_ticks_of
-from analyses.limit_cycles.counts import Counts, counts_of
-from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
-from analyses.motion.settling import Settling, settlings_of
+from analyses.limit_cycles.counts import counts_of
+from analyses.linear.loop_figures import all_loop_figures, loop_figures
+from analyses.motion.settling import settlings_of
 from analyses.specification import specification
 from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
@@ -45,35 +45,21 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: Design | str | PathLike[str],
+    design: AnyDesign,
     settings: Settings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     model: Design | None = None,
 ) -> Validation:
     """Check every prediction of a design by the nonlinear simulator.
 
-    Parameters
-    ----------
-    design : Design
-    settings : Settings, optional
-        Which findings are looked for beside the checks; by default all.
-    progress : callable, optional
-        Called with (parts done, parts in all).
-    model : Design, optional
-        The drive that predictions are made of, by default the same: a wrong one shows what a validation sees.
+    ``settings``: which findings are looked for beside the checks; by default all.
+    ``progress``: called with (parts done, parts in all).
+    ``model``: drive that predictions are made of, by default the same: a wrong one shows what a validation
+    sees.
 
-    Returns
-    -------
-    Validation
-        ``rows`` are the checks; ``verdict`` and ``passed`` sum them up with what the drive itself does.
-
-    Raises
-    ------
-    InputError
-        If the design cannot be tested (no steady motion: dry friction takes the whole current, say).
-    NumericalError
-        From the computations.
+    Raises `InputError`: if the design cannot be tested (no steady motion: dry friction takes the whole
+    current, say). Raises `NumericalError`: from the computations.
 
     Examples
     --------
@@ -94,7 +80,7 @@ class _Work:
     design: Design
     settings: Settings
     bench: Bench
-    progress: Progress | None
+    progress: Progress
     notes: list[str] = field(default_factory=list)
     done: int = 0
 
@@ -117,24 +103,30 @@ class _Work:
         values = partial(design_value_rows, self.design, self.bench.model)
         rows += self._part("numbers of the design", values, [])
         self._step()
+        design, bench, settings = self.design, self.bench, self.settings
+        settled = self._asked("rest after a step", whole, lambda: settlings_of(design, bench.commanded), ())
         return Validation(
-            design=self.design,
+            design=design,
             rows=tuple(rows),
-            figures=self.bench.figures,
+            figures=bench.figures,
             loops=loops,
             steps=steps,
             margins=margins,
-            sweeps=self._each("injected sweep", swept, lambda n: bench_sweep(self.bench, places[n])),
-            amplitude_margins=self._asked(
-                "margins by amplitude", bool(stable), lambda: tuple(margins_by_amplitude(self.bench)), ()
-            ),
-            conditional=self._asked("conditional stability", whole, self._conditional, None),
-            settlings=self._asked("rest after a step", whole, lambda: self._settled, ()),
+            sweeps=self._each("injected sweep", swept, lambda n: bench_sweep(bench, places[n])),
+            amplitude_margins=self._asked("margins by amplitude", bool(stable),
+                lambda: tuple(margins_by_amplitude(bench)), ()),
+            conditional=self._asked("conditional stability", whole,
+                lambda: conditional_stability(design, bench.commanded), None),
+            settlings=settled,
             rest_sweep=self._asked("motion from rest", whole, self._rest, None),
-            counts=self._asked("motion from rest", whole, self._counts, ()),
-            large_signals=self._asked("large signals", whole, self._large, None),
-            friction=self._asked("friction effects", whole, self._friction, None),
-            specification=self._asked("specification", whole, self._specification, None),
+            counts=self._asked("motion from rest", whole,
+                lambda: counts_of(design, bench.commanded, self._settle()), ()),
+            large_signals=self._asked("large signals", whole,
+                lambda: large_signals(design, self._whole, counts=settings.map_counts), None),
+            friction=self._asked("friction effects", whole,
+                lambda: friction_effects(design, bench.commanded, settlings=settled), None),
+            specification=self._asked("specification", whole,
+                lambda: specification(design, bench.commanded), None),
             held_by_friction=self._held_by_friction(),
             notes=tuple(dict.fromkeys(self.notes)),
         )  # fmt: skip
@@ -169,8 +161,8 @@ class _Work:
         return made
 
     def _small_signals(self) -> tuple[list[Row], dict[str, Place]]:
-        """Rows of every place, and the places."""
-        rows: list[Row] = []
+        """Rows of every place, and the places; a break point of the outermost loop is this loop again."""
+        rows, outermost = list[Row](), self.design.controller.outermost
         places: dict[str, Place] = {}
         self.bench.setup(self.bench.names[0])  # a drive without an operating motion cannot be tested
         for name in self.bench.names:
@@ -180,6 +172,8 @@ class _Work:
                 continue
             places[name] = place
             made = self._part(f"checks at {name}", partial(small_signal, place), None)
+            if made is not None and name in wire(self.design).points and place.repeats(places.get(outermost)):
+                made = [row for row in made if row.name == "delay_margin"]  # that a loop does not have
             rows += [_unproven(name, self.notes)] if made is None else made
             self._step()
         onsets = self._part("checks at onsets", self._onsets, None)
@@ -214,15 +208,10 @@ class _Work:
         closed = self.bench.commanded.present["position"].plain_closed
         return settling_ticks_of(closed, self.bench.setup("position").hold_ticks, self.design.name)
 
-    @cached_property
-    def _commanded(self) -> LoopFigures:
-        """Figures of the response to the command, with feed-forward and filters."""
-        mean = command_mean(self.bench.model)
-        return loop_figures(self._whole.present["position"], self._whole.plain_response, mean=mean)
-
     def _rest(self) -> RestSweep | None:
-        """Sines from rest."""
-        design, band = self.design, self._commanded.bandwidth
+        """Sines from rest, about the bandwidth of the response to the command, feed-forward included."""
+        design, mean = self.design, command_mean(self.bench.model)
+        band = loop_figures(self._whole.present["position"], self._whole.plain_response, mean=mean).bandwidth
         if band is None or not self.bench.commanded.limiters:
             return None
         marks = [x for x in (band.minus3db_hz, band.minus90deg_hz) if x]
@@ -234,29 +223,8 @@ class _Work:
         amplitude = free_amplitude(design, self._whole, asked, min(design.validation.amplitude_fractions))
         return sweep_from_rest(design, asked, amplitude, self._settle(), described=rubs(design))
 
-    @cached_property
-    def _settled(self) -> tuple[Settling, ...]:
-        return settlings_of(self.design, self.bench.commanded)
-
-    def _conditional(self) -> Conditional:
-        return conditional_stability(self.design, self.bench.commanded, self._settle())
-
-    def _counts(self) -> tuple[Counts, ...]:
-        return counts_of(self.design, self.bench.commanded, self._settle())
-
-    def _large(self) -> Any:
-        return large_signals(self.design, self._whole, counts=self.settings.map_counts)
-
-    def _friction(self) -> Any:
-        return friction_effects(self.design, self.bench.commanded, settlings=self._settled)
-
-    def _specification(self) -> Any:
-        return specification(self.design, self.bench.commanded)
-
 
 def _unproven(name: str, notes: list[str]) -> Row:
     """The row of a place at which nothing could be measured."""
-    because = next(
-        (note for note in reversed(notes) if f"at {name}:" in note), "it failed, see what is missing"
-    )
-    return Row(name="response", loop=name, verdict=Verdict.NOT_PROVEN, because=because)
+    told = [note for note in notes if f"at {name}:" in note] or ["it failed, see what is missing"]
+    return Row(name="response", loop=name, verdict=Verdict.NOT_PROVEN, because=told[-1])

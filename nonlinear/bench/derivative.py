@@ -19,14 +19,12 @@ not.  It shares no code with the linear loops, so the two may be held against ea
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from os import PathLike
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.loader import AnyDesign, as_design
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
 from nonlinear.bench.lifted import (
@@ -46,24 +44,16 @@ from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 class Tangent:
     """Linear model of the running drive from an injection at a place to what comes back there.
 
-    Attributes
-    ----------
-    place : str
-        A stage (outer loops open), a break point (all loops closed), ``"command"`` or ``"load"``.
-    A, B, C, D : ndarray, shapes (n, n), (n, M), (M, n), (M, M)
-        Over one base period. The M inputs are the values held one after the other at the place, the M outputs
-        what comes back at its updates, negated: the closed loop T = L/(1 + L). To command and load:
-        the output's answer.
-    period_s, hold_s : float
-        Base period, and time between two updates at the place.
-    states : tuple of str
-        Names of the numbers of the state that the injection moves, as the layout has them.
-    stated_error : float
-        Largest error of the response, relative, by what two step sizes differ in.
-    entry_errors : ndarray, shape (n + M, n + M)
-        The same of the entries of A over C beside B over D; see `error_at`.
-    places : ndarray of int, shape (n,)
-        Where the states lie in the row of the state.
+    ``place``: a stage (outer loops open), a break point (all loops closed), ``"command"`` or ``"load"``.
+    ``A, B, C, D``, shapes (n, n), (n, M), (M, n), (M, M): over one base period. The M inputs are the values
+    held one after the other at the place, the M outputs what comes back at its updates, negated: the closed
+    loop T = L/(1 + L). To command and load: the output's answer.
+    ``period_s, hold_s``: base period, and time between two updates at the place.
+    ``states``: names of the numbers of the state that the injection moves, as the layout has them.
+    ``stated_error``: largest error of the response, relative, by what two step sizes differ in.
+    ``entry_errors``, shape (n + M, n + M): the same of the entries of A over C beside B over D; see
+    `error_at`.
+    ``places``, shape (n,): where the states lie in the row of the state.
     """
 
     place: str
@@ -150,40 +140,18 @@ class Tangent:
         )
 
 
-def tangent(
-    design: Design | str | PathLike[str],
-    place: str,
-    *,
-    setup: LoopSetup | None = None,
-    hold: bool = True,
-) -> Tangent:
+def tangent(design: AnyDesign, place: str, *, setup: LoopSetup | None = None, hold: bool = True) -> Tangent:
     """Measure the derivative of the running drive.
 
-    Parameters
-    ----------
-    design : Design, str or path
-    place : str
-        ``"current"``, ``"velocity"``, ``"position"``: the loop of a stage, outer loops open.  ``"u"``,
-        ``"i_ref"``, ``"w_ref"``, ``"output"``: the loop seen there, all loops closed.  ``"command"`` and
-        ``"load"``: from the command, from the moment on the output shaft, to the output.
-    setup : LoopSetup, optional
-        Operating motion and test set-up; by default `nonlinear.bench.loop_setup.loop_setup` chooses one.
-    hold : bool
-        Whether the rotor is locked for the current loop, as on a bench.
+    ``place``: ``"current"``, ``"velocity"``, ``"position"``: the loop of a stage, outer loops open.
+    ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``: the loop seen there, all loops closed.  ``"command"`` and
+    ``"load"``: from the command, from the moment on the output shaft, to the output.
+    ``setup``: operating motion and test set-up; by default `nonlinear.bench.loop_setup.loop_setup` chooses.
+    ``hold``: whether the rotor is locked for the current loop, as on a bench.
 
-    Returns
-    -------
-    Tangent
+    Raises `InputError`: if the design has no such place or no operating motion; `NumericalError`: if no step
+    is free of events.
 
-    Raises
-    ------
-    InputError
-        If the design has no such place or no operating motion.
-    NumericalError
-        If no step is free of events.
-
-    Notes
-    -----
     Limits, counts, noise and supply are out of the test set-up; friction acts as the operating motion has it.
 
     Examples

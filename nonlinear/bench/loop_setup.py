@@ -233,10 +233,7 @@ def loop_setup(design: Design, loop: str, *, limits_on: bool = True, held: bool 
     A position controller with an integral or a derivative part cannot be started in the steady state of a
     ramp: then the drive stands, where it has no slope of its own about rest.
 
-    Raises
-    ------
-    InputError
-        If the design has no such loop or break point, or has no operating motion.
+    Raises `InputError`: if the design has no such loop or break point, or has no operating motion.
     """
     wired = wire(design)
     known = (*wired.stages, *wired.points, *PATHS)

@@ -18,22 +18,15 @@ Point = Literal["u", "i_ref", "w_ref", "output"]
 class Probe:
     """Break point of a loop: ``after = gain * delayed(before) + injection``, held to the stage's limit.
 
-    Parameters
-    ----------
-    point : {"u", "i_ref", "w_ref", "output"}
-        Voltage (V), current command (A), speed command (rad/s, motor), or the measured output angle
-        (rad at the output shaft) on its way to the position controller.
-    injection : Command or array, optional
-        Signal added, in the unit of the point; an array has one value a tick.
-    gain : float
-        Factor on the loop gain.
-    delay_samples : float
-        Extra delay in samples of the rate at which the point is updated: the base tick at ``u`` behind a
-        current loop, n_v ticks at ``i_ref``, n_p ticks at ``w_ref`` and ``output``.  A whole number is
-        exact; a fraction goes through a Lagrange interpolator of 2, 4 or 6 samples (`fractional_delay`).
+    ``point``: voltage ``"u"`` (V), current command ``"i_ref"`` (A), speed command ``"w_ref"`` (rad/s, motor),
+    or the measured output angle ``"output"`` (rad at the output shaft) on its way to the position controller.
+    ``injection``: signal added, in the unit of the point; an array has one value a tick.
+    ``gain``: factor on the loop gain.
+    ``delay_samples``: extra delay in samples of the rate at which the point is updated: the base tick at
+    ``u`` behind a current loop, n_v ticks at ``i_ref``, n_p ticks at ``w_ref`` and ``output``.  A whole
+    number is exact; a fraction goes through a Lagrange interpolator of 2, 4 or 6 samples
+    (`fractional_delay`).
 
-    Notes
-    -----
     The sign of the loop lies elsewhere, so with all other commands at rest ``before = -L after`` with L the
     open loop seen at the point, and ``-before/injection`` is L/(1 + L).
     """

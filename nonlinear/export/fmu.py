@@ -39,24 +39,13 @@ def fmu_bytes(
 ) -> bytes:
     """The unit as one file; the same input gives the same bytes with the same compilers.
 
-    Parameters
-    ----------
-    design : Design
-    version : {2, 3}
-        Of FMI.
-    platforms : sequence of {"linux64", "win64"}
-        Binaries to compile; ziglang's compiler is needed for those of another system.
-    documents : mapping of str to bytes
-        Files of the documentation folder, by name.
-    picture : bytes, optional
-        PNG of the model: ``model.png`` (FMI 2.0), ``documentation/diagram.png`` (FMI 3.0).
-    tool : str
-        Name and version for the model description.
+    ``version``: of FMI, 2 or 3.
+    ``platforms``: binaries to compile; ziglang's compiler is needed for those of another system.
+    ``documents``: files of the documentation folder, by name.
+    ``picture``: PNG of the model: ``model.png`` (FMI 2.0), ``documentation/diagram.png`` (FMI 3.0).
+    ``tool``: name and version for the model description.
 
-    Raises
-    ------
-    InputError
-        For an unknown version or platform, or without a compiler.
+    Raises `InputError`: for an unknown version or platform, or without a compiler.
     """
     refuse_unknown(version, platforms)
     trace = trace_keys(design)

@@ -100,10 +100,7 @@ def sources_hash() -> str:
 def build_wasm() -> bytes:
     """Compile the module with ziglang.
 
-    Raises
-    ------
-    InputError
-        Without ziglang.
+    Raises `InputError`: without ziglang.
     """
     return compile_files(sources(), _NAME, "wasm", _FLAGS)
 

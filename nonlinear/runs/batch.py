@@ -27,22 +27,14 @@ CHUNK_TICKS = 2_000_000  # ticks one thread does between two looks at the queue
 
 
 def simulate_many(
-    runs: Sequence[Run], *, threads: int | None = None, progress: Progress | None = None
+    runs: Sequence[Run], *, threads: int | None = None, progress: Progress = None
 ) -> BatchResult:
     """Simulate many runs, each with its own design, command and reducers.
 
-    Parameters
-    ----------
-    runs : sequence of Run
-    threads : int, optional
-        Default: the cores this process may use.
-    progress : callable, optional
-        Called as ``progress(runs done, runs in all)``.
+    ``threads``: by default the cores this process may use.
+    ``progress``: called as ``progress(runs done, runs in all)``.
 
-    Returns
-    -------
-    BatchResult
-        One entry a run, in order.  Runs that failed have a status that is not 0; look at it.
+    The result has one entry a run, in order.  Runs that failed have a status that is not 0; look at it.
 
     Examples
     --------
@@ -67,17 +59,14 @@ def run_rows(
     tables: Floats | None = None,
     *,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     drives: Sequence[Running] | None = None,
 ) -> BatchResult:
     """Run parameter rows, shape (n, layout.SIZE), of `nonlinear.rows.Rows`.
 
     Each of ``drives``, one a row, goes on from where it is to the row's number of ticks.
 
-    Raises
-    ------
-    TooManyTicks
-        If the runs have more ticks than can be computed in a reasonable time.
+    Raises `TooManyTicks`: if the runs have more ticks than can be computed in a reasonable time.
     """
     rows = np.ascontiguousarray(rows, dtype=float)
     ticks = float(rows[:, at.TICKS].sum())

@@ -16,10 +16,7 @@ def read_columns(
 ) -> list[Floats]:
     """Read columns, by header name or number, of a CSV file whose first line is a header.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column is missing, or a cell is not a number.
+    Raises `InputError`: if the file cannot be read, a column is missing, or a cell is not a number.
     """
     where = shown_path(path)
     text = decode(read_bytes(path, "CSV file", TABLE_BYTES), where)

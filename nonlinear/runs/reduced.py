@@ -20,12 +20,8 @@ def whole_periods(
 ) -> tuple[float, int, int]:
     """Frequency next to the one asked for, of which a whole number of periods fills whole ticks.
 
-    Returns
-    -------
-    frequency_hz : float
-        Off by at most half a tick over the window: 0.13 % with 400 ticks.
-    ticks, cycles : int
-        The window.
+    It is off by at most half a tick over the window, 0.13 % with 400 ticks; behind it ticks and periods of
+    that.
 
     Examples
     --------
@@ -55,14 +51,9 @@ class BatchResult:
     ``motor_speed_rad_s``, ``current_A``, ``voltage_V``, ``current_command_A``, ``speed_command_rad_s`` and
     ``probe_<point>_before``, ``probe_<point>_after``.  ``last = 0`` is the last window, 1 the one before.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (n, layout.SIZE)
-        Parameters.
-    outs : ndarray, shape (n, layout.OUT_SIZE)
-        The kernel's numbers.
-    status : ndarray of int, shape (n,)
-        0: done; otherwise ``layout.TOO_MANY_EVENTS``, ``NOT_FINITE``.
+    ``rows``, shape (n, layout.SIZE): parameters.
+    ``outs``, shape (n, layout.OUT_SIZE): the kernel's numbers.
+    ``status``, shape (n,): 0: done; otherwise ``layout.TOO_MANY_EVENTS``, ``NOT_FINITE``.
     """
 
     rows: Floats

@@ -135,12 +135,15 @@ class Running:
         self.p[at.TICKS] = self.s[at.S_TICK] + ticks
         self._tick()
 
-    def begin(self, **state: float) -> None:
-        """Run one tick from the start with some numbers of the state replaced, by their names."""
+    def begin(self, command: float | None = None, **state: float) -> Running:
+        """Run one tick from the start under a command, some numbers of the state replaced, by their names."""
+        if command is not None:
+            self.command(command)
         self.s[:] = self.start
         for name, value in state.items():
             self.s[_place(name)] = value
         self.run(1)
+        return self
 
     def each(self, states: Floats, ticks: int, place: int, values: Floats) -> None:
         """Run every row of ``states`` so many ticks on, with its own value of one parameter at ``place``."""

@@ -55,19 +55,12 @@ class Tables:
 class Reducers:
     """What to keep of a run beside final state, limit use and events.
 
-    Parameters
-    ----------
-    window_ticks, cycles : int
-        Length of the last window (and the one before it) in ticks, and whole periods of the fundamental in
-        it (see `nonlinear.runs.reduced.whole_periods`); 0: no windows.
-    harmonics : int
-        Harmonics correlated in the windows, 0 to 9.
-    extremes : bool
-        Minimum and maximum of every signal over the whole run.
-    step_target_rad : float
-        Output angle that a step asks for; gives rise, peak and settling. 0: none.
-    step_band : float
-        Settling band, relative to the target.
+    ``window_ticks, cycles``: length of the last window (and the one before it) in ticks, and whole periods of
+    the fundamental in it (see `nonlinear.runs.reduced.whole_periods`); 0: no windows.
+    ``harmonics``: correlated in the windows, 0 to 9.
+    ``extremes``: minimum and maximum of every signal over the whole run.
+    ``step_target_rad``: output angle that a step asks for; gives rise, peak and settling. 0: none.
+    ``step_band``: settling band, relative to the target.
     """
 
     window_ticks: int = 0

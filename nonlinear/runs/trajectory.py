@@ -163,38 +163,24 @@ class Trajectory:
     ``speed_command_rad_s`` are held between their updates and zero where the design has no such stage; the
     current of an ideal torque source is zero.  On a linear axis read m for rad, N for N m.
 
-    Attributes
-    ----------
-    stage : str
-        The outermost stage, which takes the command: ``reference_rad`` is in its unit (rad or rad/s at the
-        output, A, V).
-    ratio : float
-        Motor over output.
-    row_period_s : float
-        From one row to the next.
-    limit_flags : ndarray of uint16
-        Bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at rest, 32
-        limit in front of the torque filters, 64 overload protection, 128 profile of the command.
-    limits : mapping
-        `LimitUse` by name: speed, acceleration, current, voltage; torque-command, overload and profile where
-        the design has them.
-    events : int
-        Landings, breakaways and reversals; ``events_per_tick`` is the most in one tick.
-    stick_fraction : float
-        Fraction of the ticks that began at rest.
-    energy : Energy or None
-        If asked for.
-    final : State
-        State after the last tick.
-    output_speed_rad_s, twist_rad, coupling_torque_Nm : ndarray or None
-        Of an elastic drive: speed of the output shaft, twist delta and torque T_s at the coupling's shaft.
-    load_Nm : ndarray or None
-        Moment on the output shaft, all of it; ``None`` where there is none.
-    parameters_hash : str
-        SHA-256 of the kernel's parameters.
-    running : Running or None
-        The drive as the run left it; at its start, if command and load are constant from there on, so that
-        what it ends in (`nonlinear.settling.rest`) is the same whatever the length of the run.
+    ``stage``: the outermost stage, which takes the command: ``reference_rad`` is in its unit (rad or rad/s at
+    the output, A, V).
+    ``ratio``: motor over output.
+    ``row_period_s``: from one row to the next.
+    ``limit_flags``: bits per row: 1 speed, 2 acceleration, 4 current, 8 voltage limit active, 16 rotor at
+    rest, 32 limit in front of the torque filters, 64 overload protection, 128 profile of the command.
+    ``limits``, by name: speed, acceleration, current, voltage; torque-command, overload and profile where
+    the design has them.
+    ``events``: landings, breakaways and reversals; ``events_per_tick`` is the most in one tick.
+    ``stick_fraction``: fraction of the ticks that began at rest.
+    ``energy``: if asked for.
+    ``final``: state after the last tick.
+    ``output_speed_rad_s, twist_rad, coupling_torque_Nm``: of an elastic drive: speed of the output shaft,
+    twist delta and torque T_s at the coupling's shaft.
+    ``load_Nm``: moment on the output shaft, all of it; ``None`` where there is none.
+    ``parameters_hash``: SHA-256 of the kernel's parameters.
+    ``running``: the drive as the run left it; at its start, if command and load are constant from there on,
+    so that what it ends in (`nonlinear.settling.rest`) is the same whatever the length of the run.
     """
 
     design_name: str

@@ -71,7 +71,6 @@ class Curve:
     every: int = 1
     read: bool = True
     parameter: Numbers | None = None
-    id: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,17 +188,16 @@ class Panel:
 
 @dataclass(kw_only=True)
 class Column:
-    """Panels one below the other; their x axes are one unless said otherwise."""
+    """Panels one below the other; their x axes are one."""
 
     panels: list[Panel]
     heights: Sequence[Share]
     width: Share = 1.0
     title: str = ""
-    shared: bool = True
 
     def written(self) -> Column:
-        """Give what a document has to hold of it: the x axis that panels share stands in the last."""
-        bare = [replace(one, x=Axis()) for one in self.panels[:-1]] if self.shared else self.panels[:-1]
+        """Give what a document has to hold of it: the x axis stands in the last panel."""
+        bare = [replace(one, x=Axis()) for one in self.panels[:-1]]
         return replace(self, panels=bare + self.panels[-1:])
 
 

@@ -45,9 +45,8 @@ def chart_of(data: Mapping[str, Any]) -> Chart:
     if not chart.columns:
         raise InputError("columns: a chart has at least one")
     for column in chart.columns:
-        if column.shared:
-            for panel in column.panels:
-                panel.x = column.panels[-1].x
+        for panel in column.panels:
+            panel.x = column.panels[-1].x
     return chart
 
 

@@ -116,7 +116,6 @@ def _curve(item: Curve, panel: Panel, frame: Frame, pen: Pen, room: Room, key: s
         px, py = (np.repeat(x, 2)[1:], np.repeat(y, 2)[:-1]) if item.stairs else (x, y)
         more = f' class="curve{"" if item.read else " mute"}"{key}'
         more += ' data-stairs="1"' if item.stairs else ""
-        more += f' data-id="{escape(item.id)}"' if item.id else ""
         if item.parameter is not None and pen.page:
             there = item.parameter[np.isfinite(x) & np.isfinite(y)]
             more += f' data-p="{" ".join(f"{v:.5g}" for v in there)}"'

@@ -38,12 +38,7 @@ def frequency(panel: Panel, ends: Sequence[float] | np.ndarray | None = None) ->
 
 
 def bound(
-    panel: Panel,
-    values: Iterable[float | None],
-    *,
-    span: float,
-    top_room: float,
-    marks: Sequence[float] = (),
+    panel: Panel, values: Iterable[float | None], *, span: float, top_room: float, marks: Sequence[float] = ()
 ) -> None:
     """Set the y limits to the values, at most so much below the highest, with some room above.
 

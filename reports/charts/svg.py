@@ -74,7 +74,8 @@ def _columns(chart: Chart, prefix: str, page: bool) -> Iterator[tuple[Column, fl
 
 def _column(column: Column, width: float, height: float, pen: Pen) -> str:
     above = [22.0 if panel.title else 8.0 for panel in column.panels]
-    below = [_below(panel, _hides(column, k)) for k, panel in enumerate(column.panels)]
+    hidden = [True] * (len(column.panels) - 1) + [False]  # x ticks, which stand at the last panel
+    below = [_below(panel, hides) for panel, hides in zip(column.panels, hidden, strict=True)]
     head = 16.0 if column.title else 0.0
     free = height - head - sum(above) - sum(below)
     tall = [free * share / sum(column.heights) for share in column.heights]
@@ -85,13 +86,8 @@ def _column(column: Column, width: float, height: float, pen: Pen) -> str:
         frame = Frame(left, top + above[k], width - GAP, top + above[k] + tall[k])
         if panel.equal:
             _make_equal(panel, frame)
-        parts.append(panel_svg(panel, frame, pen.within(k), hide_x=_hides(column, k)))
+        parts.append(panel_svg(panel, frame, pen.within(k), hide_x=hidden[k]))
     return "".join(parts)
-
-
-def _hides(column: Column, k: int) -> bool:
-    """Whether the x ticks stand at a panel further down."""
-    return k + 1 < len(column.panels) and column.panels[k].x is column.panels[-1].x
 
 
 def _left(panel: Panel, height: float) -> float:

@@ -15,20 +15,9 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.request import OnMachines, Option, flag, is_number, options
 from analyses.studies.study_asked import study_with
 from reports.analyses import Analysis
+from reports.cli import options as common
 from reports.cli.errors import leave_with
-from reports.cli.options import (
-    DEFAULT_DESIGN,
-    DesignArgument,
-    JsonOption,
-    QuietOption,
-    SetOption,
-    folder_for_results,
-    load_drive,
-    read_changes,
-    read_quantity,
-)
-from reports.cli.output import print_json, print_line, print_note, print_warning
-from reports.cli.progress import progress
+from reports.cli.output import print_json, print_line, print_note, print_warning, progress
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
@@ -37,13 +26,11 @@ if TYPE_CHECKING:
 
 DesignOption = Annotated[
     str | None,
-    typer.Option(
-        "--design", metavar="DESIGN", help="Design by name or path (default: what the files name, or emps)."
-    ),
+    typer.Option(metavar="DESIGN", help="Design by name or path (default: what the files name, or emps)."),
 ]
 FolderOption = Annotated[
     Path | None,
-    typer.Option("--out", metavar="DIR", callback=folder_for_results, help="Write page and JSON there."),
+    typer.Option(metavar="DIR", callback=common.folder_for_results, help="Write page and JSON there."),
 ]
 
 StudyArgument = Annotated[
@@ -56,14 +43,14 @@ VariantOption = Annotated[
 
 
 def command(one: Analysis) -> Callable[..., None]:
-    usual = getattr(one.request, "design_of", lambda _given: DEFAULT_DESIGN)
+    usual = getattr(one.request, "design_of", lambda _given: common.DEFAULT_DESIGN)
 
     def run(design: str | None = None, changes: list[str] | None = None, **given: Any) -> None:
         subject: Design | Study | None = None
         if one.study and design is not None:
-            subject = study_with(design, {words: read_changes([words]) for words in changes or ()})
+            subject = study_with(design, {words: common.read_changes([words]) for words in changes or ()})
         elif not one.alone and not one.study:
-            subject = load_drive(usual(given) if design is None else design, changes)
+            subject = common.load_drive(usual(given) if design is None else design, changes)
         answer(one, subject, **given)
 
     parameters = [
@@ -80,21 +67,20 @@ def command(one: Analysis) -> Callable[..., None]:
 def _parameters(one: Analysis) -> dict[str, tuple[Any, Any]]:
     asked = [(name, *each, getattr(one.request, name, None)) for name, each in options(one.request).items()]
     needed = any(option.argument and default is None for _, _, option, default in asked)  # so is a design
-    paged = one.page and not one.alone
     made: dict[str, tuple[Any, Any]] = {}
     if one.study:
         made["design"] = (StudyArgument, None)
     elif hasattr(one.request, "design_of"):
         made["design"] = (DesignOption, None)
     elif not one.alone:
-        made["design"] = (DesignArgument, Parameter.empty if needed else DEFAULT_DESIGN)
+        made["design"] = (common.DesignArgument, Parameter.empty if needed else common.DEFAULT_DESIGN)
     if made:
-        made["changes"] = (VariantOption if one.study else SetOption, None)
+        made["changes"] = (VariantOption if one.study else common.SetOption, None)
     made |= {name: _option(name, kind, option, default) for name, kind, option, default in asked}
-    if paged:
+    if one.page:
         made["out"] = (FolderOption, Path(one.out) if one.out else None)
-    made["as_json"] = (JsonOption, False)
-    made["quiet"] = (QuietOption, False)
+    made["as_json"] = (common.JsonOption, False)
+    made["quiet"] = (common.QuietOption, False)
     if one.example:
         made["example"] = (_example(one), False)
     return made
@@ -126,25 +112,23 @@ def answer(
     from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
     from reports import document as doc
-    from reports.amperes import in_amperes
     from reports.as_json import as_json as plain_data
-    from reports.study_pages import notices
+    from reports.study_pages import in_amperes, notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
-    values: dict[str, Any] = {}
+    values, beyond = dict[str, Any](), list[str]()
     for name, (kind, option) in options(one.request).items():
         of, value = f"--{option.flag or flag(name)}", chosen[name]
         plain = option.kind == "plain" and not is_number(kind)
-        values[name] = value if plain else read_quantity(of, value, option.kind, drive, option.metavar)
+        values[name] = value if plain else common.read_quantity(of, value, option.kind, drive, option.metavar)
+        if option.kind == "load" and values[name]:
+            beyond += beyond_largest(drive, of, values[name])
     if one.written and (as_json or out is not None):
         values[one.written] = True
     asked = one.asked(subject, values)
     for each in asked:
         if isinstance(each, OnMachines) and each.engine.caution:
             print_note(f"actuator-lti: {each.engine.caution}")
-    kinds = {name: option.kind for name, (_, option) in options(one.request).items()}
-    loads = [values[name] for name, kind in kinds.items() if kind == "load" and values[name]]
-    beyond = [line for load in loads for line in beyond_largest(drive, "--load", load)]
     with progress(f"{one.doing} {getattr(subject, 'name', '')}", quiet=quiet) as doing, isolated() as missing:
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
@@ -159,6 +143,8 @@ def answer(
         doc.waived(parts, drive)
     passed = getattr(result, "passed", None)
     passed = passed or getattr(result, "verdict", passed)
+    if passed is not None:
+        parts[bool(missing)]["verdict"] = Verdict.of(passed)
     files = one.shows("write", lambda *_: [])(result, out)
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)
@@ -184,7 +170,7 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 def _print(
     one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
 ) -> None:
-    from reports.amperes import in_amperes
+    from reports.study_pages import in_amperes
     from reports.terminal import print_blocks, print_section, print_verdict
 
     name = getattr(drive, "name", "")

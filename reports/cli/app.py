@@ -1,8 +1,7 @@
-"""All commands of `actuator-lti`; each lives in the module of its name and imports only typer at the top."""
+"""All commands of `actuator-lti`: declared ones, and some apart that import what they need when they run."""
 
 import inspect
 from collections.abc import Callable
-from importlib import import_module
 from math import isfinite
 from typing import Annotated, Any
 
@@ -10,16 +9,18 @@ import typer
 
 from actuator_lti.errors import InputError
 from reports.analyses import ANALYSES, COMMANDS_IN, DESIGNS, EXPORTS, LINEAR, NONLINEAR, RECORDS, STUDIES
-from reports.cli import time_limit
+from reports.cli import objects, report, time_limit
 from reports.cli.analysis import command as declared
 
 _WHOLE_BITS = 63
-# commands that are no declared analysis
-_APART: dict[str, tuple[str, ...]] = {DESIGNS: ("objects",), LINEAR: ("report", "pdf")}
-_APART |= dict.fromkeys((NONLINEAR, RECORDS, EXPORTS, STUDIES), ())
+# commands that are no declared analysis, by panel
+_APART: dict[str, dict[str, Any]] = {
+    DESIGNS: {"objects": objects.app}, LINEAR: {"report": report.report, "pdf": report.pdf}
+}  # fmt: skip
 PANELS = {
-    panel: tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == panel)) + apart
-    for panel, apart in _APART.items()
+    panel: tuple(dict.fromkeys(one.name.split()[0] for one in ANALYSES if one.group == panel))
+    + tuple(_APART.get(panel, ()))
+    for panel in (DESIGNS, LINEAR, NONLINEAR, RECORDS, EXPORTS, STUDIES)
 }
 """Commands in the order in which the help lists them, by the panel that they stand in."""
 
@@ -88,18 +89,17 @@ def options_by_name() -> dict[str, str]:
 
 
 def _register(app: typer.Typer, command: str, panel: str) -> None:
-    """Add a command: those declared, the function of its name, or the typer application `app` of it."""
+    """Add a command: declared, or apart as a function or a typer application; or all declared below it."""
     own = [one for one in ANALYSES if one.name.split()[0] == command]
-    module = None if own else import_module(f"reports.cli.{command}")
-    group: typer.Typer | None = getattr(module, "app", None)
+    made = _APART.get(panel, {}).get(command)
     if command in COMMANDS_IN:
-        group = typer.Typer(help=COMMANDS_IN[command], no_args_is_help=True)
+        made = typer.Typer(help=COMMANDS_IN[command], no_args_is_help=True)
         for one in own:
-            _add(group, one.name.split()[1], declared(one))
-    if group is not None:
-        app.add_typer(group, name=command, rich_help_panel=panel)
+            _add(made, one.name.split()[1], declared(one))
+    if isinstance(made, typer.Typer):
+        app.add_typer(made, name=command, rich_help_panel=panel)
     else:
-        _add(app, command, declared(own[0]) if own else getattr(module, command), panel)
+        _add(app, command, made or declared(own[0]), panel)
 
 
 def _add(app: typer.Typer, name: str, function: Callable[..., Any], panel: str | None = None) -> None:

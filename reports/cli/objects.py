@@ -18,7 +18,7 @@ app = typer.Typer(
     help="Settings in the motion controller's own objects: export and import.", no_args_is_help=True
 )
 
-TargetOption = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="File to write.")]
+TargetOption = Annotated[Path | None, typer.Option(metavar="FILE", help="File to write.")]
 ForceOption = Annotated[bool, typer.Option("--force", help="Overwrite the file if it exists.")]
 PerOption = Annotated[
     str | None,
@@ -38,8 +38,7 @@ def export(
         bool, typer.Option("--complete", help="Also objects that the imported settings did not have.")
     ] = False,
     into: Annotated[
-        Path | None,
-        typer.Option("--into", metavar="XDC", help="Device configuration whose other contents are kept."),
+        Path | None, typer.Option(metavar="XDC", help="Device configuration whose other contents are kept.")
     ] = None,
     force: ForceOption = False,
     as_json: JsonOption = False,

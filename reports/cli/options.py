@@ -35,16 +35,11 @@ def folder_for_results(path: Path | None) -> Path | None:
 
 
 DEFAULT_DESIGN = "ilr33-amber"
-DEFAULT_OUT = Path("out")
 
 DesignArgument = Annotated[
     str, typer.Argument(metavar="DESIGN", help="Name of a shipped design, or path of a design file.")
 ]
 JsonOption = Annotated[bool, typer.Option("--json", help="JSON to standard output, and nothing else there.")]
-OutOption = Annotated[
-    Path,
-    typer.Option("--out", metavar="DIR", help="Folder for the results.", callback=folder_for_results),
-]
 QuietOption = Annotated[bool, typer.Option("--quiet", help="No progress on standard error.")]
 SetOption = Annotated[
     list[str] | None,

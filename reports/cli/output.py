@@ -1,16 +1,21 @@
-"""What commands print: JSON for machines, tables for people, both on standard output."""
+"""What commands print: JSON for machines or tables for people; progress on standard error."""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from reports.visible import DIRECTION
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.progress import Progress as Bar
+
 
 _TURNED = re.compile(f"[{DIRECTION}]")
 _OBEYED = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff{DIRECTION}]")
@@ -74,3 +79,39 @@ def printable(text: str) -> str:
     'a?[31mb?'
     """
     return text if text.isprintable() else _OBEYED.sub("?", text)
+
+
+PATIENCE_S = 0.7
+
+
+@contextmanager
+def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
+    """Give a function ``(done, total)`` that shows a bar on the terminal once the work takes a while.
+
+    Nothing is shown where standard error is no terminal, so that logs stay clean.
+
+    Examples
+    --------
+    >>> with progress("counting") as report:
+    ...     report(1, 1)
+    """
+    shown, started_s = not quiet and sys.stderr.isatty(), time.monotonic()
+    bars: list[Bar] = []
+
+    def report(done: int, total: int) -> None:
+        if not shown or (not bars and time.monotonic() - started_s < PATIENCE_S):
+            return
+        if not bars:
+            from rich.console import Console
+            from rich.progress import Progress
+
+            bars.append(Progress(console=Console(stderr=True), transient=True))
+            bars[0].start()
+            bars[0].add_task(description)
+        bars[0].update(bars[0].task_ids[0], completed=done, total=total)
+
+    try:
+        yield report
+    finally:
+        for bar in bars:
+            bar.stop()

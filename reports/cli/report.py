@@ -1,77 +1,47 @@
-"""`actuator-lti report`: the whole report of a design as one page and one JSON file."""
+"""`actuator-lti report`: the whole report of a design as one page and one JSON file; `pdf` typesets one."""
 
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.errors import InputError
 from reports.analyses import FURTHER
+from reports.cli import options
 from reports.cli.errors import leave_with
-from reports.cli.options import (
-    DEFAULT_DESIGN,
-    DEFAULT_OUT,
-    DesignArgument,
-    JsonOption,
-    OutOption,
-    QuietOption,
-    SetOption,
-    load_drive,
-)
-from reports.cli.output import print_line
-from reports.cli.pdf import SummaryOption
-from reports.cli.progress import progress
+from reports.cli.output import print_json, print_line, progress
 
-IncludeOption = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--include", metavar="JSON", help="Add the sections that identify or correlate wrote (repeatable)."
-    ),
+SummaryOption = Annotated[
+    bool, Option("--summary", help="In the PDF the first screen and one line a section: about four pages.")
 ]
-ValidationOption = Annotated[
-    bool,
-    typer.Option("--validation/--no-validation", help="Check every linear prediction by simulation, too."),
-]
-AlsoOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--also",
-        metavar="SECTION",
-        help=f"Add what takes its time: {', '.join(FURTHER)}, or all (repeatable).",
-    ),
-]
-ResponseOption = Annotated[
-    Path | None,
-    typer.Option("--response", metavar="FILE", help="Lay a measured response of a loop over the model."),
-]
-ResponseOfOption = Annotated[
-    str, typer.Option("--response-of", metavar="LOOP", help="What --response was measured of; see margins.")
-]
-AveragesOption = Annotated[
-    int | None, typer.Option("--averages", help="Averages behind the coherence of --response.")
-]
-PdfOption = Annotated[bool, typer.Option("--pdf", help="Write report.pdf for signing as well.")]
-
 OWN = ("report", "margins", "stiffness", "validate")  # documents of sections that a report has by itself
+INCLUDE = "Add the sections that identify or correlate wrote (repeatable)."
+ALSO = f"Add what takes its time: {', '.join(FURTHER)}, or all (repeatable)."
 SHOWN = 8  # of what is not met or not proven
 
 
 def report(
-    design: DesignArgument = DEFAULT_DESIGN,
-    changes: SetOption = None,
-    out: OutOption = DEFAULT_OUT,
-    validation: ValidationOption = True,
-    pdf: PdfOption = False,
+    design: options.DesignArgument = options.DEFAULT_DESIGN,
+    changes: options.SetOption = None,
+    out: Annotated[
+        Path, Option(metavar="DIR", help="Folder for the results.", callback=options.folder_for_results)
+    ] = Path("out"),
+    validation: Annotated[bool, Option(help="Check every linear prediction by simulation, too.")] = True,
+    pdf: Annotated[bool, Option("--pdf", help="Write report.pdf for signing as well.")] = False,
     summary: SummaryOption = False,
-    include: IncludeOption = None,
-    also: AlsoOption = None,
-    response: ResponseOption = None,
-    response_of: ResponseOfOption = "",
-    averages: AveragesOption = None,
-    as_json: JsonOption = False,
-    quiet: QuietOption = False,
+    include: Annotated[list[Path] | None, Option(metavar="JSON", help=INCLUDE)] = None,
+    also: Annotated[list[str] | None, Option(metavar="SECTION", help=ALSO)] = None,
+    response: Annotated[
+        Path | None, Option(metavar="FILE", help="Lay a measured response of a loop over the model.")
+    ] = None,
+    response_of: Annotated[
+        str, Option(metavar="LOOP", help="What --response was measured of; see margins.")
+    ] = "",
+    averages: Annotated[int | None, Option(help="Averages behind the coherence of --response.")] = None,
+    as_json: options.JsonOption = False,
+    quiet: options.QuietOption = False,
 ) -> None:
     """Write report.html and report.json of a design.
 
@@ -89,7 +59,7 @@ def report(
 
     if summary and not pdf:
         raise InputError("--summary: allowed with --pdf, of which it makes a short one")
-    drive = load_drive(design, changes)
+    drive = options.load_drive(design, changes)
     made = build.report(
         drive,
         out,
@@ -127,4 +97,33 @@ def _sections(path: Path) -> list[Any]:
         which = "whole report" if made["kind"] == "report" else f"document of {made['kind']}"
         words = f"--include: a {which}, whose sections a report has by itself"
         raise InputError(f"{words}; allowed: what identify or correlate wrote with --out", where=str(path))
-    return [part for part in made["sections"] if part["id"] != "provenance"]
+    kept = [part for part in made["sections"] if part["id"] != "provenance"]
+    return [{key: own for key, own in part.items() if key != "verdict"} for part in kept]
+
+
+def pdf(
+    report: Annotated[Path, Argument(metavar="REPORT_JSON", help="A report.json of any command.")],
+    out: Annotated[
+        Path | None, Option(metavar="FILE", help="The PDF; beside the JSON where left out.")
+    ] = None,
+    summary: SummaryOption = False,
+    as_json: options.JsonOption = False,
+) -> None:
+    """Typeset any report.json as PDF: cover with verdicts and lines to sign, tables, vector figures.
+
+    Try: actuator-lti pdf out/report.json --summary --out joint.pdf
+    """
+    from analyses.isolation import drain
+    from reports.document import load
+    from reports.pdf import write_pdf
+
+    path = write_pdf(load(report), out or report.with_suffix(".pdf"), whole=not summary)
+    if as_json:
+        print_json({"schema": "actuator-lti/pdf", "version": 1, "file": str(path)})
+    else:
+        print_line(str(path))
+    damaged = drain()
+    if damaged:
+        raise InputError(
+            f"{damaged[0].part}: cannot be drawn from its data; {path} says so", where=str(report)
+        )

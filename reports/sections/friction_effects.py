@@ -54,7 +54,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
         value=0.0 if swing is None else fine.scale * swing.swing_rad,
         limit=fine.scale * accepted_rad(design),
         unit=fine.unit,
-        passed={"met": True, "not met": False}.get(verdict_of(design, swing)),
+        passed=verdict_of(design, swing),
         comparison="<=",
         reason=f"describing function of the whole loop: {predicted}; stick-slip analysis: {slip}; "
         f"simulated: {result}; {agree}",

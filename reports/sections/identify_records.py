@@ -4,11 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import given_constant
 from analyses.identification.friction_map import LawChoice
-from analyses.identification.joint_model import JointModel, RecordFit, default_value
+from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
 from reports import document as doc
 from reports.charts import style

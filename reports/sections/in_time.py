@@ -113,10 +113,7 @@ def _margin(shown: MarginShown) -> doc.Block:
     return doc.figure("margin_runs", chart, caption, layout="half")
 
 
-FRICTION: dict[bool, style.Style] = {
-    False: {"marker": "o"},
-    True: {"marker": "s", "hollow": True, "dash": 1},
-}
+FRICTION: dict[bool, style.Style] = {False: {"marker": "o"}, True: {"marker": "s", "hollow": True, "dash": 1}}
 KINDS = {"gain": "loop gain, up", "delay": "delay at the loop"}
 NEXT_TO_NOTHING = 0.01  # of the linear margin
 WORTH_SAYING = 0.9  # of the linear margin: what takes less is not said

@@ -8,6 +8,7 @@ from actuator_lti.asked.quantities import AT_A_GLANCE
 from actuator_lti.design.model import Design
 from actuator_lti.loops.commanded import sampled_step
 from actuator_lti.step import StepFigures
+from analyses.finite import finite
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import frequency_grid, response_at
 from analyses.specification.asked_figures import said_of
@@ -84,7 +85,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
         ("T", figures.loop.plain_closed, peaks.complementary_rad_s, peaks.complementary_db, style.BLUE),
     )
     for k, (letter, system, omega, peak, colour) in enumerate(drawn):
-        at, db = margins.finite(hertz(omega)), margins.finite(peak)
+        at, db = finite(hertz(omega)), finite(peak)
         words = f"|{letter}|, no peak"
         if db is not None and at and db >= 0.005:
             words = f"|{letter}|, peak {db:.2f} dB at {style.hertz(at)}"

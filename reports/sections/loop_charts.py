@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.margins.results import StabilityMargins
+from analyses.finite import finite
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.responses import Curve, answer_curve, curve, nichols_curve, nyquist_curve, response_at
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin
-from reports.sections.margins import finite, margin_row, returns
+from reports.sections.margins import margin_row, returns
 
 Curves = Sequence[tuple[str, Curve]]
 LABELLED = 3  # margins with words

@@ -8,6 +8,7 @@ from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity, unit_
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
 from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
+from analyses.finite import finite
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
 from analyses.linear.loop_survey import OperatingPointFigures
 from analyses.margins.run import Margins
@@ -421,7 +422,3 @@ def worst_status(stable: Iterable[bool | None]) -> doc.Status:
     """Give the status of a section from the stability of its loops: unstable fails, unknown warns."""
     known = list(stable)
     return "fail" if False in known else "warn" if None in known else "info"
-
-
-def finite(value: float | None) -> float | None:
-    return None if value is None or not math.isfinite(value) else float(value)

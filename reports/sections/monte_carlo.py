@@ -9,18 +9,12 @@ from actuator_lti.asked.quantities import shown_unit, with_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
-from analyses.monte_carlo.result import (
-    ColumnStatistics,
-    Driver,
-    MonteCarloResult,
-    Odds,
-    samples_needed,
-)
+from analyses.finite import finite
+from analyses.monte_carlo.result import ColumnStatistics, Driver, MonteCarloResult, Odds, samples_needed
 from reports import document as doc
 from reports.charts import style
 from reports.charts.axis import linear_ticks
 from reports.numbers import capital, or_none
-from reports.sections.margins import finite
 from reports.sections.names import in_shown
 from reports.sections.requirements import label, limit_words
 from reports.terminal import Brief
@@ -89,9 +83,8 @@ def _result(result: MonteCarloResult) -> str:
 def _verdicts(result: MonteCarloResult) -> list[doc.VerdictItem]:
     items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
     for one in result.left_out:  # not sampled
-        words, waiver = f"{label(one)}{_MET_WITHIN}", one.waiver.words if one.waiver else ""
-        id = f"tolerance/{one.id}"
-        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=waiver))
+        id, words = f"tolerance/{one.id}", f"{label(one)}{_MET_WITHIN}"
+        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=one.waiver))
     return items
 
 
@@ -99,12 +92,11 @@ def _verdict(result: MonteCarloResult, odds: Odds) -> doc.VerdictItem:
     wanted = 1.0 if result.at_least is None else result.at_least
     share = odds.probability if result.at_least is None else odds.low
     verdict = result.judged(odds)
-    percent: dict[str, Any] = {"unit": "%", "value": 100.0 * odds.probability, "limit": 100.0 * wanted}
-    percent |= {"distance": 100.0 * (share - wanted), "comparison": ">="}
-    words = f"{capital(odds.label)}{_MET_WITHIN}"
-    made = doc.verdict(f"tolerance/{odds.id}", words, passed=None, reason=_why(result, odds), **percent)
-    waiver = odds.waiver.words if odds.waiver and verdict is Verdict.NOT_PROVEN else ""
-    return {**made, "verdict": verdict.value, "waiver": waiver}
+    return doc.verdict(
+        f"tolerance/{odds.id}", f"{capital(odds.label)}{_MET_WITHIN}", passed=verdict, comparison=">=",
+        value=100.0 * odds.probability, limit=100.0 * wanted, distance=100.0 * (share - wanted), unit="%",
+        reason=_why(result, odds), waiver=odds.waiver if verdict is Verdict.NOT_PROVEN else None,
+    )  # fmt: skip
 
 
 def _why(result: MonteCarloResult, odds: Odds) -> str:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
@@ -39,12 +38,12 @@ def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem
     unlimited = "unlimited" * (verdict.value is not None and math.isinf(verdict.value))
     source, note = requirement.source, requirement.note
     source += f" ({note})" if note and note != source else ""
-    waiver = verdict.waiver.words if verdict.waiver else ""
-    known: dict[str, Any] = {"value": verdict.value, "limit": limit, "distance": verdict.distance}
-    known |= {"comparison": comparison, "unit": requirement.unit, "source": source}
-    known |= {"reason": verdict.reason or unlimited, "waiver": waiver}
-    made = doc.verdict(verdict.id, label(verdict, load_unit), passed=None, **known)
-    return {**made, "verdict": verdict.verdict.value, "loop": verdict.loop, "quantity": requirement.quantity}
+    made = doc.verdict(
+        verdict.id, label(verdict, load_unit), passed=verdict.verdict, value=verdict.value, limit=limit,
+        distance=verdict.distance, comparison=comparison, unit=requirement.unit, source=source,
+        reason=verdict.reason or unlimited, waiver=verdict.waiver,
+    )  # fmt: skip
+    return {**made, "loop": verdict.loop, "quantity": requirement.quantity}
 
 
 def label(verdict: RequirementVerdict, load_unit: str = "N m") -> str:

@@ -94,7 +94,8 @@ def summary(validation: Validation) -> doc.Section:
         "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands, "
         "then without dry friction and friction by load: its figures differ from those of sliding by that. "
         "What is large, starts from rest, or is shaken by counts is a finding of its own. An error of less "
-        "than 10⁻⁹ of its value is rounding: that bound stands for it."
+        "than 10⁻⁹ of its value is rounding: that bound stands for it. A break point at which both show the "
+        "outermost loop again is listed as that loop."
     )
     words = " ".join(f"{capital(each)}." for each in validation.sentences())
     return doc.section(
@@ -139,8 +140,7 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
     ]
     if validation.rest is Verdict.NOT_PROVEN:
         waiver = waiver_of_rest(validation.design)
-        item = _item("rest", "Comes to rest after a step", None, validation.rest_words)
-        items.append({**item, "waiver": waiver.words if waiver else ""})
+        items.append(_item("rest", "Comes to rest after a step", None, validation.rest_words, waiver=waiver))
     return items
 
 
@@ -157,9 +157,9 @@ def _rows_item(validation: Validation, name: str, rows: Sequence[Check]) -> doc.
     return {**item, "waiver": waiver, "gathers": cast(doc.Counts, asdict(tally))}
 
 
-def _item(id: str, label: str, passed: bool | None, reason: str, **counts: Any) -> doc.VerdictItem:
-    side = ">=" if "limit" in counts else ""
-    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **counts)
+def _item(id: str, label: str, passed: bool | None, reason: str, **more: Any) -> doc.VerdictItem:
+    side = ">=" if "limit" in more else ""
+    return doc.verdict(f"{CHECKS}-{id}", label, passed=passed, reason=reason, comparison=side, **more)
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:

@@ -1,27 +1,25 @@
 # ruff: noqa: E501 (a table of cases, one a line)
-"""Every kind of bad design file: one line with file, key, value and what is allowed."""
+"""Every kind of bad design file, and what a mistyped value is answered with: one line that says what is allowed."""
 
+import re
 from pathlib import Path
 
 import pytest
 import tomli_w
 
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
+from actuator_lti.design.key_reference import key_reference
 from actuator_lti.design.loader import design_text
 from actuator_lti.errors import InputError
 from reports.cli.main import main
+from tests.refusals import mistakes
+
+# ruff: noqa: E501 (a table of cases, one a line)
+
 
 AMBER = design_text("ilr33-amber")
 TOLERANCE = 'tolerance = "50 %"'
 FACTS = "[[fact]]"
-
-
-def refused(text: str) -> str:
-    with pytest.raises(InputError) as caught:
-        read_design_text(text, "my.toml")
-    lines = str(caught.value).split("\n")
-    assert all(line.startswith("my.toml: ") and line.isprintable() for line in lines)
-    return "\n".join(lines)
 
 
 def changed(*replacements: tuple[str, str]) -> str:
@@ -119,7 +117,7 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 def test_a_bad_value_is_refused_in_one_line(case: str) -> None:
     replacements, says = CASES[case]
-    line = refused(changed(*replacements))
+    line = mistakes(changed(*replacements))
     assert "\n" not in line or case in ("one table for many", "correlation of a fixed value")
     for part in says:
         assert part in line
@@ -131,14 +129,14 @@ def test_the_terminal_tells_all_mistakes_and_many_are_cut_short(capsys, tmp_path
     path.write_text(text, encoding="utf-8")
     assert main(["margins", str(path)]) == 2
     assert capsys.readouterr().err.count("\nactuator-lti: ") == 1
-    assert refused(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
+    assert mistakes(AMBER + "".join(f"[x{k}]\n" for k in range(100))).endswith("and 70 more mistakes")
 
 
 def test_correlations_that_contradict_each_other_are_refused() -> None:
     keys = ("load.inertia", "gear.worm.input_inertia", "gear.planetary.input_inertia")
     pairs = [(keys[0], keys[1], 0.9), (keys[1], keys[2], 0.9), (keys[0], keys[2], -0.9)]
     tables = [f'[[correlation]]\nfirst = "{a}"\nsecond = "{b}"\ncoefficient = {c}\n' for a, b, c in pairs]
-    assert "contradict" in refused(AMBER + "".join(tables))
+    assert "contradict" in mistakes(AMBER + "".join(tables))
 
 
 @pytest.mark.parametrize(
@@ -150,7 +148,7 @@ def test_correlations_that_contradict_each_other_are_refused() -> None:
     ],
 )
 def test_the_stages_of_a_force_source_are_held_apart(old: str, new: str, says: str) -> None:
-    assert says in refused(design_text("emps").replace(old, new))
+    assert says in mistakes(design_text("emps").replace(old, new))
 
 
 def test_files_that_are_no_design_are_refused(tmp_path) -> None:
@@ -185,4 +183,70 @@ def test_free_texts_stay_text(text: str) -> None:
     assert (again.requirements[0].id, again.requirements[0].source) == (text, text)
     assert read_design_text(write_design(again), "my.toml") == again
     tree["requirement"][0]["quantity"] = "gain"
-    assert len(refused(tomli_w.dumps(tree))) < 500
+    assert len(mistakes(tomli_w.dumps(tree))) < 500
+
+
+def test_the_key_reference_has_every_key_once() -> None:
+    paths = [entry.path for entry in key_reference()]
+    assert len(paths) == len(set(paths)) > 100
+    assert all(entry.description for entry in key_reference("linear"))
+    assert {entry.unit for entry in key_reference("linear")} >= {"kg", "N", "m/s"}
+
+
+FILES = {
+    "empty.toml": ("", "is empty; allowed: a design file"),
+    "comment.toml": ("# only a comment\n", "is empty"),
+    "unquoted.toml": ("[motor]\nresistance = 55 mohm\n", 'line 2.*in quotes: resistance = "55 mohm"'),
+    "number.toml": ("[motor]\nresistance = 0,6\n", "line 2.*decimal point: resistance = 0.6"),
+    "comma.toml": ('[motor]\nresistance = "0,6 ohm"\n', None),
+    "quotes.toml": ("[motor]\nresistance = “55 mohm”\n", "use straight quotes"),
+    "semicolon.toml": ('[motor];\nresistance = "1 ohm"\n', "no semicolon at the end of a line"),
+    "table.toml": ("time_s;ref\n0;1\n0,001;2\n", "this looks like a table of numbers, TOML is wanted"),
+    "json.toml": ('{"motor": 1}', "this looks like JSON, TOML is wanted"),
+}
+
+
+@pytest.mark.parametrize("name", sorted(FILES))
+def test_a_file_that_is_no_design_is_told_what_it_looks_like(name: str, tmp_path, cli) -> None:
+    text, words = FILES[name]
+    (tmp_path / name).write_text(text, encoding="utf-8")
+    status, _, said = cli("margins", tmp_path / name)
+    assert status == 2
+    assert all(name in line for line in said.splitlines())
+    assert words is None or (re.search(words, said) and said.count("\n") == 1)
+
+
+def test_a_load_and_an_amplitude_may_have_their_units(cli) -> None:
+    texts = ("4 N*m", "4", "4000 mN*m")
+    result = [cli.data("margins", "--load", text)["asked"]["load_Nm"] for text in texts]
+    assert result == pytest.approx([4.0] * 3, rel=1e-12)
+    said = []
+    for words in ("5deg", "5", "300 arcmin", "0.08726646259971647 rad"):
+        ran = cli("simulate", "--amplitude", words, "--duration", "0.02", "--json")
+        assert ran.status in (0, 1)
+        said.append(ran.out)
+    assert len(set(said)) == 1
+
+
+@pytest.mark.parametrize("command", [["identify"], ["correlate", "emps"], ["simulate", "--record"]])
+def test_records_that_are_none(command: list[str], tmp_path, cli) -> None:
+    design, table, empty = tmp_path / "d.toml", tmp_path / "s.csv", tmp_path / "e.csv"
+    design.write_text(write_design(load_design("ilr33-amber")), encoding="utf-8")
+    table.write_text("time_s;reference_deg\n0;1\n0,001;2\n", encoding="utf-8")
+    empty.write_text("", encoding="utf-8")
+    twice = [design] * (2 if command == ["identify"] else 1)
+    status, _, said = cli(*command, *twice)
+    assert status == 2
+    assert "a design, and no record" in said or "this looks like TOML, a CSV file is wanted" in said
+    status, _, said = cli(*command, empty)
+    assert status == 2
+    assert "is empty" in said or "a header line and at least one row" in said
+    said = cli.refused(*command, table)
+    if command[0] == "simulate":
+        assert "separate the columns with commas, and write numbers with a decimal point" in said
+
+
+def test_a_command_warns_and_goes_on(cli) -> None:
+    status, _, said = cli("margins", "--set", "load.moment_max=4000 N*m")
+    assert status == 0
+    assert "warning: ilr33-amber: load.moment_max: 4000 N*m holds the drive fast" in said

@@ -12,10 +12,11 @@ from actuator_lti.design import (
     write_design,
 )
 from actuator_lti.design.writing import write_changed
-from actuator_lti.errors import InputError, Mistakes
+from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import all_loop_figures
 from reports.sections.margins import by_itself_notes, response_row
+from tests.refusals import mistakes
 
 DRIVE = """
 [design]
@@ -42,13 +43,6 @@ def with_law(text: str) -> Design:
     return read_design_text(f"{DRIVE}{LAW}{text}")
 
 
-def told(text: str) -> str:
-    """What a file is answered with, a line a mistake."""
-    with pytest.raises((InputError, Mistakes)) as caught:
-        read_design_text(text)
-    return str(caught.value)
-
-
 def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> None:
     flat = "A = [[0.5]]\nB = [[1]]\nC = [2]\nD = [3]\n[control.position.law.continuous]\n"
     flat += "A = [[-5000, 0], [1, 0]]\nB = [[1], [0]]\nC = [-7, 9]\nD = [253]\n"
@@ -60,7 +54,7 @@ def test_matrices_of_one_row_are_read_in_the_continuous_part_as_in_the_law() -> 
 def test_what_could_not_be_read_is_not_shown_where_it_is_asked_for_again() -> None:
     """Names that are none, in a drive without gears and without tolerances, which they could be among."""
     bare = DRIVE.replace('[[gear]]\nname = "R22"\nratio = 19.2\n', "[load]\nlocking_gear = 3\n")
-    text = told(f'{bare}[[correlation]]\nsecond = "motor.resistance"\ncoefficient = 0.5\n')
+    text = mistakes(f'{bare}[[correlation]]\nsecond = "motor.resistance"\ncoefficient = 0.5\n')
     assert "object at" not in text
     for words in ("load.locking_gear = 3: allowed: text", "locking_gear: is no gear", "first: missing"):
         assert words in text
@@ -107,7 +101,7 @@ TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
 )  # fmt: skip
 def test_what_a_first_file_is_answered_with(more: str, words: str, times: int) -> None:
     """Nothing is said of sizes of matrices that are not there."""
-    text = told(f"{DRIVE}{more}\n")
+    text = mistakes(f"{DRIVE}{more}\n")
     assert text.count(words) == times
     assert "other sizes" not in text
     assert text.count("\n") == max(times, 1) - 1
@@ -137,7 +131,7 @@ def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
     constants: str, values: dict[str, str]
 ) -> None:
     missing = "torque_constant" if "back_emf_constant" in values else "back_emf_constant"
-    answer = " ".join(told(motor(constants, **values)).split()[-2:])
+    answer = " ".join(mistakes(motor(constants, **values)).split()[-2:])
     design = read_design_text(motor(constants, **values, **{missing: answer}))
     same = design.effective_motor
     # six digits are told
@@ -150,7 +144,7 @@ def test_kv_of_a_motor_per_phase_is_line_line_and_a_constant_missing_behind_a_sc
     same = read_design_text(text).effective_motor
     assert same.back_emf_constant_Vs_rad == pytest.approx(same.torque_constant_Nm_A, rel=1e-4)
     text = DRIVE.replace("[motor]", 'axis = "linear"\n[screw]\nlead = "10 mm"\n[motor]')
-    answer = told(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
+    answer = mistakes(text.replace('back_emf_constant = "1.33 V/1000 rpm"\n', ""))
     assert answer.endswith("in SI, 0.0127 V*s/rad")
 
 
@@ -163,7 +157,7 @@ KE = 44 * 0.0070615518 / 3**0.5
     [("23 Vrms/krpm", KE * 1000 * np.pi / 30, "Vrms/krpm"), ("415 rpm/V", 30 / np.pi / KE, "rpm/V")],
 )
 def test_constants_that_disagree_are_told_as_they_are_written(written: str, wanted: float, unit: str) -> None:
-    text = told(motor("rms-line", torque_constant="44 oz-in/Arms", back_emf_constant=written))
+    text = mistakes(motor("rms-line", torque_constant="44 oz-in/Arms", back_emf_constant=written))
     assert f"({written}): allowed: within 10 %" in text
     assert "(44 oz-in/Arms) has it" in text
     number, _, same = text.partition("10 % of ")[2].partition("(")[2].partition(")")[0].partition(" ")
@@ -196,7 +190,7 @@ STEPPER = 'with "dc" of a stepper those of a phase'
 def test_a_cause_is_told_only_where_its_ratio_is_near(
     constants: str, kM: str, kE: str, said: str, not_said: str
 ) -> None:
-    text = told(motor(constants, torque_constant=kM, back_emf_constant=kE))
+    text = mistakes(motor(constants, torque_constant=kM, back_emf_constant=kE))
     assert (said in text, not_said in text) == (True, False)
 
 
@@ -234,7 +228,7 @@ def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
     """
     kM, kE = 0.03 * ampere, 0.02 * volt
     if stated != constants or any(units):
-        text = told(motor(stated, torque_constant=f"{kM} Nm/A", back_emf_constant=f"{kE} V*s/rad"))
+        text = mistakes(motor(stated, torque_constant=f"{kM} Nm/A", back_emf_constant=f"{kE} V*s/rad"))
         assert (f'the ratio is that of motor.constants = "{constants}"' in text) is (stated != constants)
         assert "the ratio is that of " in text
         assert ("A peak" in text) is any(units)
@@ -336,7 +330,7 @@ def test_a_repeated_requirement_is_told_in_its_own_lines() -> None:
         '[[requirement]]\nid = "gain-margin"\nquantity = "gain_margin"\nloop = "spede"\nminimum = "6 dB"\n'
     )
     lines = (before + again).splitlines()
-    first, second = told(before + again).splitlines()
+    first, second = mistakes(before + again).splitlines()
     for said, key in ((first, 'id = "gain-margin"'), (second, 'loop = "spede"')):
         last = len(lines) - lines[::-1].index(key)
         assert f"line {last}: requirement[" in said

@@ -8,7 +8,7 @@ import pytest
 from control import tf
 
 from actuator_lti import assemble_loops, sweep
-from actuator_lti.design import design_tree, load_design, read_design_text
+from actuator_lti.design import design_tree, load_design
 from actuator_lti.design.fields import FIELDS, template_of
 from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.writing import _override
@@ -17,7 +17,7 @@ from actuator_lti.loops.delay_budget import delay_budget
 from actuator_lti.loops.limiters import onset
 from analyses.studies.study import load_study
 from nonlinear import Probe, commands, simulate
-from tests.refusals import refused
+from tests.refusals import mistakes, refused
 
 AMBER = load_design("ilr33-amber")
 RATIO = {"gear.planetary.ratio", "gear.worm.ratio"}
@@ -103,7 +103,7 @@ def test_what_is_not_read_hides_what_needs_it_and_nothing_else(contradicted: Any
 
 def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() -> None:
     text = design_text("ilr33-amber")
-    mistakes = {
+    wrong = {
         "motor.inductance": ('value = "6 uH"', 'value = "6 ohm"'),
         "gear.worm.ratio": ("value = 36", "value = -36"),
         "control.velocity.gain": ('"0.12 A*s/rad"', '"0.12 A"'),
@@ -111,14 +111,14 @@ def test_three_unreadable_values_and_three_contradictions_are_told_in_one_run() 
         "limits.continuous_current": ('value = "4 A", source', 'value = "14 A", source'),
         "control.computing_delay": ('delay = { value = "100 us"', 'delay = { value = "20 ms"'),
     }
-    for old, new in mistakes.values():
+    for old, new in wrong.values():
         assert text.count(old) == 1, old
         text = text.replace(old, new)
     lines = text.split("\n")
-    told = _told_lines(text)
+    told = mistakes(text).split("\n")
     assert {line.split(" = ")[0] for line in told} == {
         f"my.toml: line {next(k for k, line in enumerate(lines, 1) if new in line)}: {path}"
-        for path, (_, new) in mistakes.items()
+        for path, (_, new) in wrong.items()
     }
     assert told == sorted(told, key=lambda line: int(line.split(":")[1].split()[1]))
 
@@ -146,7 +146,7 @@ def test_a_motor_with_a_mistake_does_not_hide_what_its_top_speed_refuses(
     text = design_text("ilr33-amber").replace('"942.5 rad/s"', '"30000 rpm"')
     text = text.replace("[load]", '[load]\ngear_error = "1 N*m"\ngear_error_periods = 300000')
     assert text.count(old) == 1
-    wrong, periods = sorted(_told_lines(text.replace(old, new)), key=lambda line: "periods" in line)
+    wrong, periods = sorted(mistakes(text.replace(old, new)).split("\n"), key=lambda line: "periods" in line)
     assert key in wrong
     assert f"a tick, in which {top_rad_s / AMBER.total_ratio:.4g} rad/s passes" in periods
 
@@ -197,12 +197,6 @@ def test_all_mistakes_of_requirements_are_told_with_their_lines(study: bool, tmp
         assert words in said
 
 
-def _told_lines(text: str) -> list[str]:
-    with pytest.raises(InputError) as caught:
-        read_design_text(text, "my.toml")
-    return str(caught.value).split("\n")
-
-
 GEAR = "[[gear]]\nratio = 2\nefficiency = 0.8\n\n[limits]"
 
 
@@ -219,7 +213,7 @@ GEAR = "[[gear]]\nratio = 2\nefficiency = 0.8\n\n[limits]"
 def test_one_mistake_is_told_as_one(name: str, old: str, new: str, only: str) -> None:
     text = design_text(name)
     assert old in text
-    lines = _told_lines(text.replace(old, new, 1))
+    lines = mistakes(text.replace(old, new, 1)).split("\n")
     assert [only in line for line in lines] == [True], lines
 
 
@@ -233,9 +227,9 @@ def test_no_mistake_hides_another_or_ends_in_a_traceback() -> None:
         design_from_tree(tree, "f")
     assert [key in str(told.value) for key in ("load = ", "coupling.after = ")] == [True, True]
     # whether a gear without a name locks behind the coupling; a bandwidth where there is no motor's loop
-    (line,) = _told_lines(design_text("ilr33-amber-compliant") + "[[gear]]\nratio = 2\n")
+    (line,) = mistakes(design_text("ilr33-amber-compliant") + "[[gear]]\nratio = 2\n").split("\n")
     assert "gear[3].name: missing" in line
-    lines = _told_lines(design_text("emps") + '[control.current]\ngain = "500 Hz"\n')
+    lines = mistakes(design_text("emps") + '[control.current]\ngain = "500 Hz"\n').split("\n")
     assert any("control.current = a table: not allowed with motor.source_gain" in line for line in lines)
 
 
@@ -258,8 +252,3 @@ def test_no_mistake_hides_another_or_ends_in_a_traceback() -> None:
 )
 def test_a_wrong_argument_is_named_with_what_is_allowed(call, words: str) -> None:
     refused(call, words=words)
-
-
-def test_a_delay_budget_takes_a_name_as_well() -> None:
-    named, made = (delay_budget(one, "velocity", 100.0) for one in ("ilr33-amber", AMBER))
-    assert named == made

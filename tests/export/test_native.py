@@ -1,8 +1,9 @@
-"""The compiled kernels are the written ones, bit for bit; and which library is loaded, and when."""
+"""The compiled kernels are the written ones, bit for bit; which library is loaded; refusals to emit."""
 
 import os
 import threading
 from collections.abc import Callable
+from typing import Any
 
 import control
 import numpy as np
@@ -13,7 +14,8 @@ from actuator_lti import Design, InputError, load_design, stability_margins
 from actuator_lti.axis.library import LIBRARY as AXIS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
-from actuator_lti.compiled import Library, compiler
+from actuator_lti.compiled import EmitError, Library, compiler, emit_c
+from actuator_lti.compiled.kernel import kernel
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row
@@ -194,3 +196,63 @@ def test_a_library_that_cannot_be_had_is_one_line_and_none_is_made(
     with pytest.raises(InputError, match=words):
         _ = library.functions
     assert library.path().parent.exists() is before
+
+
+@kernel
+def push(s, at, x):
+    old = s[at]
+    s[at] = x
+    return old
+
+
+@kernel
+def power(x):
+    return x**2
+
+
+@kernel
+def two_types(x):
+    y = 0
+    y = x + 1.0
+    return 2.0 * y
+
+
+@kernel
+def open_order(s):
+    """A look into a row beside a call that writes it."""
+    return s[0] + push(s, 0, 1.0)
+
+
+@kernel
+def twice(s):
+    """Two writers in one expression."""
+    return push(s, 0, 1.0) - push(s, 0, 2.0)
+
+
+@kernel
+def truth(x):
+    if x:
+        return 1.0
+    return 2.0
+
+
+@kernel
+def sliced(s):
+    s[0:2] = 1.0
+
+
+@pytest.mark.parametrize(
+    ("function", "kinds", "words"),
+    [
+        (power, ["float"], "Pow is not in the subset"),
+        (two_types, ["float"], "y is a int and becomes a float"),
+        (open_order, ["row"], "writes s beside another use of s"),
+        (twice, ["row"], "writes s beside another use of s"),
+        (truth, ["float"], "a float as a condition"),
+        (sliced, ["row"], "Slice is not in the subset"),
+        (push, ["row", "row"], "takes"),
+    ],
+)
+def test_what_is_outside_the_subset_is_refused_with_its_place(function: Any, kinds: Any, words: str) -> None:
+    with pytest.raises(EmitError, match=rf"test_native\.py:[0-9]+: {function.__name__}: .*{words}"):
+        emit_c({function: kinds})

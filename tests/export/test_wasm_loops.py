@@ -29,6 +29,7 @@ from nonlinear.export import linear, linear_loops
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.page import line_of
 from tests.changed import changed
+from tests.margins.test_unstable_inner_loops import unstable_inside
 from tests.validation.rich_drives import rich_drive
 
 STAGES = {
@@ -292,16 +293,6 @@ def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path) -> None:
     (ours,) = in_node([design], tmp_path)
     assert linear_figures(Population(design, {}, 1)).withheld("current")[0]
     assert bool(ours["current"]["doubtful"])
-
-
-def unstable_inside(seed: int) -> Design:
-    """A current loop far beyond its border that runs 8 to 24 times between two position updates."""
-    rng, design = np.random.default_rng([seed, 16]), load_design("ilr33-amber-multirate")
-    control, every = design.controller, int(rng.choice([4, 6, 8]))
-    gain = control.current.gain_V_A * 10.0 ** rng.uniform(0.6, 2)
-    position = {"every": every * int(rng.choice([2, 3]))}
-    own = {"current": {"gain_V_A": gain}, "velocity": {"every": every}, "position": position}
-    return changed(design, controller=own)
 
 
 def test_where_rounding_decides_no_figure_is_given_as_sure(tmp_path) -> None:

@@ -84,17 +84,10 @@ CELLS = st.one_of(
     st.sampled_from(["", "nan", "abc", "1,5", "1_0", '"2"', "#", "1e999", "\u00b5", "-"]),
 )
 TABLES = st.lists(st.lists(CELLS, min_size=0, max_size=4), max_size=12)
-BYTES = st.builds(
-    bytes.__add__, st.sampled_from([b"", b"t,x\n", b"t,x\n0,1\n1,2\n"]), st.binary(max_size=300)
-)
-LAYOUTS = st.sampled_from(
-    [
-        CsvFormat(),
-        CsvFormat(separator=";", decimal=","),
-        CsvFormat(separator="whitespace"),
-        CsvFormat(names=("t", "x")),
-    ]
-)
+HEADS = st.sampled_from([b"", b"t,x\n", b"t,x\n0,1\n1,2\n"])
+BYTES = st.builds(bytes.__add__, HEADS, st.binary(max_size=300))
+TOLD = [{}, {"separator": ";", "decimal": ","}, {"separator": "whitespace"}, {"names": ("t", "x")}]
+LAYOUTS = st.sampled_from([CsvFormat(**one) for one in TOLD])
 
 
 @settings(max_examples=240)
@@ -112,9 +105,8 @@ def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path
     path = _write(tmp_path_factory.getbasetemp(), content)
     columns, said = (SignalColumn(name="x", column="x"),), ""
     try:
-        record = read_csv_record(
-            path, _spec(format=layout, signals=columns, bad_rows=policy, disorder=policy)
-        )
+        spec = _spec(format=layout, signals=columns, bad_rows=policy, disorder=policy)
+        record = read_csv_record(path, spec)
     except InputError as error:
         said, record = str(error), None
     assert bool(said) == (record is None)

@@ -1,4 +1,4 @@
-"""Several records together: joint fit, held-out record, fixed values, what is not told, honest errors."""
+"""Several records together, at several settings: joint fit, held-out record, fixed values, honest errors."""
 
 import shutil
 from pathlib import Path
@@ -7,9 +7,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from actuator_lti.design import load_design, with_values
+from actuator_lti.design import load_design, parameter_value, with_values, write_design
 from analyses.estimation.least_squares import between_records, solve
+from analyses.records.open_record import open_records
+from nonlinear import commands, simulate
 from reports.document import load
+from reports.document import load as load_document
 from tests.identification.bench_records import columns_of, motion, staircase, write
 
 
@@ -33,18 +36,16 @@ def test_records_with_loads_of_their_own_are_one_fit_judged_on_another(files, tm
     result = cli.data(*arguments, "--design", "ilr33-amber", "--refine", "--out", tmp_path)
     checks = {check["id"]: check for check in result["items"]}
     assert checks["held-out-unseen.csv"]["passed"]
-    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(
-        1.5 * result["model"]["relative_residual"] + 0.02
-    )
+    limit = 1.5 * result["model"]["relative_residual"] + 0.02
+    assert checks["held-out-unseen.csv"]["limit"] == pytest.approx(limit)
     assert {one["record"] for one in result["resimulated"]} == {"a.csv", "b.csv", "loaded.csv", "unseen.csv"}
     written = load_design(tmp_path / "ilr33-amber-identified.toml")
     assert written.friction.load_coefficient == pytest.approx(1.34e-3, rel=3e-3)
     assert written.friction.dry_torque_Nm == pytest.approx(2.25e-3, rel=5e-3)
     assert written.friction.viscous_Nms_rad == pytest.approx(5.25e-6, rel=5e-3)
     page = load(tmp_path / "identification.json")
-    tables = {
-        b["caption"]: b.get("note") for part in page["sections"] for b in part["blocks"] if "caption" in b
-    }
+    blocks = [block for part in page["sections"] for block in part["blocks"] if "caption" in block]
+    tables = {block["caption"]: block.get("note") for block in blocks}
     assert "Torque constant kM, fixed: these records do not tell it" in tables["Refined by simulation"]
     for path, refined in result["refined"]["parameters"].items():
         tolerance = written.parameters[path].tolerance
@@ -64,9 +65,8 @@ def test_a_held_out_record_is_filtered_and_that_of_another_drive_fails(files, tm
     words = ("identify", files["a"], "--validate", again, "--design", "ilr33-amber", "--cutoff", "20")
     told = cli.data(*words)
     checks = {check["id"]: check for check in told["items"]}
-    assert checks["held-out-again.csv"]["value"] == pytest.approx(
-        told["model"]["relative_residual"], rel=0.05
-    )
+    residual = told["model"]["relative_residual"]
+    assert checks["held-out-again.csv"]["value"] == pytest.approx(residual, rel=0.05)
 
 
 def test_a_value_can_be_held(files: dict[str, str], cli) -> None:
@@ -90,10 +90,9 @@ def test_a_torque_command_is_the_drive(identify) -> None:
     result = identify(columns).data
     uses = {row["meaning"]: row["use"] for row in result["inputs"]["r.csv"]}
     assert uses["commanded motor torque"] == "drive: torque as commanded"
-    assert result["model"]["parameters"]["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
-    assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
-        load_design("ilr33-amber").inertia_kgm2, rel=0.01
-    )
+    found, inertia = result["model"]["parameters"], load_design("ilr33-amber").inertia_kgm2
+    assert found["dry"]["value"] == pytest.approx(2.25e-3, rel=0.03)
+    assert found["inertia"]["value"] == pytest.approx(inertia, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["one way", "one speed"])
@@ -129,10 +128,8 @@ def test_scatter_between_records_is_found_again() -> None:
     """Values 2, own error 0.1, scatter 0.5: the estimate's mean square over many draws is the truth's."""
     rng = np.random.default_rng(5)
     own = np.full(6, 0.1)
-    result = [
-        between_records(2.0 + 0.5 * rng.standard_normal(6) + own * rng.standard_normal(6), own)
-        for _ in range(400)
-    ]
+    drawn = ((rng.standard_normal(6), rng.standard_normal(6)) for _ in range(400))
+    result = [between_records(2.0 + 0.5 * apart + own * noise, own) for apart, noise in drawn]
     assert np.sqrt(np.mean(np.square(result))) == pytest.approx(0.5, rel=0.05)
 
 
@@ -168,3 +165,108 @@ def test_correlation_over_several_records(files: dict[str, str], cli) -> None:
     assert result["worst"] == worst["record"]
     said = f"3 records against ilr33-amber; the motion of {Path(result['worst']).name} is furthest off"
     assert said in cli("correlate", "ilr33-amber", *paths).out
+
+
+SHARED = """
+time = { column = "time_s" }
+signals.reference = { column = "reference_deg", unit = "deg" }
+signals.angle = { column = "motor_angle_rad", unit = "rad" }
+signals.current = { column = "current_A", unit = "A" }
+"""
+GAINS, INERTIAS = (60.0, 80.0, 100.0, 120.0), (2e-4, 0.9)
+
+
+@pytest.fixture(scope="module")
+def sixteen(tmp_path_factory) -> Path:
+    """Four gains, two known inertias at the output (of up to 70 % of the whole), two motions of each."""
+    folder, text = tmp_path_factory.mktemp("sixteen"), SHARED
+    for gain in GAINS:
+        for inertia in INERTIAS:
+            set_to = {"control.position.gain": gain, "load.inertia": inertia}
+            drive = load_design("ilr33-amber").with_values(set_to)
+            files = [f"{gain:g}_{inertia:g}_{seed}.csv" for seed in (1, 2)]
+            for seed, file in enumerate(files):
+                write(folder / file, columns_of(motion(seed, design=drive), seed))
+            text += f'\n[[record]]\nfile = ["{files[0]}", "{files[1]}"]\n'
+            text += f'settings.control.position.gain = "{gain} 1/s"\nsettings."load.inertia" = {inertia}\n'
+    (folder / "runs.toml").write_text(text)
+    return folder / "runs.toml"
+
+
+def test_sixteen_records_of_four_gains_are_one_fit(sixteen, cli, tmp_path) -> None:
+    """The inertia at the output is known of each: what is found is the motor's own, from all sixteen."""
+    design = load_design("ilr33-amber")
+    model = cli.data("identify", sixteen, "--design", "ilr33-amber")["model"]
+    assert len(model["records"]) == 16
+    truth = {"inertia": design.inertia_kgm2, "viscous": design.friction.viscous(1)}
+    for name, value in truth.items():
+        found = model["parameters"][name]
+        assert abs(found["value"] - value) < 4.0 * found["standard_error"] + 1e-3 * value, name
+    records = open_records(sixteen)
+    assert [record.settings["load.inertia"] for record in records] == [*np.repeat(INERTIAS, 2)] * 4
+    records = cli.data("correlate", "ilr33-amber", sixteen, "--error-limit", "3")["records"]
+    told = [note for record in records for note in record["notes"]]
+    assert [told.count(f"set: control.position.gain = {gain} 1/s") for gain in GAINS] == [4] * 4
+    plain = sixteen.with_name("plain.toml")
+    plain.write_text(SHARED + f'file = "{GAINS[0]:g}_{INERTIAS[0]:g}_1.csv"\n')
+    assert cli("correlate", "ilr33-amber", plain, "--error-limit", "3").status == 1
+
+
+def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, cli) -> None:
+    """A P position loop sets the voltage, which no column holds: it is the gain times a difference of two."""
+    drive = load_design("ctms-motor-position")
+    text = 'time = { column = "time_s" }\nsignals.reference = { column = "reference_rad", unit = "rad" }\n'
+    text += 'signals.angle = { column = "angle_rad", unit = "rad" }\n'
+    for k, gain in enumerate((0.6, 1.0, 1.6, 2.4)):
+        command_to = commands.multisine(1.0, [0.7, 1.9, 4.3], 4.0, 1e-3, seed=k)
+        run = simulate(drive.with_values({"control.position.gain": gain}), command_to, 4.0)
+        noise = 1e-4 * np.random.default_rng(k).standard_normal(len(run.time_s))
+        angle = run.motor_angle_rad + noise
+        columns = {"time_s": run.time_s, "reference_rad": run.reference_rad, "angle_rad": angle}
+        write(tmp_path / f"{k}.csv", columns)
+        text += f'[[record]]\nfile = "{k}.csv"\nsettings."control.position.gain" = {gain}\n'
+        text += f'signals.voltage = {{ column = "reference_rad - angle_rad", unit = "V", scale = {gain} }}\n'
+    (tmp_path / "runs.toml").write_text(text)
+    words = ("identify", tmp_path / "runs.toml", "--design", "ctms-motor-position", "--refine")
+    result = cli.data(*words, "--out", tmp_path / "o")
+    first = load_document(tmp_path / "o" / "identification.json")["sections"][0]["result"]
+    assert first.startswith("Refined by simulation: motor.rotor_inertia 3.228")
+    found = result["refined"]["parameters"]
+    made = load_design(tmp_path / "o" / "ctms-motor-position-identified.toml")
+    for key in ("motor.rotor_inertia", "friction.viscous"):
+        value, error = found[key]["value"], found[key]["standard_error"]
+        assert abs(value - parameter_value(drive, key)) < 4.0 * error < 0.01 * value
+        assert parameter_value(made, key) == pytest.approx(value)
+
+
+@pytest.mark.parametrize(
+    ("settings", "reason"),
+    [
+        ('"control.position.gain" = "90 kg"', "settings: control.position.gain"),
+        ('"control.position.gian" = "90 1/s"', "settings: control.position.gian"),
+        (
+            '"friction.viscous" = "1e-6 N*m*s/rad"',
+            "is found from all records; allowed: any other key, or --fix",
+        ),
+        ('"control.position.gain" = [1]', "a key of the design with its value is wanted"),
+    ],
+)
+def test_a_setting_that_cannot_be_is_refused(settings: str, reason: str, sixteen: Path, cli) -> None:
+    file = sixteen.with_name("wrong.toml")
+    file.write_text(f'{SHARED}\nfile = "{GAINS[0]:g}_{INERTIAS[0]:g}_1.csv"\n[settings]\n{settings}\n')
+    err = cli.refused("identify", file, "--design", "ilr33-amber")
+    assert reason in err
+    assert "wrong.toml" in err or ".csv" in err
+
+
+def test_a_design_in_the_place_of_a_record_is_named(sixteen, cli) -> None:
+    file = sixteen.with_name("my.toml")
+    file.write_text(write_design(load_design("ilr33-amber")))
+    for words in (("correlate", "ilr33-amber", file), ("identify", sixteen, file)):
+        status, _, err = cli(*words)
+        assert status == 2
+        assert "my.toml: a design, and no record; allowed: CSV" in err
+        assert "correlate takes the design first, identify behind --design" in err
+    status, _, err = cli("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
+    assert status == 2
+    assert "a table of numbers, TOML is wanted: a record, and no design?" in err

@@ -21,9 +21,8 @@ from tests.identification.bench_records import Columns, bare, write
 def _wrong(design: Design) -> Design:
     keys = ("dry_torque_Nm", "viscous_Nms_rad", "load_coefficient")
     friction = {key: 0.6 * getattr(design.friction, key) for key in keys}
-    return changed(
-        design, motor={"rotor_inertia_kgm2": 1.4 * design.motor.rotor_inertia_kgm2}, friction=friction
-    )
+    motor = {"rotor_inertia_kgm2": 1.4 * design.motor.rotor_inertia_kgm2}
+    return changed(design, motor=motor, friction=friction)
 
 
 DEG, COUNT = 180.0 / np.pi, 2.0 * np.pi / 65536
@@ -208,9 +207,8 @@ def test_signals_at_several_rates(tmp_path, cli) -> None:
         result = cli("identify", tmp_path / name, "--design", tmp_path / "d.toml", "--json").data
         used[name] = result["model"]["records"][0]["rows_in"]
         near = 0.01 if name == "r.toml" else 0.05
-        assert result["model"]["parameters"]["inertia"]["value"] == pytest.approx(
-            design.inertia_kgm2, rel=near
-        )
+        found = result["model"]["parameters"]["inertia"]["value"]
+        assert found == pytest.approx(design.inertia_kgm2, rel=near)
     assert used == {"r.csv": 800, "r.toml": 4000}
     told = cli("identify", tmp_path / "r.csv", "--design", tmp_path / "d.toml").out
     assert 'missing = "interpolate"' in " ".join(told.split())

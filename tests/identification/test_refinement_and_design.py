@@ -1,4 +1,4 @@
-"""Output error, the next runs of a campaign, dynamic results as designs."""
+"""Output error, dynamic results as designs, next runs of a campaign, planned motions that keep their word."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,6 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from actuator_lti.design import load_design, parameter_value, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
@@ -16,12 +17,15 @@ from analyses.identification.bench import identify_bench
 from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import fit_output
+from analyses.identification.plan import PERIOD_S, Plan, plan_motions
 from analyses.identification.steady import SteadyPoint, SteadyWindow
 from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments
 from analyses.records.open_record import open_record
-from tests.identification.bench_records import columns_of, motion, write
+from analyses.records.record import Record
+from nonlinear import commands, simulate
+from tests.identification.bench_records import NOISE_A, columns_of, motion, record_of, write
 from tests.refusals import refused
 
 TABLE_1 = np.array([2.25e-3, 5.25e-6, 1.34e-3])
@@ -73,8 +77,7 @@ def test_random_errors_have_the_least_squares_covariance_and_what_is_not_told_is
 
 
 def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: SurfaceFit) -> None:
-    design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, count=3)
+    result = suggest_runs(BASE, fit, count=3)
     left = [run.remaining for run in result.runs]
     assert left == sorted(left, reverse=True)
     assert left[0] < 1.0
@@ -89,29 +92,27 @@ def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: Surfac
     worse = [replace(run, speed_rad_s=942.0, load_Nm=8.9) for run in result.runs]
     assert spread(result.runs) < spread(worse) < spread([])
     assert left[-1] == pytest.approx(spread(result.runs) / spread([]))
-    result = suggest_runs(load_design("ilr33-amber"), fit, count=4, criterion="D")
+    result = suggest_runs(BASE, fit, count=4, criterion="D")
     assert {run.load_Nm for run in result.runs} <= {0.0, 8.9}
     assert {round(run.speed_rad_s) for run in result.runs} <= {105, 942}
     assert 0.5 < result.shared_part <= 1.0
     assert result.largest_shared in fit.shared_shifts
-    refused(suggest_runs, load_design("ilr33-amber"), fit, criterion="E", words="criterion")
+    refused(suggest_runs, BASE, fit, criterion="E", words="criterion")
 
 
 def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:
     """The phase margin of the velocity loop falls as the viscous friction falls: first order holds."""
     from actuator_lti import assemble_loops, stability_margins
 
-    design = load_design("ilr33-amber")
-    result = suggest_runs(design, fit, count=1)
+    result = suggest_runs(BASE, fit, count=1)
     spread = next(m for m in result.margins if m.label == "position phase margin, 0 N m")
     base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
     base["friction.load_coefficient"] = float(fit.values[2])
 
     def margin(scale: float) -> float:
-        changed = with_values(design, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
-        loops = assemble_loops(
-            changed, operating_point="describing-function", load_Nm=0.0, speed_amplitude_rad_s=0.02 * 942.5
-        )
+        changed = with_values(BASE, base | {"friction.dry_torque": scale * base["friction.dry_torque"]})
+        at = {"operating_point": "describing-function", "load_Nm": 0.0}
+        loops = assemble_loops(changed, speed_amplitude_rad_s=0.02 * 942.5, **at)
         value = stability_margins(loops.position.open_loop).phase_margin_deg
         assert value is not None
         return value
@@ -130,9 +131,7 @@ def test_output_error_finds_the_values_of_a_record_and_names_one_at_its_bound() 
     def force(tried: Design) -> np.ndarray:
         return np.asarray(35.15065 * simulate(tried, command, 3.0).voltage_V)
 
-    start = with_values(
-        design, {"motor.rotor_inertia": 99.0, "friction.viscous": 190.0, "friction.dry_torque": 22.0}
-    )
+    start = with_values(design, dict(zip(paths, (99.0, 190.0, 22.0), strict=True)))
     found = fit_output(start, paths, force, force(design))
     assert found.values == pytest.approx([parameter_value(design, path) for path in paths], rel=2e-3)
     assert np.linalg.norm(found.rest) < 0.05 * np.linalg.norm(found.first)
@@ -188,3 +187,75 @@ def test_refinement_on_emps_lowers_the_force_error_and_every_result_is_what_is_w
             assert back.friction.offset_torque_Nm == 0.0
         else:
             assert back.friction.offset_torque_Nm == pytest.approx(model["offset"], rel=1e-6)
+
+
+BASE = load_design("ilr33-amber")
+VALUES = ("inertia", "viscous", "dry", "offset")
+
+
+def _measured(plan: Plan, seed: int) -> tuple[dict[str, float], Record]:
+    """A drive of other inertia and friction, driven by the plan; truth and record."""
+    rng = np.random.default_rng([30, seed])
+    friction = BASE.friction
+    drive = with_values(
+        BASE,
+        {
+            "motor.rotor_inertia": BASE.motor.rotor_inertia_kgm2 * rng.uniform(0.7, 1.4),
+            "friction.dry_torque": friction.dry_torque_Nm * rng.uniform(0.6, 1.5),
+            "friction.viscous": friction.viscous_Nms_rad * rng.uniform(0.6, 1.5),
+        },
+    )
+    time = np.arange(0.0, plan.time_s[-1], drive.controller.period_s)
+    smooth = commands.sampled(time, CubicSpline(plan.time_s, plan.command)(time))
+    run = simulate(drive, smooth, float(time[-1]), record_every=10)
+    assert all(use.fraction == 0.0 for use in run.limits.values())
+    current = run.current_A + NOISE_A * rng.standard_normal(len(run.time_s))
+    record = record_of(run.time_s, reference=run.reference_rad, angle=run.motor_angle_rad, current=current)
+    values = (drive.inertia_kgm2, drive.friction.viscous_Nms_rad, drive.friction.dry_torque_Nm, 0.0)
+    truth = dict(zip(VALUES, values, strict=True))
+    return truth, record
+
+
+def test_what_was_promised_is_kept_on_twenty_drives_and_motions_keep_off_the_limits() -> None:
+    """Stated over promised errors, mean of each value; real over promised, rms of all 80: within 20 %."""
+    plan = plan_motions(BASE, within=0.002, noise=NOISE_A)
+    assert plan.passed
+    stated, real = [], []
+    for seed in range(20):
+        truth, record = _measured(plan, seed)
+        model = identify_bench(BASE, [record]).model
+        promised = np.array([plan.expected.std(name) for name in VALUES])
+        stated.append(np.array([model.std(name) for name in VALUES]) / promised)
+        real.append(np.array([model[name] - truth[name] for name in VALUES]) / promised)
+    assert np.mean(stated, axis=0) == pytest.approx(1.0, abs=0.2)
+    assert np.sqrt(np.mean(np.square(real))) == pytest.approx(1.0, abs=0.2)
+    rate = np.max(np.abs(np.gradient(plan.command, PERIOD_S))) * BASE.total_ratio
+    assert rate <= 0.81 * BASE.limits.speed_rad_s
+    assert np.max(np.abs(plan.command)) <= 0.8 * BASE.validation.full_deflection_rad
+    assert plan.command[0] == plan.command[-1] == 0.0
+
+
+def test_half_the_interval_takes_four_times_the_motion() -> None:
+    """White noise: the variance falls with the time; and what is measured already need not be again."""
+    coarse, fine = (plan_motions(BASE, within=within, noise=NOISE_A) for within in (0.002, 0.001))
+    some = len(coarse.segments)  # of which the last may hardly be needed
+    assert 4 * (some - 1) <= len(fine.segments) <= 4 * some
+    _, record = _measured(coarse, 1)
+    model = identify_bench(BASE, [record]).model
+    rest = plan_motions(BASE, within=0.001, noise=NOISE_A, measured=model)
+    assert rest.measured == 1
+    assert len(rest.segments) == pytest.approx(len(fine.segments) - some, abs=2)
+    refused(plan_motions, BASE, within=0.01, noise=0.0, words="the noise of the recorded current")
+    bare = replace(BASE, controller=replace(BASE.controller, position=None))
+    refused(plan_motions, bare, within=0.01, noise=NOISE_A, words="needs a position loop")
+
+
+def test_the_command_writes_the_motions_for_the_drive(tmp_path, cli) -> None:
+    ran = cli("identify", "--plan", "ilr33-amber", "--noise", NOISE_A, "--out", tmp_path, "--json")
+    assert ran.status == 0
+    assert ran.data["half_widths"]["inertia"] < ran.data["within"] == 0.05
+    written = np.loadtxt(tmp_path / "ilr33-amber-plan.csv", delimiter=",", skiprows=1)
+    assert len(written) == 4000 * len(ran.data["segments"])
+    out = cli("identify", "--plan", "ballscrew", "--noise", 0.02, "--within", 1e-2).out
+    assert out.startswith("FAIL")
+    assert "are not enough" in " ".join(out.split())

@@ -24,14 +24,7 @@ from tests.changed import changed
 from tests.identification.bench_records import record_of, two_mass_design
 from tests.refusals import refused
 
-TRUTH = {
-    "motor_inertia": 2e-5,
-    "load_inertia": 2e-3,
-    "stiffness": 400.0,
-    "damping": 0.02,
-    "viscous": 1e-5,
-    "load_viscous": 1e-3,
-}
+TRUTH = dict(zip(NAMES, (2e-5, 2e-3, 400.0, 0.02, 1e-5, 1e-3), strict=True))
 N, RATE, PERIODS, KM = 10.0, 2000, 8, 0.05
 HERTZ = np.arange(2.0, 400.0, 2.0)
 

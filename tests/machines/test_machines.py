@@ -1,4 +1,4 @@
-"""Every kind of machine says the same: discrete facts exactly, figures to 1e-9."""
+"""A machine of another kind says the same; a processor that is not at hand; the list of slow tests."""
 
 import functools
 import json
@@ -11,6 +11,7 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from beside import MOST, moved
 from machine_kinds import kernels, kinds
 
 from tests.margins.margin_families import integrators_and_whole_samples, sections_permuted_and_scaled
@@ -72,3 +73,37 @@ def test_there_are_several_kinds() -> None:
     assert len(kinds()) >= 2
     if sys.platform == "linux" and os.uname().machine == "x86_64":
         assert len(kernels()) >= 1
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_every_number_moves_by_a_few_ulp_and_equal_ones_alike(seed: int) -> None:
+    x = np.random.default_rng(seed).standard_normal((40, 5)) * 10.0 ** np.arange(-100, 150, 50)
+    y = moved(x, seed)
+    assert np.all(np.abs(y - x) <= MOST * np.spacing(np.abs(np.maximum(np.abs(x), np.abs(y)))))
+    assert 0.7 < np.mean(y != x) < 1.0
+    assert np.array_equal(moved(x.T, seed), y.T)
+    assert np.array_equal(moved(-x, seed), -y)
+    z = x + 1j * x[::-1]
+    assert np.array_equal(moved(z.conj(), seed), moved(z, seed).conj())
+    assert not np.array_equal(moved(x, seed + 1), y)
+
+
+def test_what_is_no_rounded_number_stays() -> None:
+    for kept in (0.0, -0.0, np.inf, -np.inf, 5e-324, 3, "a", None):
+        assert repr(moved(kept, 1)) == repr(kept) or moved(kept, 1) == kept
+    assert np.isnan(moved(np.nan, 1))
+    pivots = np.array([2, 1, 0])
+    assert moved((pivots, 0), 1) == (pivots, 0)
+    result = np.linalg.eig(np.array([[0.0, 1.0], [-2.0, -3.0]]))
+    assert type(moved(result, 1)) is type(result)
+
+
+HERE = Path(__file__).parents[1]
+
+
+def test_every_slow_test_is_there() -> None:
+    lines = [line for line in (HERE / "slow.txt").read_text(encoding="utf-8").splitlines() if line[:1] != "#"]
+    assert lines == sorted(set(lines))
+    for line in lines:
+        file, _, name = line.partition("::")
+        assert f"def {name}(" in (HERE.parent / file).read_text(encoding="utf-8") or not name, line

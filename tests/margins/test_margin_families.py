@@ -1,20 +1,26 @@
 """Harsh families of loops: none wrong where the data determine the answer, hardly any withheld there.
 
 Truth is certified roots of polynomials made of the exact doubles, written apart from the package, or by
-construction. What 8 ulp of the entries change, the data do not determine: there any answer is allowed, and
-withholding is.
-"""
+construction. What 8 ulp of the entries change, the data do not determine: there any answer is allowed."""
 
 import math
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
+import control
 import numpy as np
 import pytest
-from margin_families import FAMILIES, Loop, near_the_border, over_twelve_decades
+from margin_families import (
+    FAMILIES,
+    PERIOD_S,
+    Loop,
+    integrators_and_whole_samples,
+    near_the_border,
+    over_twelve_decades,
+)
 from margin_truth import ULP, difference, facts, towards_the_border, truth_of, unlike
 
-from actuator_lti.margins import stability_margins
+from actuator_lti.margins import StabilityMargins, stability_margins
 from tests.margins.differential import ALL, behind_part_of_a_sample, tried
 
 LOOPS = 120  # of each family, double precision against exact arithmetic
@@ -42,6 +48,12 @@ def test_behind_part_of_a_sample_only_what_8_ulp_decide_is_withheld(family: int)
     withheld = [what for kind, what in answers if kind == "withheld"]
     assert all(f"{ULP} ulp of the entries" in what for what in withheld)
     assert len(withheld) < ROUNDS // 2
+
+
+def test_a_phase_that_turns_beside_poles_next_to_the_border_is_followed() -> None:
+    """A double pole at z = 1 that rounding parts by 1e-8: its rate hides the turn of the phase behind it."""
+    k = 34747
+    assert behind_part_of_a_sample(ALL[k % len(ALL)], 9201, k) == ("right", "")
 
 
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
@@ -89,3 +101,56 @@ def test_zeros_far_from_the_poles_hide_nothing(k: int, use: int) -> None:
     v = np.array([0.0, *np.geomspace(1e-8, 1e8, 40_001)])  # a grid from above
     L = np.polyval(loop.num[0][0], 1j * v) / np.polyval(loop.den[0][0], 1j * v)
     assert m.modulus_margin <= np.abs(1.0 + L).min() * (1.0 + 1e-9)
+
+
+def drawn(count: int) -> Iterator[tuple[control.TransferFunction, StabilityMargins]]:
+    """Loops whose margins are told."""
+    for seed in range(count):
+        loop = integrators_and_whole_samples(np.random.default_rng([seed, 31]))
+        if not (m := stability_margins(loop)).withheld:
+            yield loop, m
+
+
+def test_smallest_distances_are_not_undercut_on_a_grid() -> None:
+    rng, compared = np.random.default_rng(7), 0
+    for loop, m in drawn(60):
+        top = math.pi / PERIOD_S if loop.dt else 1e4
+        omega = np.exp(rng.uniform(math.log(1e-3), math.log(top), 3000))
+        points = np.exp(1j * omega * PERIOD_S) if loop.dt else 1j * omega
+        L = np.polyval(loop.num[0][0], points) / np.polyval(loop.den[0][0], points)
+        rel = 1e-3 if loop.dt else 1e-6  # polynomials in z near z = 1 lose digits in this plain evaluation
+        assert m.modulus_margin <= np.abs(1 + L).min() * (1 + rel)
+        assert m.disk_margin.alpha <= np.abs(2 * (1 + L) / (1 - L)).min() * (1 + rel)
+        compared += 1
+    assert compared > 50
+
+
+def wound(loop: control.TransferFunction, delay_s: float, crossovers: list[float]) -> int:
+    """Unstable closed-loop poles by the turn of (N exp(-s delay) + D)/(s + 1)^n over a fine grid."""
+    num, den = loop.num[0][0], loop.den[0][0]
+    about = np.concatenate((crossovers, np.abs(loop.poles())))
+    near = (1.0 + np.outer([-1.0, 1.0], np.geomspace(1e-9, 0.5, 400))).ravel()
+    w = np.concatenate((np.geomspace(1e-6, 1e7, 40_001), np.outer(about[about > 0.0], near).ravel()))
+    s = 1j * np.unique(w)
+    f = (np.polyval(num, s) * np.exp(-s * delay_s) + np.polyval(den, s)) / (s + 1.0) ** (den.size - 1)
+    return -round(float(np.angle(f[1:] / f[:-1]).sum()) / math.pi)
+
+
+def test_delays_below_the_margin_keep_stability_and_above_it_end_it() -> None:
+    """But where a gain only touches one, or passes it again near by: there the poles may return."""
+    compared = 0
+    for loop, m in drawn(320):
+        quoted, crossovers = m.delay_margin, [p.frequency_rad_s for p in m.phase_margins]
+        if loop.dt or not m.stable or quoted is None or any(p.tangent for p in m.phase_margins):
+            continue
+        if any(0.0 < abs(w / quoted.frequency_rad_s - 1) < 0.05 for w in crossovers):
+            continue
+        for part, unstable in ((0.05, 0), (0.5, 0), (0.98, 0), (1.01, 2)):
+            delay_s = part * quoted.seconds
+            late = stability_margins(loop, delay_s=delay_s)
+            assert late.stable is (unstable == 0)
+            assert wound(loop, delay_s, crossovers) == unstable
+            counted = {late.agreement.unstable_poles, late.agreement.unstable_nyquist}
+            assert counted - ({None} if late.evidence == "certified" else set()) == {unstable}
+        compared += 1
+    assert compared > 25

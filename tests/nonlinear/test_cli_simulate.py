@@ -101,10 +101,6 @@ def test_cycles_are_those_played(words: str, seconds: float, rising: int, run) -
     assert np.flatnonzero((reference[:-1] < 0.0) & (reference[1:] >= 0.0)).size == rising
 
 
-def test_a_number_of_rows_is_refused_by_its_option(run) -> None:
-    assert "--every 0: must be a whole number, at least 1" in run.refused("--every 0")
-
-
 def test_a_load_keeps_its_own_clock_or_that_of_the_record(run, tmp_path) -> None:
     """Rows from 0.1 s on: until then there is no load, at 0.15 s half of what it grows to."""
     path = table(tmp_path / "load.csv", "t,M", [0.1, 0.2], [2, 4])

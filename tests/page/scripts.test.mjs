@@ -89,7 +89,7 @@ test("columns are found by name and unit, or as chosen, or refused in words", ()
 });
 
 test("a response in any form is the open loop", () => {
-  // the command line reads and refuses the same texts: tests/design/test_response_files.py
+  // the command line reads and refuses the same texts: tests/design/test_controller_files.py
   const shared = JSON.parse(readFileSync(new URL("responses.json", import.meta.url), "utf8"));
   for (const text of shared.refused) assert.throws(() => read(text, { kind: "response" }), Error, text);
   for (const [text, of] of [

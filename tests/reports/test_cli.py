@@ -12,7 +12,7 @@ import typer
 
 from actuator_lti.design.loader import design_text
 from reports.cli.app import build
-from reports.cli.progress import progress
+from reports.cli.output import progress
 
 
 def test_no_help_loses_a_name_in_brackets_to_markup() -> None:
@@ -107,6 +107,10 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("report --also all-of-it", "--also 'all-of-it': allowed: corners"),
         ("tune --place spring", "--place 'spring': allowed: notch"),
         ("tune --aim least", "Invalid value for '--aim': 'least' is not one of"),
+        ("montecarlo --samples 0 --out o", "--samples 0: at least 1"),
+        ("montecarlo --seed -1 --out o", "--seed -1: 0 or more"),
+        ("montecarlo --step '5 kg' --out o", "--step '5 kg': wrong dimension"),
+        ("montecarlo --workers 2 --scheduler tcp://a:1 --out o", "--workers and --scheduler: one of them"),
         ("montecarlo --samples 1e3", "'--samples': allowed: a whole number, such as 1000"),
         (
             "montecarlo --at-least x",
@@ -148,7 +152,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("simulate --amplitude inf", "finite"),
         ("simulate --command square", "must be one of"),
         ("simulate --command recorded", "needs --record"),
-        ("simulate --every 0", "at least 1"),
+        ("simulate --every 0", "--every 0: must be a whole number, at least 1"),
         ("simulate --duration 1e9", "ticks of one run; allowed"),
         ("simulate --command stepped-sine --frequency 5 --to 20 --count 3 --duration 1", "takes 1.75 s"),
         ("simulate --start 3 --duration 1", "the run ends at 1 s"),

@@ -13,7 +13,7 @@ from actuator_lti.design import load_design, parameter_value, shipped_designs, w
 from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
-from reports.live import live_model
+from reports.live.model import live_model
 
 ASKED = (
     ("output_rate", "deg/s", 60.0, 20.0),

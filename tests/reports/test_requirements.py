@@ -1,14 +1,30 @@
-"""Verdict and distance of requirements."""
+"""Requirements: verdict and distance; those on failures, duty, limit cycles and corners, and their tables."""
 
 import math
 from dataclasses import replace
+from math import degrees
 from typing import Any
 
 import pytest
 
 from actuator_lti import InputError, assemble_loops, stability_margins
-from actuator_lti.design import load_design, with_values
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES
+from actuator_lti.batch import variable_paths
+from actuator_lti.design import (
+    design_hash,
+    load_design,
+    read_design_text,
+    with_overrides,
+    with_values,
+    write_design,
+)
 from actuator_lti.design.model import Design, Requirement, Waiver
+from analyses.corners import corners
+from analyses.duty import Asked as DutyAsked
+from analyses.duty import duty
+from analyses.failures import Asked, failures
+from analyses.limit_cycles import limit_cycles
+from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 
@@ -91,3 +107,84 @@ def test_a_drive_that_friction_holds_does_not_move_and_a_load_is_a_number() -> N
     assert (result.output_rate_rad_s, result.acceleration_rad_s2, result.rate_limit) == (0.0, 0.0, "force")
     with pytest.raises(InputError, match="must be finite"):
         drive_figures(AMBER, math.nan)
+
+
+TABLES = {
+    "failure.stop": "15 deg", "failure.deflection": "3 deg", "failure.detection_time": "20 ms",
+    "failure.load": "2 N*m", "duty.amplitude": "4 deg", "duty.frequency": "2 Hz", "duty.load": "3 N*m",
+    "duty.share": "0.5", "duty.cycle": "20 s", "temperature.thermal_resistance": "2 K/W",
+}  # fmt: skip
+
+
+FIN = with_overrides(load_design("fin"), TABLES)
+
+
+def requirement(quantity: str, **limits: float) -> Requirement:
+    unit = ANALYSIS_QUANTITIES[quantity].unit
+    return Requirement(id=quantity, quantity=quantity, unit=unit, **limits)
+
+
+def test_the_tables_are_read_written_and_hashed_where_they_stand() -> None:
+    again, bare = read_design_text(write_design(FIN), "again"), load_design("fin")
+    assert (again.failure, again.duty) == (FIN.failure, FIN.duty)
+    assert design_hash(again) == design_hash(FIN) != design_hash(replace(FIN, failure=None))
+    assert design_hash(read_design_text(write_design(bare), "again")) == design_hash(bare)
+    asked, wanted = Asked.of(FIN), DutyAsked.of(FIN)
+    assert (asked.detection_s, asked.load_Nm) == (pytest.approx(0.02), 2.0)
+    assert (wanted.frequency_hz, wanted.share, wanted.cycle_s) == (pytest.approx(2.0), 0.5, 20.0)
+    assert Asked.of(FIN, load_Nm=1.0).load_Nm == 1.0
+    assert not any(path.startswith(("failure.", "duty.")) for path in variable_paths(FIN))
+
+
+def test_every_requirement_reads_its_analysis() -> None:
+    """Each value is that of the analysis asked by itself; limits on either side of it pass and fail."""
+    wanted = {
+        "hard_over_time": failures(FIN).case("hard-over").to_stop_s,
+        "failure_deflection": degrees(max(one.at_detection_rad for one in failures(FIN).cases)),
+        "failure_moment": max(one.peak_moment_Nm for one in failures(FIN).cases),
+        "duty_current": duty(FIN).rms_A,
+        "winding_temperature": duty(FIN).heating.final_degC,
+        "limit_cycle": 0.0 if limit_cycles(FIN).hunting is None else None,
+    }
+    for shift in (1e-3, -1e-3):
+        lower = {name: ANALYSIS_QUANTITIES[name].better > 0 for name in wanted}
+        limits = {name: {"minimum" if lower[name] else "maximum": wanted[name] + shift} for name in wanted}
+        asked = tuple(requirement(name, **limit) for name, limit in limits.items())
+        for one in evaluate_requirements(replace(FIN, requirements=asked)):
+            assert one.value == pytest.approx(wanted[one.id], rel=1e-9), one.id
+            assert (one.verdict == "met") is (lower[one.id] is (shift < 0.0)), one.id
+
+
+def test_margins_at_the_corners() -> None:
+    """The fin is not stable at its worst tolerances; the ball screw's least margins are the table's."""
+    asked = tuple(requirement(f"corner_{name}_margin", minimum=3.0) for name in ("gain", "phase"))
+    verdicts = evaluate_requirements(replace(load_design("fin"), requirements=asked))
+    assert [one.verdict for one in verdicts] == ["not met"] * 2
+    design = replace(load_design("ballscrew"), requirements=asked)
+    gain, phase = evaluate_requirements(design)
+    loops = [one.margins for corner in corners(design).corners for one in corner.figures.values()]
+    assert gain.value == pytest.approx(min(abs(one.gain_margin_db) for one in loops))
+    assert phase.value == pytest.approx(min(abs(one.phase_margin_deg) for one in loops))
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "reason"),
+    [
+        ("fin", "winding_temperature", "the design does not state what this needs"),
+        ("emps", "duty_current", "duty: an ideal torque source has no current"),
+    ],
+)
+def test_a_figure_that_there_is_not_says_why(name: str, quantity: str, reason: str) -> None:
+    asked = replace(load_design(name), requirements=(requirement(quantity, maximum=1.0),))
+    (found,) = evaluate_requirements(asked)
+    assert (found.verdict, found.reason) == ("not proven", reason)
+
+
+def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path) -> None:
+    asked = requirement("duty_current", maximum=1.0)
+    design = replace(load_design("fin"), requirements=(*load_design("fin").requirements, asked))
+    result = monte_carlo(design, tmp_path, MonteCarloSettings(samples=16, worst_cases=False))
+    assert "duty_current" not in {odds.id for odds in result.odds}
+    left = {one.requirement.quantity: one for one in result.left_out}
+    assert left["duty_current"].verdict == "not proven"
+    assert "not sampled" in left["duty_current"].reason

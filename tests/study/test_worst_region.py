@@ -102,11 +102,8 @@ KM, KE = "motor.torque_constant", "motor.back_emf_constant"
 
 def _tied(coefficient: float = 1.0) -> Design:
     design = read_design_text(write_design(load_design("ilr33-amber")))
-    tolerance = Tolerance(kind="normal", std=1e-4)
-    parameters = {
-        path: replace(one, tolerance=tolerance) if path in (KM, KE) else one
-        for path, one in design.parameters.items()
-    }
+    parameters, tolerance = dict(design.parameters), Tolerance(kind="normal", std=1e-4)
+    parameters |= {path: replace(parameters[path], tolerance=tolerance) for path in (KM, KE)}
     pair = Correlation(first=KM, second=KE, coefficient=coefficient)
     tied = replace(design, parameters=parameters, correlations=(pair,))
     return read_design_text(write_design(tied))

@@ -84,9 +84,8 @@ def _rubbing(dice: Dice, design: model.Design) -> Parts:
 def _timed(dice: Dice, design: model.Design) -> Parts:
     """Any delay, times by which integrals are tracked."""
     control, T = design.controller, design.controller.period_s
-    parts: Parts = {
-        "computing_delay_s": T * dice.one_of(control.computing_delay_s / T, dice.rng.uniform(0, 3))
-    }
+    ticks = dice.one_of(control.computing_delay_s / T, dice.rng.uniform(0, 3))
+    parts: Parts = {"computing_delay_s": T * ticks}
     for stage in ("current", "velocity"):
         loop = getattr(control, stage)
         if loop is not None and loop.anti_windup == "back-calculation" and dice.chance(0.5):

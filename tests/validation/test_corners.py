@@ -46,9 +46,8 @@ def test_a_low_supply_lowers_the_rate_and_no_margin() -> None:
 def test_the_worst_ends_are_the_worst_of_all_corners_of_the_box(quantity: str) -> None:
     """Four toleranced numbers of the fin: all sixteen corners looked at (the figures are monotone there)."""
     kept = ("motor.rotor_inertia", "motor.resistance", "load.inertia", "friction.viscous")
-    parameters = {
-        path: one if path in kept else replace(one, tolerance=None) for path, one in FIN.parameters.items()
-    }
+    parameters = {path: replace(one, tolerance=None) for path, one in FIN.parameters.items()}
+    parameters |= {path: FIN.parameters[path] for path in kept}
     design = replace(FIN, parameters=type(FIN.parameters)(parameters))
     chosen = worst_ends(design, quantity)
     nominal = {path: design.parameters[path].value for path in kept}

@@ -49,11 +49,8 @@ def test_gain_of_counts_by_quadrature(ratio: float, offset: float) -> None:
     edges = [k + offset for k in range(-6, 7) if abs(k + offset) < ratio]
     breaks = sorted(x for e in edges for x in (np.arcsin(e / ratio), pi - np.arcsin(e / ratio)))
     breaks = [-pi / 2, *breaks, 3 * pi / 2]
-    total = sum(
-        quad(lambda x: np.floor(ratio * np.sin(x) - offset) * np.sin(x), a, b)[0]
-        for a, b in pairwise(breaks)
-        if b - a > 1e-9
-    )
+    parts = [(a, b) for a, b in pairwise(breaks) if b - a > 1e-9]
+    total = sum(quad(lambda x: np.floor(ratio * np.sin(x) - offset) * np.sin(x), a, b)[0] for a, b in parts)
     assert counted_gain(ratio, offset) == pytest.approx(total / pi / ratio, abs=1e-7)
 
 
@@ -118,9 +115,8 @@ def test_a_small_cycle_keeps_its_digits_in_a_document() -> None:
     found = counts_of(joint, assemble_loops(joint), 4000)
     table = certain(counts_section(found))["blocks"][-1]
     shown = [f"{row['output']:.3g} {table['columns'][2]['unit']}" for row in table["rows"]]
-    assert shown == [
-        f"{1e3 * degrees(one.cycle.output_rad):.3g} mdeg" for each in found for one in each.cycles
-    ]
+    sizes = [degrees(one.cycle.output_rad) for each in found for one in each.cycles]
+    assert shown == [f"{1e3 * size:.3g} mdeg" for size in sizes]
 
 
 def test_a_drive_that_only_friction_holds_has_no_linear_amplitude() -> None:

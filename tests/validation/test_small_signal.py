@@ -100,8 +100,23 @@ def test_cogging_in_front_of_a_coupling_with_play() -> None:
     plain = load_design("ilr33-amber-compliant")
     result = validate(changed(plain, motor={"cogging_Nm": 2e-3, "cogging_periods": 5.0}), CHECKS)
     assert plain.coupling.play_rad > 0.0
-    assert result.tally.met == result.tally.total > 100
+    assert result.tally.met == result.tally.total > 90
     assert result.passed
+
+
+def test_the_outermost_loop_is_listed_once() -> None:
+    """The drive of one loop has its delay margin at the voltage; a wrong break point is another loop."""
+    rows = {name: validate(name, CHECKS).rows for name in ("joint", "ctms-motor-position")}
+    seen = {name: {row.loop for row in of} - {"command", "load", "drive"} for name, of in rows.items()}
+    assert seen == {
+        "joint": {"current", "velocity", "position", "u", "i_ref"},
+        "ctms-motor-position": {"position", "u"},
+    }
+    assert [row.name for row in rows["ctms-motor-position"] if row.loop == "u"] == ["delay_margin"]
+    design = load_design("joint")
+    loop, point = (Bench(design, design).place(name) for name in ("position", "w_ref"))
+    assert point.repeats(loop)
+    assert not replace(point, predicted=lambda z: 1.01 * point.predicted(z)).repeats(loop)
 
 
 def test_every_number_of_a_spring_that_bends_is_confronted() -> None:

@@ -136,7 +136,7 @@ export class Chart {
   // gives a curve new values, in the units of its axes: {panel, curve (its label), x, y, parameter}
   redraw({ panel, curve, x, y, parameter }) {
     const p = this.panels[panel], key = this.keyOf(curve);
-    const known = p.curves.find((c) => !c.dots && (key === undefined ? p.curves.length === 1 || c.node.dataset.id === curve : c.key === key));
+    const known = p.curves.find((c) => !c.dots && (key === undefined ? p.curves.length === 1 : c.key === key));
     if (!known) return;
     let d = "";
     known.points = [];

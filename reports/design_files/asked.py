@@ -1,6 +1,5 @@
-"""A design file to start from."""
+"""What is asked about design files: their keys, and one to start from."""
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,7 +12,28 @@ KINDS: dict[str, str | None] = {"servo-axis": None, "joint": "joint", "ballscrew
 
 
 @dataclass(frozen=True, kw_only=True)
-class Asked:
+class AskedKeys:
+    """List the keys of a design file: unit, default, allowed range, meaning, example.
+
+    A repeated table stands as gear.* (by name), friction.point.* and control.velocity.filter.* (by number).
+    Try: actuator-lti keys notch, or actuator-lti keys --explain my.toml
+    """
+
+    match: Annotated[
+        str, Option("Only keys whose name or meaning holds this text.", "TEXT", argument=True)
+    ] = ""
+    explain: Annotated[
+        str | None,
+        Option(
+            words="The numbers of a design: written, read as, in the model as; what follows, and warnings.",
+            metavar="FILE",
+        ),
+    ] = None
+    linear: Annotated[bool, Option("Units of a linear axis (m, N, kg).")] = False
+
+
+@dataclass(frozen=True, kw_only=True)
+class AskedStart:
     """Write a commented design file to start one's own drive from.
 
     Try: actuator-lti init arm.toml --kind joint, or with values of data sheets: actuator-lti init arm.toml
@@ -41,38 +61,3 @@ class Asked:
             raise InputError(f'--kind = "{self.kind}": not allowed beside --from')
         if self.kind is not None and self.kind not in KINDS:
             raise InputError(f'--kind = "{self.kind}": allowed: {", ".join(KINDS)}')
-
-
-@dataclass(frozen=True)
-class Started:
-    """The file that was written."""
-
-    file: str
-
-    def __str__(self) -> str:
-        return f"wrote {self.file}; next: actuator-lti report {self.file}"
-
-
-def start(asked: Asked) -> Started:
-    """Write a commented design file, named as the file is.
-
-    An InputError if there is such a file already, or the source is no design.
-    """
-    from actuator_lti.design import read_design_text
-    from actuator_lti.design.loader import design_text
-    from actuator_lti.files.atomic import write_text
-    from reports.cli.options import refuse_existing
-    from reports.design_files.parts import with_parts
-
-    refuse_existing(asked.file, asked.force)
-    source = KINDS[asked.kind] if asked.kind else asked.source
-    starter = Path(__file__).parents[1] / "templates" / "design.toml"
-    text = starter.read_text(encoding="utf-8") if source is None else design_text(source)
-    if asked.motor is not None or asked.gear is not None:
-        text = with_parts(text, asked.motor, asked.gear)
-    if re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9_-]{0,63}", name := asked.file.stem):  # can be a design's, too
-        head = r'(?m)^(\[design\]\n(?:[^\[\n]*\n)*?name = )"[^"\n]*"'
-        text = re.sub(head, rf'\1"{name}"', text, count=1)
-    read_design_text(text, str(asked.file))
-    write_text(asked.file, text)
-    return Started(str(asked.file))
