@@ -164,9 +164,9 @@ def check_frequency(design: Design, command: Command) -> None:
     """Refuse what is no command, and one that the outermost loop, sampled, cannot follow in principle."""
     check_command(command)
     control = design.controller
-    loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
-    nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
-    stage = "the drive" if loop is None else f"the {control.outermost} loop"
+    nyquist = 0.5 / control.period_of(control.outermost)
+    sampled = control.outermost in ("position", "velocity")
+    stage = f"the {control.outermost} loop" if sampled else "the drive"
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
         raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)
