@@ -118,21 +118,18 @@ class Run:
         return row
 
 
+_kept_row = lru_cache(maxsize=16)(design_row)  # a design is mostly run more than once
+
+
 def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
     """The row of a design alone."""
     for name, switch in (("friction_on", friction_on), ("limits_on", limits_on)):
         if switch not in (True, False):
             raise InputError(f"{name} = {shown(switch)}: allowed: True or False")
     try:
-        return _kept_row(design, friction_on, limits_on)
+        return _kept_row(design, friction_on=friction_on, limits_on=limits_on)
     except TypeError:  # a list in place of a tuple
         return design_row(design, friction_on=friction_on, limits_on=limits_on)
-
-
-@lru_cache(maxsize=16)
-def _kept_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
-    """The same, kept: a design is mostly run more than once."""
-    return design_row(design, friction_on=friction_on, limits_on=limits_on)
 
 
 def ticks_of(duration_s: float, period_s: float) -> int:
