@@ -80,7 +80,7 @@ def loop_model(
         value = mean_response(steps, z)[..., 0, 0]
         value = value / (1.0 - value) if periodic else value
         over = {"T": value, "S": np.ones_like(value)}.get(of)
-        return value if over is None else over / (1.0 + value)
+        return np.asarray(value if over is None else over / (1.0 + value), dtype=np.complex128)
 
     def response(values: Values) -> Complexes:
         delay = {"control.computing_delay": np.asarray(design.controller.computing_delay_s)}
