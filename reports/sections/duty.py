@@ -1,6 +1,8 @@
 """Duty cycle against the continuous rating: current, overload protection and winding temperature."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.duty.run import Duty
@@ -61,11 +63,15 @@ def _found(result: Duty) -> str:
     """What is beyond its limit, else the current."""
     beyond = [row for row in _rows(result) if row["_status"] == "fail"]
     if beyond:
-        said = ("{what} {value:.4g} {unit}, limit {limit:.4g} {unit}".format(**row) for row in beyond)
-        return "; ".join(said).replace(" ,", ",").rstrip()
+        return "; ".join(map(_beyond, beyond))
     known = math.isfinite(result.continuous_A)
     limit = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
     return f"{result.rms_A:.4g} A, rms over time{limit}"
+
+
+def _beyond(row: Mapping[str, Any]) -> str:
+    unit = f" {row['unit']}".rstrip()
+    return f"{row['what']} {row['value']:.4g}{unit}, limit {row['limit']:.4g}{unit}"
 
 
 def _rows(result: Duty) -> list[doc.Row]:
