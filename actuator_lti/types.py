@@ -12,5 +12,5 @@ Real = NDArray[np.floating[Any]]
 Complex = NDArray[np.complexfloating[Any, Any]]
 Mask = NDArray[np.bool_]
 Ints = NDArray[np.int64]
-Progress = Callable[[int, int], None]
-"""Called with (done, total) while long work goes on."""
+Progress = Callable[[int, int], None] | None
+"""Called with (done, total) while long work goes on; None: nobody looks on."""

@@ -160,7 +160,7 @@ class Rows:
         self,
         *,
         threads: int | None = None,
-        progress: Progress | None = None,
+        progress: Progress = None,
         drives: Sequence[Running] | None = None,
     ) -> BatchResult:
         """Run all rows over the cores; what is kept of each is in the result.

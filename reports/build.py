@@ -29,7 +29,6 @@ from reports.live.model import live_model
 from reports.provenance import provenance
 from reports.sections import (
     answer,
-    delays,
     forms,
     limits,
     loop,
@@ -43,7 +42,7 @@ from reports.sections import (
 from reports.sections.names import load_unit
 from reports.study_pages import design_head, in_amperes, notices
 
-Step = Callable[[str], AbstractContextManager[Progress | None]]
+Step = Callable[[str], AbstractContextManager[Progress]]
 
 
 def report(
@@ -116,7 +115,7 @@ def report(
 def design_report(
     design: Design,
     validation: Sequence[doc.Section] = (),
-    progress: Progress | None = None,
+    progress: Progress = None,
     source: str | None = None,
 ) -> Document:
     """Compute the report of a design as a document of `reports.document`.
@@ -204,7 +203,7 @@ def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     return [*made, *notices(missing, "further")]
 
 
-def validation_sections(design: Design, progress: Progress | None = None) -> list[doc.Section]:
+def validation_sections(design: Design, progress: Progress = None) -> list[doc.Section]:
     """Put the predictions to the simulator; a design that cannot be tested says why."""
     title = "Predictions against simulation"
     with isolated() as missing:
@@ -227,7 +226,7 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
     makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
     if survey.budgets:
-        makers["Delays"] = lambda: delays.section(survey.budgets)
+        makers["Delays"] = lambda: forms.delay_budget(survey.budgets)
     if design.coupling is not None or design.load.path == "back-drivable":
         makers["Stiffness"] = lambda: stiffness.of_design(design)
     if onset is not None:

@@ -18,7 +18,7 @@ PLACEHOLDER = (
 
 
 def draw_all(
-    blocks: Sequence[Mapping[str, Any]], progress: Progress | None = None, page: bool = True
+    blocks: Sequence[Mapping[str, Any]], progress: Progress = None, page: bool = True
 ) -> dict[int, str]:
     """Draw figure blocks: SVG by the block's ``id()``; one that fails is a notice in its place, and is noted.
 

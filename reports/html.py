@@ -32,11 +32,7 @@ KICKERS = {"report": "Loop analysis report"}
 
 
 def write_report(
-    made: Mapping[str, Any],
-    folder: str | PathLike[str],
-    stem: str = "report",
-    *,
-    progress: Progress | None = None,
+    made: Mapping[str, Any], folder: str | PathLike[str], stem: str = "report", *, progress: Progress = None
 ) -> tuple[Path, Path]:
     """Write a document as ``<stem>.html`` and ``<stem>.json``; both or neither."""
     content = dumps(made)
@@ -46,7 +42,7 @@ def write_report(
     return paths
 
 
-def page(made: Mapping[str, Any], *, progress: Progress | None = None) -> str:
+def page(made: Mapping[str, Any], *, progress: Progress = None) -> str:
     """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all)."""
     drawings = draw_all(figures(made), progress)
 

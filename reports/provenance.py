@@ -6,24 +6,17 @@ import shutil
 import subprocess
 from datetime import UTC, datetime
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
+from actuator_lti.start.extras import package_version
 
 LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2")
 _SAFE = (
     "--no-pager", "-c", "core.fsmonitor=false", "-c", "core.hooksPath=/dev/null", "-c",
     "log.showSignature=false", "-c", "core.pager=cat", "-c", "protocol.allow=never",
 )  # fmt: skip
-
-
-def package_version(name: str = "actuator-lti", otherwise: str = "not installed") -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return otherwise
 
 
 def provenance(design_hash: str | None = None) -> Tree:

@@ -13,6 +13,7 @@ REAL, IMAGINARY, OFF_AXIS, WEIGHT, TURNING, FACTOR = range(6)
 LOG_GAIN, PHASE, DELAY, SLACK = range(4)
 LEAST_RATE, MOST, MOST_RATE, BOUNDS = 2, 4, 6, 8  # places in ``bounds``; least gain and phase come first
 STEPS = 60
+EPS = 2.220446049250313e-16
 STEP = 1e-5  # relative: near enough for the loop itself to go on
 
 
@@ -50,15 +51,19 @@ def evaluated(m, factors, w, parts, at):
 def bounded(m, factors, parts, left, right, bounds):
     """Least and most of log gain, phase and their rates between two slots, between places.
 
-    By what the factors change, each one way; gain and phase by the rate of their sum besides.
+    By what the factors change, each one way; gain and phase by the rate of their sum besides.  Rates are
+    widened by their rounding: next to a pole on the axis one is 1e17 times the others.
     """
     a, b = left + 4 * m, right + 4 * m
     width = parts[b + 4] - parts[a + 4]
     for kind in range(4):
-        spread = 0.0
+        spread, size = 0.0, 0.0
         for k in range(m):
-            change = parts[right + 4 * k + kind] - parts[left + 4 * k + kind]
-            spread += abs(factors[WEIGHT * m + k] * change)
+            first, last = parts[left + 4 * k + kind], parts[right + 4 * k + kind]
+            spread += abs(factors[WEIGHT * m + k] * (last - first))
+            size += abs(factors[WEIGHT * m + k]) * (abs(first) + abs(last))
+        if kind >= LEAST_RATE:
+            spread += EPS * m * size
         if kind == 1:
             spread += factors[FACTOR * m + DELAY] * width
         middle = parts[a + kind] + parts[b + kind]

@@ -11,15 +11,14 @@ import math
 
 from actuator_lti.compiled.kernel import kernel
 
-from ._factors import DELAY, FACTOR, MOST, REAL, WEIGHT, bounded, evaluated, halved, slot
+from ._factors import DELAY, EPS, FACTOR, MOST, REAL, WEIGHT, bounded, evaluated, halved, slot
 from ._search import DEEPEST, DONE, KNOWN, NARROWEST, half_turns
 
 MEETS, UNSETTLED = 3, 4  # status, beside those of the search
 FINEST = 1e-8  # relative: how much lower another place may be without being found
 SMALL = 1e-6  # nearer to -1 double precision says little
-EPS = 2.220446049250313e-16
 NEWTON_STEPS = 20
-NEWTON_STEP = 1e-9
+NEWTON_STEP = 1e-13
 
 
 @kernel
@@ -163,8 +162,10 @@ def _bends_in(m, factors, u, v, x, parts, left, right, middle):
     bend *= 2.0 * size * size * math.exp(math.copysign(2.0 * grown, -bend))
     first, first_slope = _end(m, u, v, x, parts, left)
     last, last_slope = _end(m, u, v, x, parts, right)
-    if not bend > 0.0:
-        return not min(first, last) + 0.5 * bend * half * half > 0.0
+    if not bend > 0.0:  # from each end the way to the middle, no lower than its tangent bent down
+        sag = 0.5 * bend * half * half
+        inside = min(first + first_slope * half, last - last_slope * half) + sag
+        return not min(min(first, last), inside) > 0.0
     down, up = min(first_slope, 0.0), max(last_slope, 0.0)
     return not max(first - down * down / (2.0 * bend), last - up * up / (2.0 * bend)) > 0.0
 

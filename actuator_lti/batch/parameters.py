@@ -10,14 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.design.access import located, paths_of, stacked
-from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.systems.sampling import split_delay
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design
-
-__all__ = ["OperatingPoint", "Population", "variable_paths"]
 
 Values = Mapping[str, np.ndarray]
 

@@ -163,7 +163,7 @@ class Parameter:
 
 
 class FrozenMap(Mapping[str, Any]):
-    """A mapping that can be hashed and sent to a worker; equal to any with the same items in any order.
+    """A mapping that stays as it is and can be sent to a worker; equal to any with the same items.
 
     Examples
     --------
@@ -184,9 +184,6 @@ class FrozenMap(Mapping[str, Any]):
 
     def __len__(self) -> int:
         return len(self._items)
-
-    def __hash__(self) -> int:
-        return hash(frozenset(self._items.items()))
 
     def __repr__(self) -> str:
         return f"FrozenMap({self._items!r})"

@@ -5,7 +5,7 @@ from math import inf, pi
 from typing import Any, get_args
 
 from actuator_lti.design.control import FEED_FORWARD, FILTER_KEYS, Filter, FilterPlace, stable_pair
-from actuator_lti.design.fields import FIELDS, Field, Structure, fields_in, part_at
+from actuator_lti.design.fields import FIELDS, Field, axis_unit, fields_in, part_at
 from actuator_lti.design.law import BESIDE_A_LAW, MOST_STATES, Law
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable
 from actuator_lti.design.model import Design
@@ -142,7 +142,7 @@ def _needed(design: Design, key: str, value: float, outer: str) -> Iterator[Refu
 def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterator[Refusal]:
     limit, ratio = _of(design, f"limits.{limiter}") if limiter else inf, design.total_ratio
     if limit * (1 + 1e-9) < value * ratio < inf:
-        unit = _unit(design, key)
+        unit = axis_unit(design.axis, f"command.{key}")
         most = f"{limit / ratio:.6g} {unit}"
         if design.axis == "rotary":
             most += f" ({limit / ratio * (180.0 / pi):.6g} {unit.replace('rad', 'deg')})"
@@ -150,16 +150,12 @@ def _slow_enough(design: Design, key: str, value: float, limiter: str) -> Iterat
         yield _written(design, key, value, allowed)
 
 
-def _unit(design: Design, key: str) -> str:
-    """SI unit of a key of the command, for which the axis alone counts."""
-    return FIELDS[f"command.{key}"].unit(Structure(design.axis))
-
-
 def _written(design: Design, key: str, value: float, allowed: str) -> Refusal:
     """A key of the command as the file has it, else in SI."""
-    parameter = design.parameters.get(f"command.{key}")
-    text = f"{value:.6g} {_unit(design, key)}" if parameter is None else parameter.text
-    return f"command.{key}", text, allowed
+    path = f"command.{key}"
+    parameter = design.parameters.get(path)
+    text = f"{value:.6g} {axis_unit(design.axis, path)}" if parameter is None else parameter.text
+    return path, text, allowed
 
 
 def _jitter(design: Design) -> Iterator[Refusal]:
@@ -200,6 +196,8 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
     path, velocity = f"control.{stage}.law.inputs", design.controller.velocity
     if "current" in law.inputs and not design.motor.has_electrical_dynamics:
         yield path, "current", "not allowed with motor.source_gain, which has no current"
+    if "twist" in law.inputs and design.coupling is None:
+        yield path, "twist", "not allowed without a coupling"
     filtered = design.encoder.filter_time_s > 0.0 or (velocity and velocity.filters_on("speed"))
     if filtered and ("speed" in law.inputs or stage == "velocity"):
         yield path, "speed", "allowed: without encoder.filter_time and filters of the speed"
@@ -224,6 +222,8 @@ def _matrices(law: Law, path: str) -> Iterator[Refusal]:
         return
     if (law.C or law.D) and not any((*law.C, *law.D)):
         yield f"{path}.{'D' if law.D else 'C'}", "zero", "the law gives nothing; allowed: not C and D zero"
+    if law.gain == 0.0:
+        yield f"{path}.gain", "0", "the law gives nothing; allowed: not 0"
     if len(law.A) > MOST_STATES:
         yield f"{path}.A", f"{len(law.A)} states", f"allowed: at most {MOST_STATES}"
     if len(law.L) not in (0, len(law.A)):

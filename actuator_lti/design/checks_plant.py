@@ -6,8 +6,7 @@ from dataclasses import replace
 from math import inf, isclose, log
 from typing import Any
 
-from actuator_lti.design.field import Structure
-from actuator_lti.design.fields import FIELDS, part_at
+from actuator_lti.design.fields import axis_unit, part_at
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants
@@ -67,10 +66,9 @@ def check_motor(design: Design) -> Iterator[Refusal]:
         over = _TORQUE_OVER_VOLTAGE[design.motor.constants][1]
         same = f'with motor.constants = "{design.motor.constants}" kE is kM over {over} in SI'
         same = "in SI the two are one constant" if over == "1" else same
-        allowed = (
-            f"allowed: within 10 % of {wanted:g} {_unit(design, key)}{_as_written(design, key, kM / kE)}, as "
-            f"motor.torque_constant = {_stated(design, 'torque_constant')} has it ({same})"
-        )
+        wanted = f"{wanted:g} {axis_unit(design.axis, f'motor.{key}')}{_as_written(design, key, kM / kE)}"
+        held = f"motor.torque_constant = {_stated(design, 'torque_constant')}"
+        allowed = f"allowed: within 10 % of {wanted}, as {held} has it ({same})"
         causes = f"{_ratio(design, kE / kM)}{_warm(design, kM / kE)}"
         yield f"motor.{key}", _stated(design, key), f"{allowed}{causes}"
 
@@ -90,7 +88,7 @@ def _warm(design: Design, ratio: Any) -> str:
     if not 0.8 <= ratio <= 0.95:
         return ""
     key = "torque_constant"
-    kM = f"{design.motor.torque_constant_Nm_A / ratio:g} {_unit(design, key)}"
+    kM = f"{design.motor.torque_constant_Nm_A / ratio:g} {axis_unit(design.axis, f'motor.{key}')}"
     kM += _as_written(design, key, 1.0 / ratio)
     taken = f"take one and write the other as it follows, kE as said or kM = {kM}"
     return f"; sheets give kM warm or saturated and kE cold (0.8 to 0.95 of it, here {ratio:.3g}): {taken}"
@@ -140,12 +138,7 @@ def with_stand_ins(design: Design) -> Design:
 def _stated(design: Design, key: str) -> str:
     """A constant of the motor in SI, and as the file has it."""
     value = getattr(design.motor, _ELECTRICAL[key])
-    return f"{value:g} {_unit(design, key)}{_as_written(design, key, 1.0)}"
-
-
-def _unit(design: Design, key: str) -> str:
-    """The SI unit of a constant of the motor."""
-    return FIELDS[f"motor.{key}"].unit(Structure(design.axis))
+    return f"{value:g} {axis_unit(design.axis, f'motor.{key}')}{_as_written(design, key, 1.0)}"
 
 
 def _as_written(design: Design, key: str, times: float) -> str:
@@ -179,7 +172,7 @@ def _without(key: str, design: Design) -> str:
     if design.screw is not None:  # constants of the motor's own shaft
         p, axis = design.screw.travel_m_rad, "rotary"
     number = held * p * (ratio if torque else 1.0 / ratio)
-    return f"; {same} in SI, {number:g} {FIELDS[f'motor.{key}'].unit(Structure(axis))}"
+    return f"; {same} in SI, {number:g} {axis_unit(axis, f'motor.{key}')}"
 
 
 def check_temperature(design: Design) -> Iterator[Refusal]:

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 
 from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.design import model
-from actuator_lti.design.field import Field, Structure, named_after  # noqa: F401 - a unit asks for one
+from actuator_lti.design.field import Axis, Field, Structure, named_after
 
 Many = Literal["", "named", "numbered", "listed"]
 
@@ -210,6 +210,11 @@ FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
 def field_of(path: str) -> Field | None:
     """The field of a dotted path such as ``"gear.planetary.ratio"``; None if there is none."""
     return None if "*" in path else FIELDS.get(template_of(path))
+
+
+def axis_unit(axis: Axis, path: str) -> str:
+    """The SI unit of a key for which the axis alone counts."""
+    return FIELDS[path].unit(Structure(axis))
 
 
 def fields_in(section: str) -> tuple[Field, ...]:

@@ -8,14 +8,16 @@ u being what the limits of the stage leave of v, e the named signals as the cont
 """
 
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, get_args
+from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
 from actuator_lti.design.field import BIG, matrix, names, positive, quantities, quantity, text
 
-LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed"]
-LAW_INPUTS: tuple[str, ...] = get_args(LawInput)
+LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed", "twist"]
+LAW_WORDS: tuple[str, ...] = get_args(LawInput)
+LAW_INPUTS = LAW_WORDS[:-1]
+"""What a controller measures or is given; the twist it makes of two of them, see `twist_of`."""
 BESIDE_A_LAW = ("every", "sensor", "back_emf_feedforward", "resistance_feedforward")
 """Keys of a stage that its law does not take the place of."""
 MOST_STATES = 16
@@ -33,6 +35,24 @@ class Matrices(NamedTuple):
     C: np.ndarray
     D: np.ndarray
     L: np.ndarray
+
+
+def twist_of(design: Any) -> dict[str, Any]:
+    """The twist of the coupling as a controller knows it: gains on the angles of the motor and the output."""
+    return {"angle": 1.0 / design.ratio_to_coupling, "output_angle": -1.0 * design.ratio_behind_coupling}
+
+
+def balance(A: np.ndarray, B: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """Powers of two t, x = t x', that give rows and columns of A, B and C like sizes.
+
+    As `matrix_balance` (LAPACK gebal), of A with one state more that stands for all inputs and the output.
+    """
+    from scipy.linalg import matrix_balance
+
+    n = len(A)
+    whole = np.block([[A, np.abs(B).sum(axis=1, keepdims=True)], [C.reshape(1, n), np.zeros((1, 1))]])
+    scale = matrix_balance(whole, permute=False, separate=True)[1][0]
+    return scale[:n] / scale[n]
 
 
 # fmt: off
@@ -73,10 +93,11 @@ class Law(StateSpace):
     """A discrete linear law of one stage, at that stage's period."""
 
     inputs: Annotated[tuple[LawInput, ...], names("the signals that it takes, a column of B and D each "
-        "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, the others of "
-        "the motor; the speed is held between updates of a velocity stage")]
+        "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, twist of the "
+        "coupling by both angles, the others of the motor; the speed is held between updates of a velocity "
+        "stage")]
     file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
-        "their place")] = ""
+        "their place. L, gain and inputs may stand in it or here")] = ""
     L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "
         "where left out", **_LIST)] = ()
     gain: Annotated[float, quantity("factor on the law; its tolerance is that of the whole law",
@@ -98,7 +119,9 @@ class Law(StateSpace):
     @property
     def integrates(self) -> bool:
         """Whether it has a pole at z = 1."""
-        return bool(self.A) and bool(np.linalg.cond(np.eye(len(self.A)) - self.sampled.A) > SINGULAR)
+        A, B, C, _, _ = self.sampled
+        t = balance(A, B, C)  # the size of a state is a matter of taste
+        return bool(self.A) and bool(np.linalg.cond(np.eye(len(A)) - A * t / t[:, None]) > SINGULAR)
 
     @property
     def direct(self) -> float:

@@ -146,9 +146,10 @@ class Design:
 
         ``stage``: ``"current"``, ``"velocity"`` or ``"position"``.
         ``system``: a sampled state space or transfer function of python-control or scipy.signal, or
-        ``(A, B, C, D, dt)``; its period must be that of the stage.
+        ``(A, B, C, D, dt)``; its period must be that of the stage. States whose numbers are beyond 1e12 are
+        scaled by powers of two.
         ``inputs``: the signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``,
-        ``current``, ``output_angle``, ``output_speed``; by default the system's own input labels.
+        ``current``, ``output_angle``, ``output_speed``, ``twist``; by default the system's own input labels.
         ``settings``: ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the
         stage; ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
         the same law in continuous time, for the forms without samples.

@@ -374,12 +374,15 @@ class Reader:
         if not isinstance(raw, dict) or "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}
-        held = dict.fromkeys((*PARTS, "L", "period"), UNREAD)
-        twice = [key for key in held if key in rest]
+        held: Tree = dict.fromkeys((*PARTS, "L", "period", "inputs"), UNREAD)
         try:
-            if not isinstance(file, str) or twice:
-                raise InputError(f"allowed: a file's name, without {', '.join(twice) or 'more'}")
-            held = read_law(self.findings.folder / file)
+            if not isinstance(file, str):
+                raise InputError("allowed: a file's name")
+            read = read_law(self.findings.folder / file)
+            one_of = {key: read.get(key, rest[key]) for key in rest if key not in (*PARTS, "period")}
+            if twice := [key for key in rest if key not in one_of or one_of[key] != rest[key]]:
+                raise InputError(f"allowed: a file's name, without {', '.join(twice)}, which the file gives")
+            held = read
         except InputError as error:
             self.refuse(f"{path}.file", file, error.message)
         return {**held, **rest}

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.asked.quantities import LOOPS
-from actuator_lti.design.law import BESIDE_A_LAW, LAW_INPUTS
+from actuator_lti.design.law import BESIDE_A_LAW, LAW_WORDS, StateSpace, balance
 from actuator_lti.design.law_sources import PARTS, law_tree
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design
@@ -57,8 +57,8 @@ def _inputs(system: Any, inputs: Sequence[str] | None) -> list[str]:
     given = getattr(system, "input_labels", None) if inputs is None else inputs
     listed: list[Any] = list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     for name in listed:
-        if name not in LAW_INPUTS or given is name:
-            raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_INPUTS)}")
+        if name not in LAW_WORDS or given is name:
+            raise InputError(f"inputs = {shown(name)}: allowed: a list of {', '.join(LAW_WORDS)}")
     return listed
 
 
@@ -73,8 +73,12 @@ def with_law(
     L, gain, every, method, continuous = {**SETTINGS, **settings}.values()
     if stage not in LOOPS:
         raise InputError(f"stage = {shown(stage)}: allowed: {', '.join(LOOPS)}")
-    there: Mapping[str, Any] = design_tree(design)["control"].get(stage, {})
-    table = {key: value for key, value in there.items() if key in BESIDE_A_LAW}
+    control: Mapping[str, Any] = design_tree(design)["control"]
+    present = [one for one in LOOPS if one in control]
+    if outer := [one for one in present if stage not in present and LOOPS.index(one) > LOOPS.index(stage)]:
+        gains = f"the drive has none, and its {outer[0]} stage has gains for a drive without"
+        raise InputError(f"stage = {shown(stage)}: {gains}; allowed: {', '.join(present)}")
+    table = {key: value for key, value in control.get(stage, {}).items() if key in BESIDE_A_LAW}
     table |= {} if every is None else {"every": every}
     ticks = 1 if stage == "current" else table.get("every", 1)
     period_s = design.controller.period_s * (ticks if isinstance(ticks, int) and ticks > 0 else 1)
@@ -100,9 +104,19 @@ def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> t
     """A continuous system sampled by a stated method."""
     from scipy.signal import cont2discrete
 
-    law_tree(*parts)
     if not isinstance(method, str) or method not in METHODS:
         raise InputError(f"method = {shown(method)}: allowed: {' or '.join(METHODS)}")
     if dt not in (None, 0) or dt is False:
         raise InputError(f"method = {shown(method)}: the system is sampled already, dt = {dt}")
-    return tuple(cont2discrete(tuple(np.atleast_2d(part) for part in parts), period_s, METHODS[method])[:4])
+    plain = StateSpace(**law_tree(*parts))
+    m = len(plain.B[0] if plain.B else plain.D)
+    for key, (shape, fits) in plain.sizes(m).items():
+        if not fits:
+            raise InputError(f"{key}: other sizes; allowed: {shape}")
+    A, B, C, D, _ = plain.matrices(m)
+    if not A.size:
+        return A, B, C, D
+    t = balance(A, B, C)  # what is sampled is well scaled; its states stay those of the system
+    scaled = A * t / t[:, None], B / t[:, None], (C * t)[None], D[None]
+    A, B, C, D = cont2discrete(scaled, period_s, METHODS[method])[:4]
+    return A / t * t[:, None], B * t[:, None], C / t, D

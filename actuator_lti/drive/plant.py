@@ -137,7 +137,7 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
         B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}),
         torque=_own_torque(design, at),
         moment=_own_moment(design, at) if reaches else {},
-        rows={"output_angle": {"th": 1 / N}, "load_speed": {"w": 1.0}},
+        rows={"output_angle": {"th": 1 / N}, "output_speed": {"w": 1 / N}, "load_speed": {"w": 1.0}},
     )
 
 
@@ -192,6 +192,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
             "output_angle": {name: value / N_r for name, value in phi.items()},
             "phi": phi,
             "T_s": spring,
+            "output_speed": {"W": 1 / N_r},
             "load_speed": {"W": N_c},
         },
     )

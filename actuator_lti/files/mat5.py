@@ -1,9 +1,9 @@
 """Real numeric arrays out of a MATLAB level 5 file, by a small reader that trusts nothing in it.
 
 A reader of its own because the usual one can crash the interpreter on a damaged file. Source of the layout:
-MathWorks, "MAT-File Format" (R2019b), chapter 1. Texts and cells of texts are read as lists of names, numeric
-fields of a structure as ``name.field``; all else (sparse, objects) is passed over and named. So are complex
-arrays, which stand beside the real ones for whoever asks for them.
+MathWorks, "MAT-File Format" (R2019b), chapter 1. Texts and cells of texts are read as lists of names, sparse
+matrices as full ones, fields of a structure as ``name.field``; all else is passed over and named. So are
+complex arrays, which stand beside the real ones for whoever asks for them.
 """
 
 import struct
@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from math import prod
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +23,7 @@ from actuator_lti.types import Floats
 HEADER = 128
 MATRIX, COMPRESSED = 14, 15
 NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
-CELL, STRUCTURE, TEXT = 1, 2, 4
+CELL, STRUCTURE, TEXT, SPARSE = 1, 2, 4, 5
 NUMERIC_CLASSES = range(6, 16)
 COMPLEX_FLAG = 0x08
 MAX_BYTES = 8 * MAT_VALUES.most  # unpacked
@@ -84,7 +85,7 @@ class _Reader:
             self.content.passed_over.append(f"{what} at byte {place}")
             return
         name = parts[2][1].decode("latin-1")
-        takers = {CELL: self._cell, STRUCTURE: self._structure, TEXT: self._text}
+        takers = {CELL: self._cell, STRUCTURE: self._structure, TEXT: self._text, SPARSE: self._sparse}
         if not takers.get(self._flags(parts[0]) & 0xFF, self._array)(name, parts, place):
             self.content.passed_over.append(name)
 
@@ -108,6 +109,25 @@ class _Reader:
             raise InputError(f"{at}: no imaginary part for the shape {dimensions}")
         self.content.complexes[name] = (values + 1j * imaginary).reshape(dimensions, order="F")
         return False
+
+    def _sparse(self, name: str, parts: list[Part], _place: int) -> bool:
+        """A sparse matrix, which is written by columns, as a full one where that is not too large."""
+        found = [self._numbers(part) for part in (parts[1], *parts[3:])]
+        numbers = [one for one in found if one is not None]
+        there = sum(array.size for array in self.content.arrays.values())
+        if len(numbers) not in (4, 5) or len(numbers[0]) != 2 or there + prod(numbers[0]) > MAT_VALUES.most:
+            return False
+        shape, rows, starts, *values = numbers
+        try:
+            columns = np.repeat(np.arange(int(shape[1])), np.diff(starts.astype(int)))
+            places = np.ravel_multi_index((rows[: len(columns)].astype(int), columns), shape.astype(int))
+            full = np.zeros(int(prod(shape)), dtype=complex if len(values) == 2 else float)
+            full[places] = sum(k * v[: len(columns)] for k, v in zip((1, 1j), values, strict=False))
+        except ValueError:
+            return False
+        into: dict[str, Any] = self.content.complexes if len(values) == 2 else self.content.arrays
+        into[name] = full.reshape(shape.astype(int))
+        return len(values) == 1
 
     def _text(self, name: str, parts: list[Part], _place: int) -> bool:
         """A text: one name for each row of a character array."""
@@ -136,7 +156,7 @@ class _Reader:
         return True
 
     def _structure(self, name: str, parts: list[Part], _place: int) -> bool:
-        """The numeric fields of a single structure, as ``name.field``."""
+        """The numeric and text fields of a single structure, as ``name.field``."""
         shape = self._numbers(parts[1])
         if len(parts) < 5 or shape is None or np.prod(shape) != 1:
             return False
@@ -147,12 +167,11 @@ class _Reader:
         fields = [text[k : k + size].split(b"\0")[0].decode("latin-1") for k in range(0, len(text), size)]
         for field_name, part in zip(fields, parts[5:], strict=False):
             full = f"{name}.{field_name}"
-            if self._class_of(part) not in NUMERIC_CLASSES:
+            inner = MatContent() if self._class_of(part) == STRUCTURE else self._inside(part)
+            if not (inner.arrays or inner.texts):
                 self.content.passed_over.append(full)
-                continue
-            inner = self._inside(part)
-            self.content.arrays.update(zip([full], inner.arrays.values(), strict=False))
-            self.content.complexes.update(zip([full], inner.complexes.values(), strict=False))
+            for kind in ("arrays", "complexes", "texts"):
+                getattr(self.content, kind).update(zip([full], getattr(inner, kind).values(), strict=False))
         return True
 
     def _inside(self, part: Part) -> MatContent:

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 PlantInput = Literal["u", "i_ref"]
 INPUTS = ("ref", "moment")  # behind ``command`` and ``load_torque``
-OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist"}
+OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_angle", "twist": "twist",
+           "output_speed": "output_speed"}  # fmt: skip
 
 
 def plant(
@@ -63,7 +64,8 @@ def plant(
         Inputs: ``command``, and ``load_torque`` in N m, which pushes the output shaft forward (held over the
         tick; without effect where the load path locks itself). Outputs, those that the drive has:
         ``current`` in A, ``speed`` and ``angle`` of the motor in rad/s and rad, ``output_angle`` in rad,
-        ``twist`` of the coupling in rad at its own shaft (linear axis: m for rad, N for N m).
+        ``twist`` of the coupling in rad at its own shaft, ``output_speed`` in rad/s (linear axis: m for rad,
+        N for N m): the signals that a law of one's own takes, see `Design.with_law`.
 
     Raises
     ------
@@ -74,7 +76,7 @@ def plant(
     --------
     >>> system = plant("joint")
     >>> system.input_labels, system.output_labels
-    (['u', 'load_torque'], ['current', 'speed', 'angle', 'output_angle', 'twist'])
+    (['u', 'load_torque'], ['current', 'speed', 'angle', 'output_angle', 'twist', 'output_speed'])
     """
     design = as_design(design)
     for name, value, known in (("form", form, Form), ("command", command, PlantInput)):

@@ -103,8 +103,9 @@ class FlowWalk(Walk):
     def own_matrices(self, law: Law) -> Matrices:
         """Those that the design gives for continuous time."""
         if law.continuous is None:
+            stage, _ = self.control.own_law or ("*", law)
             given = "sampled, or the law's continuous = {A, B, C, D} in the design as well"
-            raise InputError(f"form: control.*.law is a sampled one; allowed: {given}")
+            raise InputError(f"form: control.{stage}.law is a sampled one; allowed: {given}")
         return law.continuous.matrices(len(law.inputs))
 
     def moves(self, name: str, value: Row) -> None:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from actuator_lti.design.law import Law, Matrices
+from actuator_lti.design.law import Law, Matrices, twist_of
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.drive.steady import standing_gain
@@ -24,7 +24,7 @@ from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
 """Reference of the outer stage, torque in N m at the motor, moment on the output shaft, a cut signal."""
-OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle"}
+OWN_SIGNALS = {"current": "i", "angle": "th", "output_angle": "output_angle", "output_speed": "output_speed"}
 """What a law of one's own takes of the plant as it is."""
 
 
@@ -138,6 +138,8 @@ class Walk(ABC):
         self.signals |= {name: self.state(name) for name in plant.states}
         for name, terms in plant.rows.items():
             self.signals[name] = total(value * self.state(state) for state, value in terms.items())
+        if self.program.shares_speed and self.updates(self.drive.interval["speed"]):
+            self.measured_speed()  # whether or not a stage takes it in this tick
         if not stages:
             value = self.command() if self.updates(1) else None
             return self.held("u", value, 1, 1)
@@ -275,18 +277,13 @@ class Walk(ABC):
         if stage not in self.program.opened:
             e |= {name: self.signals.get(signal, Row()) for name, signal in OWN_SIGNALS.items()}
             e |= seen or {}
-            e["output_speed"] = self.output_speed()
+            if "twist" in law.inputs:
+                e["twist"] = total(gain * e[name] for name, gain in twist_of(self.design).items())
             if "speed" in law.inputs:
                 e["speed"] = self.speed_in_use(stage)
         inputs = [e.get(name, Row()) for name in law.inputs]
         matrices, names = self.own_matrices(law), [f"{stage}.x{k}" for k in range(1, len(law.A) + 1)]
         return law.gain * self.linear(names, matrices.A, matrices.B, matrices.C, matrices.D, inputs)
-
-    def output_speed(self) -> Row:
-        """Speed of the output shaft; none where the rotor is locked."""
-        if "load_speed" in self.signals:
-            return self.signals["load_speed"] / self.drive.ratio
-        return self.signals.get("w", Row()) / self.drive.ratio
 
     def speed_in_use(self, stage: str) -> Row:
         """The measured speed as a stage has it."""

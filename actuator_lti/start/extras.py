@@ -1,4 +1,4 @@
-"""Packages that only some commands need: what to install is said in one line."""
+"""Packages: their versions, and what to install of those that only some commands need, said in one line."""
 
 from importlib import import_module
 from types import ModuleType
@@ -25,3 +25,13 @@ def need(module: str, extra: str, what: str) -> ModuleType:
         if error.name is None or error.name.partition(".")[0] != package:
             raise
         raise InputError(f'{what} needs {package}; allowed: pip install "actuator-lti[{extra}]"') from None
+
+
+def package_version(name: str = "actuator-lti", otherwise: str = "not installed") -> str:
+    """The version of an installed package."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return otherwise

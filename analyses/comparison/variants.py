@@ -111,7 +111,7 @@ def compare(
     study: Study | str | PathLike[str],
     *,
     validation: bool | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     engine: Engine | None = None,
     folder: Path | None = None,
 ) -> Comparison:

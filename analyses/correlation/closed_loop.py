@@ -65,7 +65,7 @@ class CorrelationResult:
 
 
 def correlate_record(
-    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress | None = None
+    design: AnyDesign, record: Record, *, command: str | None = None, progress: Progress = None
 ) -> CorrelationResult:
     """Simulate the design with a record's command and compare every signal.
 
@@ -148,7 +148,7 @@ def model_signals(
     record: Record,
     measured: Mapping[str, Floats],
     notes: list[str] | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     command: str | None = None,
 ) -> tuple[dict[str, Floats], dict[str, float]]:

@@ -118,7 +118,7 @@ class Correlation:
         return agrees(self.records, self.limit)
 
 
-def correlate(design: Design, asked: Asked, *, progress: Progress | None = None) -> Correlation:
+def correlate(design: Design, asked: Asked, *, progress: Progress = None) -> Correlation:
     """Run the model with each record's own command, load and supply, and compare."""
     records = named_apart([record for path in asked.records for record in open_records(path)])
     results = (correlate_record(design, one, command=asked.command, progress=progress) for one in records)

@@ -69,7 +69,7 @@ def identify_bench(
     *,
     validation: Sequence[Record] = (),
     settings: Settings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> BenchResult:
     """Identify a drive from records of its motion, and hold the design that comes of it against them.
 
@@ -148,7 +148,7 @@ def _made(
     both: Fit | None,
     settings: Settings,
     items: Sequence[verdict.Item],
-    progress: Progress | None,
+    progress: Progress,
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records

@@ -206,9 +206,7 @@ def _law_item(design: Design, fit: SurfaceFit) -> Iterator[Item]:
     yield Item(id="law", label="The load only adds friction", passed=False, reason=reason)
 
 
-def steady_error(
-    design: Design, points: Sequence[SteadyPoint], *, progress: Progress | None = None
-) -> float | None:
+def steady_error(design: Design, points: Sequence[SteadyPoint], *, progress: Progress = None) -> float | None:
     """Relative error of the simulated steady torques kM i over all runs; None where no run can be driven.
 
     Each run is a ramp of the output angle at the run's mean speed under its mean load, 0.3 s for running up

@@ -60,12 +60,7 @@ class CampaignSuggestion:
 
 
 def suggest_runs(
-    design: Design,
-    fit: SurfaceFit,
-    *,
-    count: int = 6,
-    criterion: str = "margins",
-    progress: Progress | None = None,
+    design: Design, fit: SurfaceFit, *, count: int = 6, criterion: str = "margins", progress: Progress = None
 ) -> CampaignSuggestion:
     """Suggest further (speed, load) points, one after the other, each the best after those before it.
 
@@ -93,9 +88,7 @@ def suggest_runs(
     )
 
 
-def margin_spreads(
-    design: Design, fit: SurfaceFit, *, progress: Progress | None = None
-) -> tuple[MarginSpread, ...]:
+def margin_spreads(design: Design, fit: SurfaceFit, *, progress: Progress = None) -> tuple[MarginSpread, ...]:
     """Margins, their slopes to C0, Cv, CM (central differences), and their spread from a fit's covariance."""
     middle = _margins(design)
     slopes = {key: np.zeros(3) for key in middle}

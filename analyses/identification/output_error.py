@@ -76,7 +76,7 @@ def fit_output(
     paths: tuple[str, ...],
     output_of: Callable[[Design], Floats],
     measured: Floats,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     step: float = STEP,
     iterations: int = ITERATIONS,
@@ -174,7 +174,7 @@ def output_name(design: Design, record: Record) -> str:
 
 
 def refine_records(
-    design: Design, records: Sequence[Record], paths: tuple[str, ...], *, progress: Progress | None = None
+    design: Design, records: Sequence[Record], paths: tuple[str, ...], *, progress: Progress = None
 ) -> OutputErrorResult:
     """Refine values by simulating every record with its own command, load and supply.
 

@@ -77,7 +77,7 @@ def plan_motions(
     within: float,
     noise: float,
     measured: JointModel | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> Plan:
     """Choose motions, one after the other, until every interval is expected to be as small as asked.
 

@@ -38,7 +38,7 @@ class CampaignAnswer(Identified):
 
 
 def identify(
-    design: Design, asked: Asked, *, progress: Progress | None = None
+    design: Design, asked: Asked, *, progress: Progress = None
 ) -> BenchResult | CampaignAnswer | FrequencyResult | ResponseResult | Plan:
     """Identify a drive from its records, and hold the design that comes of it against them."""
     limit, first, *others = asked.residual_limit / 100.0, *asked.files
@@ -78,7 +78,7 @@ def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:
     return named_apart([record for path in paths for record in open_records(path)], taken)
 
 
-def _of_campaign(design: Design, asked: Asked, progress: Progress | None) -> CampaignAnswer:
+def _of_campaign(design: Design, asked: Asked, progress: Progress) -> CampaignAnswer:
     listed, fixed = load_campaign(asked.files[0]), fixed_values(design, asked.fix)
     held, imported = held_by_name(fixed, NAMES), import_campaign(listed, progress=progress)
     result = identify_campaign(imported, design, fixed=held)

@@ -113,7 +113,7 @@ class LoopSurvey:
         return frame
 
 
-def survey_loops(design: AnyDesign, progress: Progress | None = None) -> LoopSurvey:
+def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
     """Assemble and measure the loops of a design in every form and at every operating point.
 
     All margins are certified, see `stability_margins`. ``progress`` gets (steps done, steps in all).

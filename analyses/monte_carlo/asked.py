@@ -51,9 +51,7 @@ class Asked(OnMachines):
             raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
 
 
-def study(
-    design: Design, asked: Asked, *, out: Path, progress: Progress | None = None
-) -> MonteCarloResult | Design:
+def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None) -> MonteCarloResult | Design:
     """The study, its samples kept in a folder of its own under ``out``; or the one sample that is asked for.
 
     Raises `InputError`: if nothing has a tolerance, or what is asked is no study.

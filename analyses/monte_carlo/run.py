@@ -14,12 +14,12 @@ import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
+from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.start.extras import need
@@ -82,7 +82,7 @@ def monte_carlo(
     settings: MonteCarloSettings | None = None,
     *,
     engine: Engine | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
 ) -> result.MonteCarloResult:
     """Sample the tolerances of a design and judge its requirements.
 
@@ -154,9 +154,7 @@ def _odds(id: str, words: str, unit: str, passed: int, count: int, **more: Any) 
     return result.Odds(id, words, unit, passed, count, passed / count, *bounds, **more)
 
 
-def _reduced(
-    task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress | None
-) -> Reduction:
+def _reduced(task: SampleTask, store: Store, samples: int, engine: Engine, progress: Progress) -> Reduction:
     """Reduce the samples where they are computed; what is done is noted every `NOTED_S` and at the end."""
     path = store.folder / f"reduced-{samples}.json.zlib"
     whole, done = judging.unpacked(path.read_bytes()) if path.is_file() else (Reduction(), [])

@@ -19,10 +19,10 @@ import numpy as np
 
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
-from actuator_lti.batch.parameters import OperatingPoint
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.design.tolerances import together
+from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree

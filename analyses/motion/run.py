@@ -39,7 +39,7 @@ class Motion:
         return False if self.ended.status == "diverging" else None
 
 
-def motion(design: Design, asked: Asked, *, progress: Progress | None = None) -> Motion:
+def motion(design: Design, asked: Asked, *, progress: Progress = None) -> Motion:
     """Simulate one motion, and write its rows where that is asked for.
 
     Raises `InputError`: for a command that does not fit the run, or a load that would not act in it.

@@ -94,7 +94,7 @@ def _over(one: InputUse, known: InputUse | None) -> InputUse:
     return replace(known, low=min(known.low, one.low), high=max(known.high, one.high))
 
 
-def import_campaign(campaign: Campaign, *, progress: Progress | None = None) -> ImportedCampaign:
+def import_campaign(campaign: Campaign, *, progress: Progress = None) -> ImportedCampaign:
     """Read every run that the campaign lists.
 
     A run whose file is missing, broken, or cannot be joined is set aside with its reason.

@@ -232,7 +232,7 @@ class Engine:
 
     def map(
         self, work: Callable[[Item], Result], items: Iterable[Item], sink: Callable[[Item, Result], None],
-        progress: Progress | None = None, size: Callable[[Item], int] = lambda _: 1,
+        progress: Progress = None, size: Callable[[Item], int] = lambda _: 1,
     ) -> None:  # fmt: skip
         """Apply a function of a module, or a task that is called like one, to every item once.
 

@@ -31,7 +31,7 @@ class Asked(OnMachines):
     ] = None
 
 
-def compared(study: Study | None, asked: Asked, *, out: Path, progress: Progress | None = None) -> Comparison:
+def compared(study: Study | None, asked: Asked, *, out: Path, progress: Progress = None) -> Comparison:
     """Compare the variants of a study; what is found of each design is kept under ``out``.
 
     Raises `InputError`: without a study.

@@ -41,7 +41,7 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 
 def tune(
-    design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress | None = None
+    design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress = None
 ) -> TuningResult:
     """Find gains that meet the requirements on loops over all corners of the tolerances.
 

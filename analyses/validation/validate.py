@@ -47,7 +47,7 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 def validate(
     design: AnyDesign,
     settings: Settings | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     *,
     model: Design | None = None,
 ) -> Validation:
@@ -80,7 +80,7 @@ class _Work:
     design: Design
     settings: Settings
     bench: Bench
-    progress: Progress | None
+    progress: Progress
     notes: list[str] = field(default_factory=list)
     done: int = 0
 

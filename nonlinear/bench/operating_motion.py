@@ -184,20 +184,9 @@ def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:
 
 def full_torque_Nm(design: Design) -> float:
     """Torque that the motor reaches at its limits, at standstill."""
-    return _torque_Nm(design, design.limits.peak_current_A)
-
-
-def lasting_torque_Nm(design: Design) -> float:
-    """The same that an overload protection leaves for long."""
-    limits = design.limits
-    lasting = inf if limits.peak_time_s is None else limits.continuous_current_A
-    return _torque_Nm(design, min(limits.peak_current_A, lasting))
-
-
-def _torque_Nm(design: Design, current_A: float) -> float:
     voltage, resistance = design.limits.voltage_V, design.effective_motor.resistance_ohm
     short = voltage / resistance if resistance else voltage
-    return float(motor_torque_Nm(design, min(current_A, short), voltage))
+    return float(motor_torque_Nm(design, min(design.limits.peak_current_A, short), voltage))
 
 
 def _fastest(design: Design, load_Nm: float, share: float) -> OperatingMotion | None:

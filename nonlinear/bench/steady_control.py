@@ -113,6 +113,6 @@ def _inputs(design: Design, stage: str, bias: OperatingMotion, T: float) -> tupl
     at_output = stage == "position" and design.controller.position_loop.sensor == "output"
     measured = {"position": N * output if at_output else 0.0, "velocity": w, "current": bias.current_A}[stage]
     start = {"error": -measured, "speed": w, "current": bias.current_A, "output_angle": output,
-             "output_speed": w / N}  # fmt: skip
+             "output_speed": w / N, "twist": -design.ratio_behind_coupling * output}  # fmt: skip
     gained = {"angle": w * T, "output_angle": w * T / N, "command": w * T if stage == "position" else 0.0}
     return start, gained, {"command": 1.0, "error": 1.0}

@@ -1,12 +1,12 @@
 """`actuator-lti export c`: header, source, the design's parameters, an example and a README."""
 
 import re
-from importlib.metadata import PackageNotFoundError, version
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
+from actuator_lti.start.extras import package_version
 from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
@@ -98,14 +98,6 @@ def stage_words(design: Design) -> tuple[str, str]:
     return table[design.controller.outermost]
 
 
-def exporter_version() -> str:
-    """Version of the package that exports."""
-    try:
-        return version("actuator-lti")
-    except PackageNotFoundError:
-        return "not installed"
-
-
 def _values(design: Design, row: Floats) -> dict[str, str]:
     """What stands for the words of ``design.h`` and ``design.c``."""
     known = place_words()
@@ -117,7 +109,7 @@ def _values(design: Design, row: Floats) -> dict[str, str]:
     return {
         "DESIGN": plain(design.name), "TITLE": plain(design.title),
         "NAME": c_text(design.name), "REVISION": c_text(design.revision or ""),
-        "DESIGN_HASH": design_hash(design), "VERSION": exporter_version(), "VALUES": "\n".join(lines),
+        "DESIGN_HASH": design_hash(design), "VERSION": package_version(), "VALUES": "\n".join(lines),
     }  # fmt: skip
 
 

@@ -8,8 +8,9 @@ from actuator_lti.compiled.program import Program
 from actuator_lti.compiled.structs import Member, struct_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
+from actuator_lti.start.extras import package_version
 from nonlinear._kernels import layout as at
-from nonlinear.export.c_files import exporter_version, plain, refuse_prefix
+from nonlinear.export.c_files import plain, refuse_prefix
 from nonlinear.export.controller_cut import Controller, begins, controller_of
 from nonlinear.export.controller_names import SIGNAL_AT, member_words
 from nonlinear.export.controller_vectors import roundings, vectors_text
@@ -36,7 +37,7 @@ def controller_export(
     called = ", ".join(f"`{name}`" for name in sorted({*_LIBRARY.findall(source)}))
     values = {
         "PREFIX": prefix.upper(), "prefix": prefix, "namespace": prefix.removesuffix("_"),
-        "NAME": plain(design.name), "TITLE": plain(design.title), "VERSION": exporter_version(),
+        "NAME": plain(design.name), "TITLE": plain(design.title), "VERSION": package_version(),
         "C_NAME": c_text(design.name), "C_REVISION": c_text(design.revision or ""),
         "DESIGN_HASH": design_hash(design), "REAL": "float" if single_precision else "double",
         "PRECISION": "single" if single_precision else "double",

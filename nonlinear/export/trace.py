@@ -58,14 +58,19 @@ def _number(value: Any) -> float:
     return value.number if isinstance(value, Traced) else float(value)
 
 
-def _binary(sign: str, function: Callable[[Any, Any], Any]) -> tuple[Any, Any]:
+def _binary(sign: str, function: Callable[[Any, Any], Any], *, loose: bool = False) -> tuple[Any, Any]:
+    def made(tape: Tape, one: Any, other: Any) -> Traced:
+        if loose and not tape.loose:
+            raise TypeError(f"{sign} of a traced value")
+        return tape.value(sign, (one, other), function(_number(one), _number(other)))
+
     def forward(self: Traced, other: Any) -> Traced:
         if isinstance(other, np.ndarray):
             return NotImplemented  # numpy goes over its elements
-        return self.tape.value(sign, (self, other), function(self.number, _number(other)))
+        return made(self.tape, self, other)
 
     def backward(self: Traced, other: Any) -> Traced:
-        return self.tape.value(sign, (other, self), function(_number(other), self.number))
+        return made(self.tape, other, self)
 
     return forward, backward
 
@@ -114,6 +119,7 @@ class Traced:
     __mul__, __rmul__ = _binary("*", operator.mul)
     __truediv__, __rtruediv__ = _binary("/", operator.truediv)
     __pow__, _ = _binary("pow", operator.pow)
+    __mod__, __rmod__ = _binary("fmod", math.fmod, loose=True)
     __and__, _ = _binary("&&", lambda one, other: bool(one) and bool(other))  # of comparisons that are values
     __or__, _ = _binary("||", lambda one, other: bool(one) or bool(other))
     __rand__, __ror__ = __and__, __or__
@@ -139,17 +145,6 @@ class Traced:
     def __format__(self, form: str) -> str:
         """Stands in a message for the value that it will have."""
         return f"\x01{form or 'g'}\x02{self.name}\x03"
-
-    def __mod__(self, other: Any) -> Traced:
-        return self._remainder(self, other)
-
-    def __rmod__(self, other: Any) -> Traced:
-        return self._remainder(other, self)
-
-    def _remainder(self, of: Any, by: Any) -> Traced:
-        if not self.tape.loose:
-            raise TypeError("a remainder")
-        return self.tape.value("fmod", (of, by), math.fmod(_number(of), _number(by)))
 
     def __neg__(self) -> Traced:
         return self.tape.value("-", (self,), -self.number)

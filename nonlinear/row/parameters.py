@@ -6,7 +6,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from actuator_lti.design.law import LAW_INPUTS
+from actuator_lti.design.law import LAW_INPUTS, twist_of
 from actuator_lti.design.model import AntiWindup, CurrentLoop, Design, FilterPlace, SpeedSource, VelocityLoop
 from actuator_lti.design.over_angle import OverAngle
 from actuator_lti.drive.signals import LIMITERS
@@ -199,15 +199,18 @@ def _own_law(design: Design, row: Floats) -> None:
         row[place] = 0.0 if quantum is None else 1.0 / quantum
     if stage == "position" and design.controller.position_loop.sensor == "motor":
         row[at.POSITION_COUNTS] = row[at.OWN_COUNTS]
-    columns = [LAW_INPUTS.index(name) for name in law.inputs]
-    for k, (own_row, driven) in enumerate(zip(law.A, law.B, strict=True)):
+    made = {"twist": twist_of(design) if "twist" in law.inputs else {}}
+    for at_row, driven in (
+        (at.OWN_D, law.D),
+        *((at.OWN_B + k * at.OWN_INPUTS, one) for k, one in enumerate(law.B)),
+    ):
+        for name, value in zip(law.inputs, driven, strict=bool(driven)):
+            for signal, gain in made.get(name, {name: 1.0}).items():
+                row[at_row + LAW_INPUTS.index(signal)] += value * gain
+    for k, own_row in enumerate(law.A):
         _put(row, at.OWN_A + k * at.MOST_STATES, own_row)
-        for j, value in zip(columns, driven, strict=True):
-            row[at.OWN_B + k * at.OWN_INPUTS + j] = value
     _put(row, at.OWN_C, law.C)
     _put(row, at.OWN_L, law.L)
-    for j, value in zip(columns, law.D or (0.0,) * len(columns), strict=True):
-        row[at.OWN_D + j] = value
 
 
 def _regulator(

@@ -27,7 +27,7 @@ CHUNK_TICKS = 2_000_000  # ticks one thread does between two looks at the queue
 
 
 def simulate_many(
-    runs: Sequence[Run], *, threads: int | None = None, progress: Progress | None = None
+    runs: Sequence[Run], *, threads: int | None = None, progress: Progress = None
 ) -> BatchResult:
     """Simulate many runs, each with its own design, command and reducers.
 
@@ -59,7 +59,7 @@ def run_rows(
     tables: Floats | None = None,
     *,
     threads: int | None = None,
-    progress: Progress | None = None,
+    progress: Progress = None,
     drives: Sequence[Running] | None = None,
 ) -> BatchResult:
     """Run parameter rows, shape (n, layout.SIZE), of `nonlinear.rows.Rows`.

@@ -6,7 +6,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.progress import Progress as Bar
 
-    from actuator_lti.types import Progress
 
 _TURNED = re.compile(f"[{DIRECTION}]")
 _OBEYED = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff{DIRECTION}]")
@@ -86,7 +85,7 @@ PATIENCE_S = 0.7
 
 
 @contextmanager
-def progress(description: str, *, quiet: bool = False) -> Iterator[Progress]:
+def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int, int], None]]:
     """Give a function ``(done, total)`` that shows a bar on the terminal once the work takes a while.
 
     Nothing is shown where standard error is no terminal, so that logs stay clean.

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 
 from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.law import LAW_INPUTS, Law
+from actuator_lti.design.law import LAW_WORDS, Law
 from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
 from tests.changed import changed
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
-         "output_speed": 1e-3}  # fmt: skip
+         "output_speed": 1e-3, "twist": 1.0}  # fmt: skip
 STAGES = ("current", "velocity", "position")
 BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
@@ -54,7 +54,8 @@ def random_law(
     rng: np.random.Generator, design: Design, stage: str, *, order: int | None = None, stable: bool = False
 ) -> Design:
     """A law on any inputs, over decades of the stage's gain; at most so large that the loop is stable."""
-    known = [name for name in LAW_INPUTS if name != "current" or design.motor.has_electrical_dynamics]
+    lacking = {"current": not design.motor.has_electrical_dynamics, "twist": design.coupling is None}
+    known = [name for name in LAW_WORDS if not lacking.get(name)]
     inputs = [name for name in known if rng.random() < 0.6]
     inputs += [] if {"command", "error"} & {*inputs} else ["error"]
     n, m, size = (

@@ -12,18 +12,45 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, as_law, drawn, period_s
+from own_laws import PlainLaw, as_law, drawn, linear, period_s
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
-from actuator_lti.design import Design, design_hash, design_tree, read_design_text, warnings_of, write_design
+from actuator_lti.design import (
+    Design,
+    design_hash,
+    design_tree,
+    model,
+    read_design_text,
+    warnings_of,
+    write_design,
+)
 from actuator_lti.design.model import Command, Encoder, Limits, OutputEncoder
 from actuator_lti.loops.assemble import loops_at
 from nonlinear import Drive, Rows, State, commands, simulate, tangent
 from nonlinear.bench.loop_setup import loop_setup
+from tests.changed import changed
 
 TICKS = 400
 SIGNALS = {"th": "motor_angle_rad", "w": "motor_speed_rad_s", "i": "current_A", "u": "voltage_V"}
+
+
+def same_run(design: Design, case: object, rng: np.random.Generator) -> None:
+    """Simulator without limits and linear map, tick by tick, under a sine, a ramp and a load."""
+    t = np.arange(TICKS)
+    command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
+    rows = Rows.of(design, limits_on=False)
+    rows["ticks"], rows["load"] = TICKS, 0.1
+    rows.series("command", command)
+    system = assemble_loops(design).tick_system
+    with np.errstate(over="ignore", invalid="ignore"):
+        run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
+    for name, ours in SIGNALS.items():
+        if name not in linear:
+            continue
+        some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
+        most = np.abs(linear[name][some]).max()
+        assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (case, name)
 
 
 @pytest.mark.parametrize("part", range(4))
@@ -36,21 +63,20 @@ def test_both_writings_agree_on_random_laws(part: int) -> None:
             continue
         design, stage = found
         stages.add(stage)
-        rng, t = np.random.default_rng(case), np.arange(TICKS)
-        command = 1e-2 * (np.sin(t * rng.uniform(0.01, 0.1)) + 1e-3 * t)
-        rows = Rows.of(design, limits_on=False)
-        rows["ticks"], rows["load"] = TICKS, 0.1
-        rows.series("command", command)
-        system = assemble_loops(design).tick_system
-        with np.errstate(over="ignore", invalid="ignore"):
-            run, linear = rows.trajectory(), system.respond(command, 0.0, None, 0.1)
-        for name, ours in SIGNALS.items():
-            if name not in linear:
-                continue
-            some = np.maximum.accumulate(np.abs(linear["w"])) < 1e12
-            most = np.abs(linear[name][some]).max()
-            assert np.abs(getattr(run, ours) - linear[name])[some].max() <= 1e-9 * most, (part, case, name)
+        same_run(design, (part, case), np.random.default_rng(case))
     assert stages == {"current", "velocity", "position"}
+
+
+@pytest.mark.parametrize("every", [1, 2, 10])
+@pytest.mark.parametrize("encoder", [Encoder(speed="difference", difference_samples=3),
+                                     Encoder(speed="tracking", bandwidth_rad_s=600.0)])  # fmt: skip
+def test_a_position_law_takes_the_speed_that_is_measured_every_tick(encoder: Encoder, every: int) -> None:
+    """Without a velocity stage the speed is measured every tick, the law updated every so many."""
+    loops = {"velocity": None, "position": model.PositionLoop(gain=1.0, every=every)}
+    design = linear(changed(load_design("ilr33-amber"), encoder=encoder, controller=loops))
+    T = design.controller.period_s * every
+    law = ([], [], [], [[0.5, -0.5, -2e-3]], T)
+    same_run(design.with_law("position", law, ["command", "angle", "speed"]), every, np.random.default_rng(1))
 
 
 @pytest.mark.parametrize("case", [c for c in range(60) if drawn(c) is not None][:12])
@@ -233,7 +259,7 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "continuous; allowed: a sampled one of dt = 0.0001 s" in made(control.ss(*unit[:4]))
     assert "of no stated period" in made(control.ss(*unit[:4], True))
     assert "sampled already" in made(unit, method="zoh")
-    assert 'dt = "T": allowed: a period in s' in made((*unit[:4], "T"))
+    assert "dt: must be real" in made((*unit[:4], "T"))
     assert "tustin or zoh" in made(unit[:4], method=["zoh"])
     assert "tustin or zoh" in made(unit[:4], method="euler")
     assert "current, velocity, position" in made(unit, stage="torque")
@@ -276,8 +302,14 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
     assert "without encoder.filter_time" in refused(twice.with_values, {"encoder.filter_time": "1 ms"})
     force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)
+    assert "without a coupling" in made(unit, ["twist"])
     assert "no current" in refused(force.with_law, "position", slow, ["current"])
-    assert "control.*.law is a sampled one" in refused(assemble_loops, twice, "continuous")
+    assert "form: control.velocity.law is a sampled one" in refused(assemble_loops, twice, "continuous")
+    assert "law.gain = 0: the law gives nothing; allowed: not 0" in made(unit, gain=0)
+    volts = controlled(base, current=None, velocity={"every": 1}, position=None)
+    said = refused(volts.with_law, "current", unit, ["error"])
+    assert said.startswith('stage = "current": the drive has none')
+    assert said.endswith("allowed: velocity")
     (tmp_path / "k.csv").write_text("1")
     (tmp_path / "k.mat").write_text("x")
     wrong = (("none.mat", "no such file"), ("k.csv", ".mat up to version 7"), ("k.mat", "cannot be read"))

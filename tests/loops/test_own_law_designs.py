@@ -97,6 +97,17 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
     np.testing.assert_allclose(loop.open_loop(z), theirs / (1.0 + gains["u1"] / z), rtol=1e-7)
+    # the same with the twist by its name
+    inputs = ["current", "speed", "angle", "output_speed", "twist", "command"]
+    D = -np.array([gains["i"], gains["w"], gains["th"], gains["W"] * N_r, gains["twist"], -gains["th"]])
+    law = ([[-gains["u1"]]], [D], [[-gains["u1"]]], [D], T)
+    same_poles(poles(base.with_law("position", law, inputs)), wanted, 1e-7)
+    other = Rows.of(base.with_law("position", law, inputs, L=[1.0]), limits_on=False)
+    other["ticks"] = rows["ticks"]
+    other.step("command", 0.1)
+    np.testing.assert_allclose(
+        other.trajectory().output_angle_rad, rows.trajectory().output_angle_rad, atol=1e-12, rtol=0
+    )
 
 
 STAGES = ("current", "velocity", "position")

@@ -18,7 +18,7 @@ from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.systems.sampling import delayed_hold, held_step, split_delay
 from analyses import survey_loops
 from nonlinear.row.filters import section
-from reports.sections.delays import section as delay_section
+from reports.sections.forms import delay_budget as delay_section
 from tests.validation.random_drives import full_drive
 
 

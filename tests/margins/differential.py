@@ -141,6 +141,15 @@ def leaves_out(m: StabilityMargins) -> bool:
     return any("left out" in note for note in m.notes)
 
 
+def too_far(m: StabilityMargins, end: float = math.inf) -> str:
+    """The smallest distance to -1 if a crossing below ``end`` lies nearer: |1 + L| there in closed form."""
+    phases = [2.0 * math.sin(0.5 * math.radians(abs(p.deg))) for p in m.phase_margins]
+    gains = [abs(1.0 - 1.0 / g.ratio) for g in m.gain_margins if g.frequency_rad_s < end]
+    nearest = min([*phases, *gains], default=math.inf)
+    wrong = m.modulus_margin is not None and m.modulus_margin > nearest * (1.0 + 1e-6) + 1e-12
+    return f"modulus margin {m.modulus_margin} beyond a crossing at {nearest}" if wrong else ""
+
+
 def delayed_forms(
     loop: control.TransferFunction, rng: np.random.Generator
 ) -> Iterator[tuple[str, Facts, Facts, float]]:
@@ -203,7 +212,7 @@ def behind_part_of_a_sample(family: Family, seed: int, k: int) -> tuple[str, str
     ours = facts(m)
     inside = Facts(None, [g for g in ours.gains if 0.0 < g[0] < end], ours.phases)
     expected = without_touches(replace(truth_of(loop, part), unstable=None), m)
-    what = unlike(inside, expected, 1e-6, 1e-3, far=30.0 if leaves_out(m) else 90.0)
+    what = too_far(m, end) or unlike(inside, expected, 1e-6, 1e-3, far=30.0 if leaves_out(m) else 90.0)
     return ("wrong", f"behind {part} of a sample: {what}") if what else ("right", "")
 
 
@@ -231,6 +240,8 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
             said = leaves_out(m) and not unlike(ours, listed, 1e-6, 1e-3, far=30.0)
             kind = "wrong" if determined(loop, expected, rng) else "right" if said else "undetermined"
             return kind, f"against the truth: {what}"
+        if what := too_far(m):
+            return "wrong", what
         for name, other, unit in forms(loop, rng):
             theirs = facts(other)
             gains, phases = ([(w * unit, x) for w, x in part] for part in (theirs.gains, theirs.phases))

@@ -228,3 +228,15 @@ def test_a_band_may_be_any_pair(certify: bool) -> None:
 def test_frequencies_that_are_none_are_refused(omega: object) -> None:
     with pytest.raises(InputError, match="omega_rad_s: every frequency must be positive and finite"):
         unwrapped_phase_deg(control.tf([1.0], [1.0, 1.0]), omega)
+
+
+def test_the_smallest_distance_is_found_at_a_resonance_that_few_places_show() -> None:
+    """It crosses the unit circle 0.104 deg from -1: at least as near as 2 sin(0.052 deg)."""
+    num = [13.549262580165, 0.0275907992797, 3066855.06404301, 15.2657139410679, 9278595.25856611]
+    den = [1.0, 0.22308598193989, 82815.563419431, 18457.458636290, 412791.58121709, 91994.570914535, 0.0]
+    m = stability_margins(control.tf(num, den))
+    nearest = min(m.phase_margins, key=lambda p: abs(p.deg))
+    bound = 2.0 * math.sin(0.5 * math.radians(abs(nearest.deg)))
+    assert bound == pytest.approx(1.814e-3, rel=1e-3)
+    assert 0.99 * bound < m.modulus_margin <= bound  # a resonance passes -1 as a straight line
+    assert m.modulus_frequency_rad_s == pytest.approx(nearest.frequency_rad_s, rel=1e-6)

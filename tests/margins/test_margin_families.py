@@ -50,6 +50,12 @@ def test_behind_part_of_a_sample_only_what_8_ulp_decide_is_withheld(family: int)
     assert len(withheld) < ROUNDS // 2
 
 
+def test_a_phase_that_turns_beside_poles_next_to_the_border_is_followed() -> None:
+    """A double pole at z = 1 that rounding parts by 1e-8: its rate hides the turn of the phase behind it."""
+    k = 34747
+    assert behind_part_of_a_sample(ALL[k % len(ALL)], 9201, k) == ("right", "")
+
+
 @pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.__name__)
 def test_what_double_precision_has_checked_is_what_exact_arithmetic_certifies(family: Family) -> None:
     kinds = set()

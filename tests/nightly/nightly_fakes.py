@@ -39,7 +39,7 @@ def fake_document(payload: Mapping[str, Any]) -> dict[str, Any]:
         found = {"passed": False, "reason": "the position loop is unstable"}
     named = str(payload.get("requirement", "GM")), str(payload.get("label", "gain margin"))
     about = {"limit": limit, "comparison": "≥", "unit": "dB", "source": "test"}
-    item = verdict(*named, **about, **found, waiver=str(payload.get("waiver", "")))
+    item = {**verdict(*named, **about, **found), "waiver": str(payload.get("waiver", ""))}
     rows = [
         {"loop": loop, "phase_margin": 40.0 + margin + k, "crossover": 100.0 * (k + 1)}
         for k, loop in enumerate(["current", "velocity", str(payload.get("loop", "position"))])

@@ -175,7 +175,7 @@ def test_names_from_a_design_file_stay_text() -> None:
 def test_names_in_a_figure_stay_text(on_page: bool) -> None:
     chart = Chart(title=HOSTILE, legend=True, legend_title=HOSTILE, loop=HOSTILE)
     panel = chart.panel(title=HOSTILE)
-    panel.curve([1, 2], [1, None], HOSTILE, id=HOSTILE)
+    panel.curve([1, 2], [1, None], HOSTILE)
     panel.bar(0.0, 0.0, 10.0, HOSTILE)
     panel.rule_y(1.0, HOSTILE)
     panel.note(HOSTILE, corner="top left")

@@ -1,0 +1,187 @@
+"""What a file or a system gives a law of one's own: all of it is taken, or refused by its name."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+import scipy.signal
+from own_laws import period_s
+from scipy.io import savemat
+from scipy.sparse import csc_matrix
+from test_own_law import refused
+
+from actuator_lti import load_design
+from actuator_lti.design import Design, write_design
+from actuator_lti.design.law import Law
+from actuator_lti.files.mat5 import read_mat5
+
+BASE = load_design("ilr33-amber-multirate")
+T = period_s(BASE, "velocity")
+A, B, C, D = (
+    np.array(one) for one in ([[0.5, 0.1], [0, 0.9]], [[1e-3, 0], [0, 1e-4]], [[1, 0.5]], [[0.1, 0]])
+)
+L = np.array([0.25, -0.5])
+INPUTS = ["error", "speed"]
+WANTED = BASE.with_law("velocity", (A, B, C, D, T), INPUTS, L=L).controller
+PARTS = {"A": A, "B": B, "C": C, "D": D, "Ts": T}
+
+
+def read(folder: Path, held: Any, beside: str = "") -> Design:
+    """The design with a law of a file: JSON of a text, else .mat."""
+    if isinstance(held, str):
+        (folder / "k.json").write_text(held)
+    else:
+        savemat(folder / "k.mat", held)
+    tables = write_design(BASE.with_law("velocity", ([], [], [], [[1.0]], T), ["error"])).split("\n\n")
+    name = f'file = "k.{"json" if isinstance(held, str) else "mat"}"'
+    made = [f"[control.velocity.law]\n{name}\n{beside}" if "velocity.law" in one else one for one in tables]
+    (folder / "mine.toml").write_text("\n\n".join(made))
+    return load_design(folder / "mine.toml")
+
+
+NAMES = f"inputs = {INPUTS}"
+
+
+@pytest.mark.parametrize(
+    ("held", "beside"),
+    [
+        (PARTS | {"L": L}, NAMES),
+        (PARTS | {"L": L[:, None], "inputs": INPUTS}, ""),
+        (PARTS, f"{NAMES}\nL = [0.25, -0.5]"),
+        (PARTS | {"L": L, "A": csc_matrix(A), "B": csc_matrix(B), "D": csc_matrix(D)}, NAMES),
+        (PARTS | {"L": L + 0j, "A": csc_matrix(A + 0j)}, NAMES),
+        ({"K": PARTS | {"L": L, "inputs": np.array(INPUTS, dtype=object)}}, NAMES),
+    ],
+)
+def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) -> None:
+    assert read(tmp_path, held, beside).controller == WANTED
+
+
+def test_its_gain_is_taken(tmp_path: Path) -> None:
+    assert read(tmp_path, PARTS | {"gain": 2.0}, NAMES).controller.velocity.law.gain == 2.0
+
+
+@pytest.mark.parametrize("name", ["A", "B", "C", "D", "L", "Ts", "gain"])
+@pytest.mark.parametrize(
+    "made", [lambda one: one + 1e-3j, lambda _: "text", lambda one: csc_matrix(one * 1j)]
+)
+def test_what_is_not_real_is_refused_by_its_name(name: str, made: Any, tmp_path: Path) -> None:
+    whole = PARTS | {"L": L, "gain": 1.0}
+    for held in (whole | {name: made(whole[name])}, {"K": whole | {name: made(whole[name])}}):
+        said = refused(read, tmp_path, held, NAMES)
+        assert said.endswith(f'law.file = "k.mat": {name}: must be real; allowed: finite real numbers'), said
+
+
+@pytest.mark.parametrize("value", ['"0.5"', "true", "null", "[[0.5, true]]"])
+def test_json_text_and_truth_are_no_numbers(value: str, tmp_path: Path) -> None:
+    said = refused(read, tmp_path, f'{{"A": {value}, "B": [[1]], "C": [[1]], "D": [[0]], "Ts": {T}}}', NAMES)
+    assert "A: must be real" in said
+
+
+def test_what_a_file_leaves_open_is_refused(tmp_path: Path) -> None:
+    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
+    several = refused(read, tmp_path, {"K1": PARTS, "K2": PARTS}, NAMES)
+    assert "holds several laws: K1, K2; allowed: a file of one law" in several
+    assert "several laws: its own A, B, C, D, K" in refused(
+        read, tmp_path, json.dumps({**one, "K": one}), NAMES
+    )
+    assert "has Ts and dt that differ" in refused(read, tmp_path, json.dumps({**one, "dt": 1.0}), NAMES)
+    assert "Ts: 1 x 2; allowed: one number" in refused(read, tmp_path, PARTS | {"Ts": [T, T]}, NAMES)
+    for more, beside in (
+        ({"inputs": INPUTS[::-1]}, ""),
+        ({"L": L}, "L = [1.0, 2.0]"),
+        ({"gain": 2.0}, "gain = 3"),
+    ):
+        said, key = refused(read, tmp_path, PARTS | more, f"{NAMES}\n{beside}"), next(iter(more))
+        assert said.endswith(f"allowed: a file's name, without {key}, which the file gives")
+    assert "without A, period, which" in refused(
+        read, tmp_path, PARTS, f'{NAMES}\nA = [[1]]\nperiod = "1 ms"'
+    )
+
+
+@pytest.mark.parametrize(
+    "system",
+    [
+        (np.array([[0.5j]]), [[1]], [[1]], [[0]], T),
+        scipy.signal.StateSpace([[0.5j]], [[1]], [[1]], [[0]], dt=T),
+        scipy.signal.ZerosPolesGain([0.2j], [0.5], 1.0, dt=T),
+        scipy.signal.TransferFunction([1 + 1j], [1, 0.5], dt=T),
+    ],
+)
+def test_a_complex_system_is_refused(system: Any) -> None:
+    assert "must be real" in refused(BASE.with_law, "velocity", system, ["error"])
+
+
+def test_a_damaged_sparse_matrix_is_passed_over(tmp_path: Path) -> None:
+    savemat(tmp_path / "k.mat", {"A": csc_matrix(A)})
+    good = (tmp_path / "k.mat").read_bytes()
+    assert np.array_equal(read_mat5(good).arrays["A"], A)
+    rows = np.array([0, 0, 1], dtype="<i4").tobytes()
+    assert read_mat5(good.replace(rows, np.array([0, 0, 7], dtype="<i4").tobytes())).passed_over == ["A"]
+
+
+def response(law: Law, z: np.ndarray) -> np.ndarray:
+    made = law.sampled
+    n = len(made.A)
+    return np.array(
+        [(made.C @ np.linalg.solve(one * np.eye(n) - made.A, made.B) + made.D).item() for one in z]
+    )
+
+
+@pytest.mark.parametrize("form", [lambda K: K, control.ss])
+def test_a_product_of_transfer_functions_is_a_law(form: Any) -> None:
+    """Its companion form has numbers of 1e15; the response is that of the factors one by one."""
+    s = control.tf("s")
+
+    def factors(p: Any) -> list[Any]:
+        lag = [1 / ((p / w) ** 2 + 1.2 * p / w + 1) for w in (900.0, 3000.0)]
+        return [22 * (p + 3) / p, (p / 20 + 1) / (p / 200 + 1), *lag]
+
+    K = form(np.prod(factors(s)))
+    mine = BASE.with_law("velocity", K, ["error"], method="tustin")
+    z = np.exp(1j * np.geomspace(1e-3, 3.0, 40))
+    want = np.prod(factors(2 / T * (z - 1) / (z + 1)), axis=0)
+    np.testing.assert_allclose(response(mine.controller.velocity.law, z), want, rtol=1e-11)
+    assert mine.controller.velocity.law.integrates
+
+
+def test_sampling_keeps_what_a_long_filter_leaves() -> None:
+    """Six lags of 30 rad/s: 1e-12 of the gain at rest is left far above them, and it is right."""
+    s, T_p = control.tf("s"), period_s(BASE, "position")
+    K = np.prod([1 / (s / (30.0 + 10 * k) + 1) for k in range(6)])
+    law = BASE.with_law("position", K, ["error"], method="tustin").controller.position.law
+    p = 1j * np.geomspace(1.0, 3000.0, 30)
+    z = (2 / T_p + p) / (2 / T_p - p)
+    want = np.prod([1 / (p / (30.0 + 10 * k) + 1) for k in range(6)], axis=0)
+    np.testing.assert_allclose(response(law, z), want, rtol=1e-10)
+    assert law.steady("command") == pytest.approx(1.0, rel=1e-9)
+
+
+def test_the_size_of_the_states_changes_nothing() -> None:
+    """Scaled by powers of two a law is the same to the last bit, anti-windup and all."""
+    law = BASE.with_law("velocity", (A, B, C, D, T), INPUTS, L=L).controller.velocity.law
+    t = 2.0 ** np.array([60.0, -60.0])
+    scaled = A * t / t[:, None], B / t[:, None], C * t, D, T
+    found = BASE.with_law("velocity", scaled, INPUTS, L=L / t).controller.velocity.law
+    for k in range(4):
+        power = np.linalg.matrix_power
+        assert np.array_equal(found.sampled.C @ power(found.sampled.A, k) @ found.sampled.B,
+                              law.sampled.C @ power(law.sampled.A, k) @ law.sampled.B)  # fmt: skip
+        assert found.sampled.C @ power(found.sampled.A, k) @ found.sampled.L == (
+            law.sampled.C @ power(law.sampled.A, k) @ law.sampled.L
+        )
+    apart = ([[0.5, 1e12], [0.0, 0.5]], [[0.0], [1.0]], [[1e-12, 0.0]], [[0.0]], T)
+    law = BASE.with_law("velocity", apart, ["error"]).controller.velocity.law
+    assert law.steady("command") == pytest.approx(4.0, rel=1e-12)
+
+
+def test_a_continuous_system_that_does_not_fit_is_refused() -> None:
+    bad = ([[1.0, 0.0], [0.0, 1.0]], [[1.0], [1.0]], [[1.0]], [[0.0]])
+    assert "C: other sizes; allowed: 1 x 2" in refused(
+        lambda: BASE.with_law("velocity", bad, ["error"], method="zoh")
+    )
+    gain = BASE.with_law("velocity", ([], [], [], [[0.2]]), ["error"], method="zoh")
+    assert gain.controller.velocity.law.D == (0.2,)
