@@ -71,7 +71,7 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         band_rad_s=(float(omega[0]), float(omega[-1])),
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
-        evidence_reason=_reason(omega, result),
+        evidence_reason=_reason(omega, result, response.noise_known),
         notes=(*_hidden(omega, result), *_lost(omega, result), *grazed, *touched, noise, *_NOTES),
     )
     return margins if response.noise_known else _without_ranges(margins)
@@ -241,8 +241,9 @@ def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], 
     return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
 
 
-def _reason(omega: Real, result: Bounds) -> str:
-    reason = "measured points: the figures lie in their ranges, stability is not determined"
+def _reason(omega: Real, result: Bounds, known: bool) -> str:
+    ranges = "the figures lie in their ranges" if known else "the figures have no ranges"
+    reason = f"measured points: {ranges}, stability is not determined"
     if not result.unresolved.any():
         return reason
     others = np.count_nonzero(result.unresolved) - 1
