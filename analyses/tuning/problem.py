@@ -136,7 +136,8 @@ class Problem:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).
 
         Unstable designs get a number of at most -3 that falls with the distance of the poles from the circle,
-        of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the corners, where not those of the problem.
+        of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the
+        corners, where not those of the problem.
         """
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
         linear = self._looked_at(gains, corners, self.factors if factors is None else factors, timed)

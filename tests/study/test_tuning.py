@@ -60,7 +60,7 @@ def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_lim
     design = load_design("ballscrew")
     problem = problem_of(design, loop_requirements(design), {})
     gains = np.array([problem.present * [1e3 if "current.gain" in path else 1.0 for path in problem.paths]])
-    wild = with_values(design, {"control.current.gain": 1e3 * design.controller.current.gain})
+    wild = with_values(design, dict(zip(problem.paths, map(float, gains[0]), strict=True)))
     assert not stability_margins(assemble_loops(wild).current.open_loop).stable
     assert problem.distances(gains, problem.all_corners[:1]).max() <= -3.0
 
