@@ -55,6 +55,16 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
     assert gains[0] == pytest.approx(2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, rel=1e-3)
 
 
+def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():
+    """A thousand times its current gain: the radius of the position loop is NaN, which is no reserve."""
+    design = load_design("ballscrew")
+    problem = problem_of(design, loop_requirements(design), {})
+    gains = np.array([problem.present * [1e3 if "current.gain" in path else 1.0 for path in problem.paths]])
+    wild = with_values(design, dict(zip(problem.paths, map(float, gains[0]), strict=True)))
+    assert not stability_margins(assemble_loops(wild).current.open_loop).stable
+    assert problem.distances(gains, problem.all_corners[:1]).max() <= -3.0
+
+
 def test_what_cannot_be_met_is_refused_with_its_distance():
     """A phase margin of 60 deg and a bandwidth of 60 Hz exclude each other behind 3.5 ms of delay."""
     phase = need("phase_margin", 60.0, loop="position")
