@@ -156,7 +156,10 @@ def _table(text: str) -> tuple[dict[str, Floats], bool]:
         "coherence",
         *(f"column {k}" for k in range(5, width + 1)),
     ]
-    names = [f"{name} ({k})" if name in names[: k - 1] else name for k, name in enumerate(names[:width], 1)]
+    names = [
+        f"{name} ({k})" if name and name in names[: k - 1] else name
+        for k, name in enumerate(names[:width], 1)
+    ]
     return dict(zip(names, values.T, strict=True)), head is not None
 
 

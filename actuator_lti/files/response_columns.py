@@ -16,6 +16,7 @@ WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg o
 HEADS = "f_hz,gain_db,phase_deg or f_hz,real,imag"
 TABLE = f"{WHAT}: a heading such as {HEADS}, then a row of numbers for each frequency"
 
+_ERROR = re.compile(r"std|dev|sigma|spread|uncert|err", re.I)
 _DEVIATION = (
     re.compile(r"^(?!re|im|f)(.*[_ ])?(std|dev|sigma|spread|uncert)", re.I),
     {"%|percent": "%", "db": "dB", "deg|°": "deg", "rad": "rad", "abs": "abs"},
@@ -94,7 +95,11 @@ def refuse_contradiction(beside: Mapping[str, Floats], z: NDArray[np.complex128]
     """Refuse a response that columns beside those which are read tell otherwise."""
     for name, values in beside.items():
         role = next((role for role, (like, _) in _UNITS.items() if like.search(name)), "")
-        if values.size != good.size or (off := _off(role, name, values[good], z)) is None:
+        if (
+            _ERROR.search(name)
+            or values.size != good.size
+            or (off := _off(role, name, values[good], z)) is None
+        ):
             continue
         off = np.abs(off[np.isfinite(off)])
         if off.size and np.quantile(off, 0.9) > _APART:
@@ -158,7 +163,7 @@ def taken_as(
         unsaid = units[role] and not _said(role, found[role])
         unit = f" in {units[role]}{' (it says no unit)' if unsaid else ''}" if units[role] else ""
         told.append(f"{_WORDS.get(role, role)} {shown(found[role])}{unit}")
-    left = [shown(name) for name in columns if name not in found.values()]
+    left = [shown(name) for name in columns if name and name not in found.values()]
     more = f"; not read: {', '.join(left[:12])}" if left else ""
     if "coherence" in found and not known:
         more += "; the coherence tells no noise without averages (--averages N)"

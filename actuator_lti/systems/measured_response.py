@@ -16,12 +16,11 @@ from actuator_lti.types import Complex, Real
 
 CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
-_GUESSED = "as points scatter about their neighbours; MeasuredResponse takes what is known"
+_KNOWN = "what is known goes in a column deviation, or a MeasuredResponse"
+_GUESSED = f"as points scatter about their neighbours; {_KNOWN}"
 _NEIGHBOURS = 17  # points whose scatter tells the noise of one
 _FEWEST = 6  # points: of two residuals the median has one degree of freedom
-_UNKNOWN = (
-    "not known, as so few points do not show it: no range is stated; MeasuredResponse takes what is known"
-)
+_UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
 
 @dataclass(frozen=True)

@@ -339,6 +339,7 @@ def test_a_deviation_counts_in_its_unit(tmp_path):
         ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '; not read: "error"'),
         ("omega,gain,phase_rad\n1,2,3\n2,-1,4", '"omega" in rad/s, magnitude "gain" in dB (it says no unit)'),
         ("w,re,im,coherence\n1,2,3,.9\n2,2,3,.9", "coherence tells no noise without averages (--averages N)"),
+        ("f,re,re_std,im,,\n1,2,1,3,,\n2,-1,1,4,,", '"im"; not read: "re_std"'),
         ("f,re,im,gain_db\n1,3,4,13.98\n2,3,4,13.98", 'imaginary part "im"; not read: "gain_db"'),
     ],
 )  # fmt: skip
