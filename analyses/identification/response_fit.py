@@ -79,7 +79,8 @@ class _Side:
                 return self.bound
             if abs(share - 1.0) < CLOSE or high[0] - low[0] < CLOSE * at:
                 break
-            path = sorted([(at, x), *path], key=lambda one: abs(one[0] - at))[:3]
+            if share < 1.0:  # beyond, the others may be those of another valley
+                path = sorted([(at, x), *path], key=lambda one: abs(one[0] - at))[:3]
             low, high = ((at, share), high) if share < 1.0 else (low, (at, share))
             part = (1.0 - low[1]) / (high[1] - low[1])
             inside = low[0] + float(np.clip(part, 0.1, 0.9)) * (high[0] - low[0])
