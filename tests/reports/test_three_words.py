@@ -206,5 +206,7 @@ def test_terminal_json_page_and_pdf_of_an_analysis_have_one_verdict(call, word: 
     assert (document["verdict"]["verdict"], document["verdict"]["passed"]) == (word, word == "met")
     (overall,) = printable(document)["overall"]
     assert overall[1] == Verdict(word).role()
-    assert f'<p class="overall {overall[1]}">' in next(tmp_path.glob("*.html")).read_text()
+    page = next(tmp_path.glob("*.html"))
+    assert f'<p class="overall {overall[1]}">' in page.read_text()
+    assert f"The same figures stand in {page.stem}.json beside this page." in page.read_text()
     assert cli.data(*call, status=int(word != "met"))["verdict"] == word
