@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 import tempfile
 import tomllib
@@ -73,6 +74,14 @@ def _plain_bars(app: object, what: str, name: str, thing: object, options: objec
             lines[number] = "``".join(parts)
 
 
+def _each_apart(app: object, what: str, name: str, thing: object, options: object, lines: list[str]) -> None:
+    """What an argument or a field means begins a paragraph of its own."""
+    for number in reversed(range(1, len(lines))):
+        if lines[number - 1] and re.match(r"(``\w[^`]*``,? ?)+[^`:]*: ", lines[number]):
+            lines.insert(number, "")
+
+
 def setup(app: Sphinx) -> None:
     """Connect ahead of numpydoc, which rewrites the docstrings."""
-    app.connect("autodoc-process-docstring", _plain_bars, priority=300)
+    for rewrite in (_plain_bars, _each_apart):
+        app.connect("autodoc-process-docstring", rewrite, priority=300)

@@ -30,7 +30,7 @@ from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.native import parameters
 from nonlinear.row.parameters import design_rows
 from nonlinear.runs.batch import Progress, run_rows
-from nonlinear.runs.reduced import COLUMNS, BatchResult
+from nonlinear.runs.reduced import COLUMNS, BatchResult, step_numbers
 from nonlinear.runs.running import Running
 from nonlinear.runs.setup import Tables
 from nonlinear.runs.simulation import run_row
@@ -149,7 +149,10 @@ class Rows:
         self["window"], self["cycles"], self["harmonics"] = ticks, cycles, harmonics
 
     def step_figures(self, target_rad: npt.ArrayLike, band: float = 0.02) -> None:
-        """Take rise, peak and settling of the output on its way to a target."""
+        """Take rise, peak and settling of what the command orders on its way to a target in its unit.
+
+        That is the output's angle, of a drive without position loop `Trajectory.followed`.
+        """
         self["step_target"], self["step_band"] = target_rad, band
 
     def extremes(self) -> None:
@@ -168,7 +171,16 @@ class Rows:
         With ``drives`` (`running`, one a row) each goes on from where it is, and stays where its row ends.
         """
         tables = self.tables.joined()
-        return run_rows(self.values, tables, threads=threads, progress=progress, drives=drives)
+        result = run_rows(self.values, tables, threads=threads, progress=progress, drives=drives)
+        if self.design.controller.position is None and drives is None:
+            for k in np.flatnonzero(self["step_target"]):
+                result.outs[k, at.OUT_STEP : at.OUT_STEP + at.STEP_SIZE] = self._step_of(int(k))
+        return result
+
+    def _step_of(self, k: int) -> Floats:
+        """Of a drive that follows no angle the numbers that the kernel takes of an output's step."""
+        run = replace(self.trajectory(k), ratio=float(self["ratio"][k]))
+        return step_numbers(run.followed / self["step_target"][k], float(self["step_band"][k]))
 
     def running(self, k: int = 0) -> Running:
         """One row at its start, to go on from piece by piece."""

@@ -254,7 +254,7 @@ def verdict(
         "comparison": COMPARISONS.get(comparison, comparison),
         "unit": unit,
         "distance": plain(distance),
-        "verdict": (passed if isinstance(passed, Verdict) else Verdict.of(passed)).value,
+        "verdict": Verdict.of(passed).value,
         "waiver": waiver.words if waiver else "",
         "source": source,
         "reason": prose(reason),
@@ -292,8 +292,8 @@ def section(
     """Make a section; ``id`` is its anchor.
 
     ``result``: one sentence that says what was found, ``intro``: how. ``told``: how grave the result is,
-    where the first screen says it; ``findings``: what else that has to say. Where ``verdict`` is not proven,
-    a report is not proven by this section, whatever its verdicts.
+    where the first screen says it; ``findings``: what else that has to say. ``verdict`` counts beside
+    the verdicts in it: where it is not proven, so is the document.
     """
     first = [Finding(severity=told, text=result, where=id)] if told and result else []
     made: Section = {

@@ -247,6 +247,7 @@ class Verdict(TypedDict):
     parts: dict[str, Counts]
     failed_sections: NotRequired[list[str]]
     unproven_sections: NotRequired[list[str]]
+    met_sections: NotRequired[list[str]]  # of documents of one analysis that judges no requirements
 
 
 class Provenance(TypedDict):

@@ -36,21 +36,24 @@ def write_report(
 ) -> tuple[Path, Path]:
     """Write a document as ``<stem>.html`` and ``<stem>.json``; both or neither."""
     content = dumps(made)
-    html = page(loads(content), progress=progress)
+    html = page(loads(content), progress=progress, beside=f"{stem}.json")
     paths = (Path(folder) / f"{stem}.html", Path(folder) / f"{stem}.json")
     write_together({paths[0]: html.encode(), paths[1]: content.encode()})
     return paths
 
 
-def page(made: Mapping[str, Any], *, progress: Progress = None) -> str:
-    """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all)."""
+def page(made: Mapping[str, Any], *, progress: Progress = None, beside: str = "") -> str:
+    """Make the page of a document (of `reports.document`); ``progress``: (figures drawn, figures in all).
+
+    ``beside``: the file with its figures.
+    """
     drawings = draw_all(figures(made), progress)
 
     def drawn(block: Mapping[str, Any]) -> Markup:
         return Markup(drawings[id(block)])
 
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
-    return render("report.html", doc=made, drawn=drawn, kicker=kicker, **_live(made))
+    return render("report.html", doc=made, drawn=drawn, kicker=kicker, beside=beside, **_live(made))
 
 
 def _live(made: Mapping[str, Any]) -> Tree:

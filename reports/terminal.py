@@ -58,7 +58,7 @@ def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequen
 
 
 def print_verdict(passed: bool | Verdict, words: str, but: str = "") -> None:
-    verdict = passed if isinstance(passed, Verdict) else Verdict.of(passed)
+    verdict = Verdict.of(passed)
     line = Text().append(HEADS[verdict] + but, style=COLOURS[verdict.role()])
     console().print(line.append(f"  {printable(prose(words))}"), soft_wrap=True)
 

@@ -20,6 +20,7 @@ SEVERITIES = ("fail", "warn", "info")
 _SECTIONS: tuple[tuple[str, str, Role], ...] = (
     ("failed_sections", "failed", "fail"),
     ("unproven_sections", "not proven", "warn"),
+    ("met_sections", "met", "pass"),
 )
 
 
@@ -56,30 +57,37 @@ def counted(blocks: Iterable[Mapping[str, Any]]) -> dict[str, Tally]:
 
 
 def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
-    """Count the verdicts of a document; a report is also judged by sections that say so without one.
+    """Count the verdicts of a document; it is also judged by sections that say so without one.
 
-    Such a section says that a loop is unstable, say, or that its stability is not known.
+    Such a section of a report says that a loop is unstable, say, or that its stability is not known; that of
+    one analysis has the analysis' own verdict.
     """
 
-    def missed(part: Mapping[str, Any]) -> int:
-        return sum(count.not_met for count in counted(walk(part)).values())
+    def own(part: Mapping[str, Any]) -> Tally:
+        return sum(counted(walk(part)).values(), Tally())
+
+    def named(verdict: Verdict) -> list[str]:
+        """Sections of this verdict whose own items do not tell it."""
+        said = [(part["title"], own(part)) for part in sections if part.get("verdict") == verdict]
+        more = Tally.of([verdict])
+        return [title for title, items in said if not items.total or (items + more).verdict != items.verdict]
 
     report = kind == "report"
     parts = {"requirements": Tally()} if report else {}
     parts |= counted(block for part in sections for block in walk(part))
     whole = sum(parts.values(), Tally())
-    silent = [part for part in sections if report and part["status"] == "fail" and not missed(part)]
+    silent = [part for part in sections if report and part["status"] == "fail" and not own(part).not_met]
     failed = [part["title"] for part in silent if part["id"] != "answer"]  # which gathers what they say
     if not failed and not whole.not_met:
         failed = [part["title"] for part in silent]
-    open_ones = [part["title"] for part in sections if report and part.get("verdict") == Verdict.NOT_PROVEN]
+    failed, open_ones = failed + named(Verdict.NOT_MET), named(Verdict.NOT_PROVEN)
     sections_too = Tally(not_met=len(failed), not_proven=len(open_ones))
     made: Overall = {
         "verdict": (whole + sections_too).verdict.value,
         "passed": sections_too.passes and all(_lets_pass(*part) for part in parts.items()),
         "parts": {what: cast(Counts, asdict(count)) for what, count in parts.items()},
     }
-    more = {"failed_sections": failed, "unproven_sections": open_ones}
+    more = {"failed_sections": failed, "unproven_sections": open_ones, "met_sections": named(Verdict.MET)}
     return cast(Overall, {**made, **{key: titles for key, titles in more.items() if titles}})
 
 

@@ -30,8 +30,10 @@ class Verdict(StrEnum):
     NOT_PROVEN = "not proven"
 
     @classmethod
-    def of(cls, passed: bool | None) -> Verdict:
+    def of(cls, passed: bool | Verdict | None) -> Verdict:
         """The word for the outcome of a comparison; ``None``: there was nothing to compare."""
+        if isinstance(passed, Verdict):
+            return passed
         return cls.NOT_PROVEN if passed is None else cls.MET if passed else cls.NOT_MET
 
     def role(self, *, waived: bool = False) -> Role:

@@ -55,7 +55,7 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     peak = max(float(gain.middle[k]), 0.0)
     largest = float(np.log(np.maximum(np.abs(T) - at_once(radius), 1e-300)).max()) - rest.log_gain - rest.up
     coarse = [f"{result.too_coarse(omega)}: the gain there is not known"] if result.unresolved.any() else []
-    return Bandwidth(
+    found = Bandwidth(
         minus3db_rad_s=falls[0] if falls else None,
         minus90deg_rad_s=turns[0] if turns else None,
         resonance_peak_db=_db(peak),
@@ -68,6 +68,9 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
         resonance_range_db=(_db(max(largest, 0.0)), _db(max(float(gain.high.max()), 0.0))),
         notes=(rest.note, *coarse, f"noise: {response.source or 'none'}"),
     )
+    if response.noise_known:
+        return found
+    return replace(found, minus3db_range_rad_s=None, minus90deg_range_rad_s=None, resonance_range_db=None)
 
 
 def _at_rest(response: MeasuredResponse, omega: Real, T: Complex, result: Bounds) -> _Rest:

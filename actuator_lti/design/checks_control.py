@@ -15,10 +15,6 @@ _BELOW_NYQUIST = ("frequency_rad_s", "zero_rad_s", "pole_rad_s")
 TRACKING_LIMIT = 0.828  # w0 T at which the tracking loop of model.md section 7 becomes unstable: 2 sqrt 2 - 2
 
 
-def _every(design: Design, stage: str, default: int = 1) -> Any:
-    return getattr(getattr(design.controller, stage, None), "every", default)
-
-
 def _filters(design: Design) -> Iterator[Refusal]:
     velocity = design.controller.velocity
     if velocity is None:
@@ -64,7 +60,7 @@ def _filter_count(design: Design) -> Iterator[Refusal]:
 def _tracking(design: Design) -> Iterator[Refusal]:
     """A tracking loop of the encoder, and its bandwidth."""
     encoder, w0 = design.encoder, design.encoder.bandwidth_rad_s
-    most = TRACKING_LIMIT / (design.controller.period_s * _every(design, "velocity"))
+    most = TRACKING_LIMIT / design.controller.period_of("velocity")
     if encoder.speed != "tracking" and w0 is not None:
         yield "encoder.bandwidth", f"{w0:g}", 'allowed with speed = "tracking"'
     elif encoder.speed == "tracking" and w0 is None:
@@ -90,8 +86,9 @@ def _tracking_time(design: Design) -> Iterator[Refusal]:
 
 
 def _multiples(design: Design) -> Iterator[Refusal]:
-    n_v = _every(design, "velocity")
-    n_p = _every(design, "position", n_v)
+    control = design.controller
+    n_v = getattr(control.velocity, "every", 1)
+    n_p = getattr(control.position, "every", n_v)
     if n_p % n_v:
         yield "control.position.every", n_p, f"allowed: a multiple of control.velocity.every = {n_v}"
 
@@ -112,7 +109,7 @@ _PROFILE = {"rate": ("", "speed"), "acceleration": ("rate", "acceleration"), "je
 def _command_filter(design: Design) -> Iterator[Refusal]:
     """Its frequency has to lie below pi/T of the stage that takes the command."""
     control, filter_time_s = design.controller, design.command.filter_time_s
-    period_s = control.period_s * _every(design, control.outermost)
+    period_s = control.period_of(control.outermost)
     if 0.0 < filter_time_s <= period_s / pi:
         allowed = f"allowed: 0, or above T/pi of the outermost loop, {period_s / pi:.6g} s"
         yield _written(design, "filter_time", filter_time_s, allowed)
@@ -186,7 +183,7 @@ def _laws(design: Design) -> Iterator[Refusal]:
 
 
 def _own_period(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
-    period = design.controller.period_s * _every(design, stage)
+    period = design.controller.period_of(stage)
     if law.period_s is not None and abs(law.period_s - period) > 1e-9 * period:
         allowed = f"allowed: {period:.9g} s, that of its stage; a law is not resampled"
         yield f"control.{stage}.law.period", f"{law.period_s:.9g} s", allowed

@@ -282,6 +282,10 @@ class Controller:
             raise InputError("control.position: missing; this needs a drive with a position loop")
         return self.position
 
+    def period_of(self, stage: str) -> Any:
+        """Time between two updates of a stage, s: that of a tick where it says no other."""
+        return self.period_s * getattr(getattr(self, stage, None), "every", 1)
+
     @property
     def outermost(self) -> Stage:
         """The stage that takes the command; ``"voltage"`` for a drive without a loop."""

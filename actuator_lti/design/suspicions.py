@@ -31,9 +31,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
 
 def _periods(design: Design) -> dict[str, float]:
     """Period in s of each loop, the inner ones first."""
-    control = design.controller
-    stages = reversed(control.stages)
-    return {stage: getattr(getattr(control, stage), "every", 1) * control.period_s for stage in stages}
+    return {stage: design.controller.period_of(stage) for stage in reversed(design.controller.stages)}
 
 
 def _sampling(design: Design) -> Iterator[str]:
@@ -235,7 +233,7 @@ def _encoder(design: Design) -> Iterator[str]:
     velocity = design.controller.velocity
     if encoder.speed != "difference" or quantum is None or velocity is None:
         return
-    step = quantum / (encoder.difference_samples * velocity.every * design.controller.period_s)
+    step = quantum / (encoder.difference_samples * design.controller.period_of("velocity"))
     if isfinite(top) and step > 0.05 * top:
         unit = unit_on(design.axis, "{angle}/s")
         yield f"encoder.counts_per_rev: one count is {step:.3g} {unit}, more than 5 % of limits.speed"

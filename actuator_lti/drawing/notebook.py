@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable
 from html import escape
-from math import isinf
+from math import isinf, nan
 from typing import Any
 
 from actuator_lti.design.model import Design
@@ -49,13 +49,12 @@ def run_html(run: Any) -> str:
     """What came of a run (`nonlinear.Trajectory`): how far it went, which limits acted, how it ended."""
     linear = run.axis == "linear"
     factor, angle, speed = (1e3, "mm", "m/s") if linear else (57.29577951308232, "deg", "rad/s")
-    every = round((run.time_s[1] - run.time_s[0]) / run.period_s) if run.time_s.size > 1 else 1
     rows = [
-        ("rows", f"{run.time_s.size} of {1e3 * run.period_s * every:g} ms"),
-        ("output, from", f"{_least(factor * run.output_angle_rad, min):.5g} {angle}"),
-        ("output, to", f"{_least(factor * run.output_angle_rad, max):.5g} {angle}"),
-        ("motor speed, up to", f"{_least(abs(run.motor_speed_rad_s), max):.5g} {speed}"),
-        ("current, up to", f"{_least(abs(run.current_A), max):.5g} A"),
+        ("rows", f"{run.time_s.size} of {1e3 * run.row_period_s:g} ms"),
+        ("output, from", f"{min(factor * run.output_angle_rad, default=nan):.5g} {angle}"),
+        ("output, to", f"{max(factor * run.output_angle_rad, default=nan):.5g} {angle}"),
+        ("motor speed, up to", f"{max(abs(run.motor_speed_rad_s), default=nan):.5g} {speed}"),
+        ("current, up to", f"{max(abs(run.current_A), default=nan):.5g} A"),
         ("at rest", f"{100.0 * run.stick_fraction:.3g} % of the ticks"),
         *(
             (f"{name} limit", f"{100.0 * use.fraction:.3g} % of the ticks, first at {use.first_time_s:.4g} s")
@@ -66,11 +65,6 @@ def run_html(run: Any) -> str:
         ("status", run.status if not run.advice else f"{run.status}: {run.advice}"),
     ]
     return html_table(f"{run.design_name}: {run.time_s.size} rows", ("figure", "value"), rows)
-
-
-def _least(values: Any, which: Any) -> float:
-    """Smallest or largest of some values; NaN of none."""
-    return float(which(values)) if len(values) else float("nan")
 
 
 def margins_html(margins: StabilityMargins) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_lti.bandwidth import closed_loop_bandwidth
+from actuator_lti.design.field import unit_on
 from actuator_lti.errors import InputError
 from actuator_lti.margins import stability_margins
 from actuator_lti.margins.measured.margins import measured_points
@@ -241,8 +242,7 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     ``axes``: four of matplotlib's axes, see `nonlinear.Trajectory.plot`.
     """
     angle, speed, current, voltage = _panels(axes, 4, figsize=(6.4, 7.2))
-    linear = run.axis == "linear"
-    factor, unit = _shown_angle(linear)
+    factor, unit = _shown_angle(run.axis == "linear")
     scale, time_unit = (1e3, "ms") if run.time_s[-1] < 1.0 else (1.0, "s")
     time = scale * run.time_s
     panels = {"position": (angle, factor), "velocity": (speed, run.ratio), "current": (current, 1.0)}
@@ -253,7 +253,7 @@ def plot_run(run: Any, axes: Any = None) -> list[Axes]:
     current.plot(time, run.current_A)
     voltage.step(time, run.voltage_V, where="post")
     angle.set(ylabel=f"output, {unit}", title=run.design_name)
-    speed.set_ylabel("motor, " + ("m/s" if linear else "rad/s"))
+    speed.set_ylabel(f"motor, {unit_on(run.axis, '{angle}/s')}")
     current.set_ylabel("current, A")
     voltage.set(ylabel="voltage, V", xlabel=f"time, {time_unit}")
     for panel in (angle, speed, current, voltage):

@@ -28,6 +28,8 @@ POINTS = 240
 LOWEST_HZ, HIGHEST_HZ = 0.1, 1000.0
 BELOW_NYQUIST = 0.45  # of the sampling rate: at 0.5 a held moment does not move a free mass at the samples
 LOST_MOTION_SHARE = 0.03  # of the rated moment
+_AROUND = np.linspace(-1.0, 1.0, 17)  # of the spacing of the frequencies, a quarter as wide every round
+_ROUNDS = 12
 _REST_HZ, _SLOW_HZ = 1e-12, 1e-5  # where the limit at zero frequency is read; its slope
 _AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-7 by one free integration
 
@@ -50,8 +52,8 @@ class StiffnessFigures:
     @cached_property
     def least_stiffness_Nm_rad(self) -> Any:
         """Powered, the smallest size at rest and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist)."""
-        size = np.abs(stiffness_at(self._response, frequencies_hz(self._response)))
-        return _plain(np.minimum(size.min(axis=-1), self.static_stiffness_Nm_rad))
+        size = np.abs(stiffness_at(self._response, weakest_hz(self._response)))[..., 0]
+        return _plain(np.minimum(size, self.static_stiffness_Nm_rad))
 
     @property
     def lost_motion_rad(self) -> Any:
@@ -67,6 +69,22 @@ def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
     """Frequencies over which a stiffness is drawn and its least value sought."""
     highest = np.minimum(HIGHEST_HZ, BELOW_NYQUIST / np.asarray(response.period_s))
     return np.moveaxis(np.geomspace(LOWEST_HZ, highest, POINTS), 0, -1)
+
+
+def weakest_hz(response: Compliance) -> npt.NDArray[np.float64]:
+    """Where |K| is least within `frequencies_hz`; shape (1,), of K stacked designs (K, 1).
+
+    Between its natural frequencies K is smooth: those and the drawn ones are looked at, then about the least.
+    """
+    drawn = frequencies_hz(response)
+    low, high, width = drawn[..., :1], drawn[..., -1:], drawn[..., 1:2] / drawn[..., :1]
+    natural = np.clip(response.natural_hz, low, high)
+    hertz = np.concatenate([np.broadcast_to(drawn, (*natural.shape[:-1], POINTS)), natural], axis=-1)
+    for _ in range(_ROUNDS):
+        least = np.abs(stiffness_at(response, hertz)).argmin(axis=-1)[..., None]
+        best = np.take_along_axis(hertz, least, axis=-1)
+        hertz, width = np.clip(best * width**_AROUND, low, high), width**0.25
+    return best
 
 
 def stiffness_at(response: Compliance, frequency_hz: npt.ArrayLike) -> npt.NDArray[np.complex128]:
@@ -133,12 +151,23 @@ class Compliance:
     @property
     def slowest(self) -> Any:
         """Largest magnitude of a pole, per tick."""
-        if not self.moves:
-            return 0.0
+        return np.abs(self._poles).max(axis=-1) ** (1.0 / len(self.blocks)) if self.moves else 0.0
+
+    @property
+    def natural_hz(self) -> npt.NDArray[np.float64]:
+        """Frequencies of the poles, and their images by slower stages; shape (..., states * ticks)."""
+        ticks = len(self.blocks)
+        turns = (np.angle(self._poles)[..., None] / (2.0 * np.pi) + np.arange(ticks)) / ticks
+        turns = np.abs(turns - np.rint(turns))
+        return turns.reshape(*turns.shape[:-2], -1) / np.asarray(self.period_s)[..., None]
+
+    @cached_property
+    def _poles(self) -> npt.NDArray[np.complex128]:
+        """Poles over a period of all ticks."""
         over = np.eye(len(self.blocks[0].states))
         for block in self.blocks:
             over = block.A @ over
-        return np.abs(np.linalg.eigvals(over)).max(axis=-1) ** (1.0 / len(self.blocks))
+        return np.asarray(np.linalg.eigvals(over), dtype=complex)
 
 
 def compliance(design: Design, at: Operating | None = None) -> Compliance:

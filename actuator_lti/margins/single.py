@@ -89,15 +89,18 @@ class DelayMargin(AtFrequency):
     """The smallest delay in the loop that brings a closed-loop pole to the border at this gain crossover.
 
     ``samples``: the same in sampling periods; ``None`` for a continuous loop.
+    ``seconds_range``: measured data: where the delay lies, by the ranges of phase margin and crossover.
     """
 
     seconds: float
     samples: float | None
     frequency_rad_s: float
+    seconds_range: tuple[float, float] | None = None
 
     def __str__(self) -> str:
         samples = "" if self.samples is None else f" = {self.samples:.6g} samples"
-        return f"{self.seconds:.6g} s{samples} at {frequency_text(self.frequency_rad_s)}"
+        known = "" if self.seconds_range is None else ", in [{:.5g} to {:.5g} s]".format(*self.seconds_range)
+        return f"{self.seconds:.6g} s{samples} at {frequency_text(self.frequency_rad_s)}{known}"
 
 
 @dataclass(frozen=True)

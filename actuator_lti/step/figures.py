@@ -1,6 +1,7 @@
 """Step response and its figures: rise, overshoot, settling."""
 
 from dataclasses import dataclass, replace
+from math import fsum
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
 from actuator_lti.systems.delay_response import plain_behind_delay
-from actuator_lti.systems.exact_response import exact_sum
 from actuator_lti.systems.measured_response import refuse_measured
 from actuator_lti.types import Real
 
@@ -150,7 +150,7 @@ def _notes(loop: RationalLoop) -> tuple[str, ...]:
     """Say where the last digits of the coefficients decide about the final value."""
     if not loop.in_z or loop.coefficients is None:
         return ()
-    moved = sum(float(np.abs(p).sum()) / abs(exact_sum(p)) for p in loop.coefficients) * ULP * _EPS
+    moved = sum(float(np.abs(p).sum()) / abs(fsum(p)) for p in loop.coefficients) * ULP * _EPS
     if moved < 0.01:
         return ()
     return (

@@ -21,7 +21,7 @@ from actuator_lti.margins.exact.roots import at_enough_bits
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.search import OVER, Search
-from actuator_lti.systems.exact_response import dc_noise, divided, double, near_dc, of_s, shown
+from actuator_lti.systems.exact_response import dc_noise, double, near_dc, of_s, shown
 from actuator_lti.types import Complex, Real
 
 UNSTABLE = "the system is not stable: it has no step figures"
@@ -160,7 +160,7 @@ def _free_motion(rest: acb_poly, poles: list[acb], sampled: bool) -> Motion | No
     for j in reversed(range(n)):
         p, passed = poles[j], gains[j] * mirrored[j]
         state[j] = rest(p) / passed(p)
-        rest = divided(rest - state[j] * passed, p)
+        rest = (rest - state[j] * passed) // acb_poly([-p, 1])
         if not float(abs(state[j] * gains[j]).rad()) <= _SURE:
             return None
         A[j, j] = p

@@ -1,11 +1,12 @@
 """What the response of a loop of exact polynomials shows, its roots, and what rounding leaves of its gain."""
 
 from dataclasses import replace
+from math import fsum
 
 import flint
 import numpy as np
 
-from actuator_lti.margins.exact.loop import ExactLoop, rational
+from actuator_lti.margins.exact.loop import ExactLoop
 from actuator_lti.margins.exact.roots import all_roots
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop
@@ -16,15 +17,6 @@ _CLOSE = 1e-3  # a computed eigenvalue this near may be such a pole
 _UNSEEN = 1e-9  # what it may move, of the final value, before the rest has settled
 _BITS = 256
 _LOST = 1e3 * _EPS  # cancellation in c A^-1 b of a state space that leaves no figure
-
-
-def divided(p: flint.acb_poly, at: flint.acb) -> flint.acb_poly:
-    """p over x - at, the remainder left out."""
-    quotient, carried = [], flint.acb(0)
-    for value in reversed(p.coeffs()):
-        carried = value + at * carried
-        quotient.append(carried)
-    return flint.acb_poly(quotient[-2::-1])
 
 
 def of_s(p: flint.acb, loop: RationalLoop) -> complex:
@@ -58,7 +50,7 @@ def shown(exact: ExactLoop, loop: RationalLoop) -> ExactLoop:
         for k, p in enumerate(near):
             beside = flint.acb_poly.from_roots([*others, *near[k + 1 :]])
             residues.append(above(p) / beside(p))
-            above = divided(above - residues[-1] * beside, p)
+            above = (above - residues[-1] * beside) // flint.acb_poly([-p, 1])
         below = flint.acb_poly.from_roots(others)
         most = (
             _UNSEEN * slowest * abs(complex(above(0) / below(0))) / (2.0 if loop.in_z else 1.0)
@@ -82,11 +74,7 @@ def _off_dc(p: flint.acb, loop: RationalLoop) -> float:
 
 
 def _middle(p: flint.acb_poly) -> flint.fmpq_poly:
-    def exact(value: flint.arb) -> flint.fmpq:
-        mantissa, exponent = value.mid().man_exp()
-        return flint.fmpq(mantissa) * flint.fmpq(2) ** int(exponent)
-
-    return flint.fmpq_poly([exact(value.real) for value in p.coeffs()])
+    return flint.fmpq_poly([value.real.mid().fmpq() for value in p.coeffs()])
 
 
 def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
@@ -99,18 +87,13 @@ def double(value: flint.fmpq) -> float:
     return int(value.p) / int(value.q)
 
 
-def exact_sum(values: np.ndarray) -> float:
-    """Sum without a rounding but the last."""
-    return double(sum((rational(v) for v in values), flint.fmpq(0)))
-
-
 def dc_noise(loop: RationalLoop) -> float:
     """What the rounding of the entries may move the gain at zero frequency by."""
     x = 1.0 if loop.in_z else 0.0
     if loop.coefficients is not None:
         if not loop.in_z:
             return 0.0  # one coefficient over another
-        below = abs(exact_sum(loop.coefficients[1]))
+        below = abs(fsum(loop.coefficients[1]))
         return ULP * _EPS * float(np.abs(loop.coefficients[0]).sum()) / below if below else 0.0
     M = x * np.eye(loop.order) - loop.A
     if not loop.order or np.linalg.cond(M) > 1.0 / _LOST:

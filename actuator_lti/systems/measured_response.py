@@ -15,8 +15,12 @@ from actuator_lti.systems.plain_system import period_of
 from actuator_lti.types import Complex, Real
 
 CONFIDENCE = 0.99
-_GUESSED = "as points scatter about their neighbours; MeasuredResponse takes what is known"
+GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
+_KNOWN = "what is known goes in a column deviation, or a MeasuredResponse"
+_GUESSED = f"as points scatter about their neighbours; {_KNOWN}"
 _NEIGHBOURS = 17  # points whose scatter tells the noise of one
+_FEWEST = 6  # points: of two residuals the median has one degree of freedom
+_UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,7 @@ class MeasuredResponse:
     ``radius``, shape (m,): of the circle, at the confidence of the range (0.99 by default).
     ``dt``: sampling period, s; ``None`` for a continuous loop.
     ``source``: where the radius comes from.
+    ``noise_known``: whether anything is known of it; else the radius is 0, and no range is stated.
     """
 
     ninputs: ClassVar[int] = 1
@@ -41,6 +46,7 @@ class MeasuredResponse:
     radius: Real
     dt: float | None
     source: str
+    noise_known: bool = True
 
     @classmethod
     def with_noise(
@@ -81,7 +87,7 @@ class MeasuredResponse:
         if averages < 2:
             raise InputError(f"averages = {averages}: at least 2")
         sigma = np.abs(L) * np.sqrt((1.0 - g2) / (g2 * (averages - 1)))
-        radius = sigma * _student(averages - 1, _checked(confidence))
+        radius = sigma * student(averages - 1, _checked(confidence))
         return cls(omega, L, radius, dt, f"coherence of {averages} averages")
 
     @classmethod
@@ -102,14 +108,17 @@ class MeasuredResponse:
         values = np.array([L for _, L, _ in read])
         n = len(repeats)
         sigma = np.sqrt((np.abs(values - values.mean(axis=0)) ** 2).sum(axis=0) / (n - 1) / n)
-        radius = sigma * _student(n - 1, _checked(confidence))
+        radius = sigma * student(n - 1, _checked(confidence))
         return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
 
     @classmethod
     def from_scatter(cls, data: Any) -> MeasuredResponse:
         """Noise as the points scatter about their neighbours."""
         omega, L, dt = _read(data)
-        return cls(omega, L, _scatter(omega, L), dt, _GUESSED)
+        radius = _scatter(omega, L)
+        if radius is None:
+            return cls(omega, L, np.zeros(L.size), dt, _UNKNOWN, False)
+        return cls(omega, L, radius, dt, _GUESSED)
 
 
 def is_measured(system: Any) -> bool:
@@ -135,18 +144,18 @@ def measured_response(data: Any) -> MeasuredResponse:
     return MeasuredResponse.from_scatter(data)
 
 
-def _scatter(omega: Real, L: Complex) -> Real:
+def _scatter(omega: Real, L: Complex) -> Real | None:
     """Radius about each value, from how far points nearby lie off the cubic through their own neighbours.
 
     Log L over log frequency, two neighbours on either side: the residual has (1 + sum of the squared weights)
     times the variance of a value. The median counts, so that a resonance between two points does not.
+    ``None``: too few points, or few that bend so much that all their values would be lost in noise.
     """
     usable = np.flatnonzero((omega > 0.0) & (L != 0.0) & np.isfinite(L))
     usable = usable[np.argsort(omega[usable])]
-    radius = np.zeros(L.size)
     u, y = np.log(omega[usable]), np.log(np.abs(L[usable])) + 1j * np.unwrap(np.angle(L[usable]))
-    if u.size < _NEIGHBOURS or (np.diff(u) <= 0.0).any():
-        return radius
+    if u.size < _FEWEST or (np.diff(u) <= 0.0).any():
+        return None
     at = np.arange(2, u.size - 2)
     beside = at[:, None] + np.array([-2, -1, 1, 2])
     off = u[at, None] - u[beside]
@@ -160,7 +169,11 @@ def _scatter(omega: Real, L: Complex) -> Real:
     first = np.clip(np.arange(u.size) - 2 - _NEIGHBOURS // 2, 0, max(at.size - _NEIGHBOURS, 0))
     window = first[:, None] + np.arange(min(_NEIGHBOURS, at.size))
     sigma = np.sqrt(np.median(squared[window], axis=1) / math.log(2.0))
-    radius[usable] = np.abs(L[usable]) * sigma * _student(_NEIGHBOURS // 2, CONFIDENCE)
+    reach = sigma * student(window.shape[1] // 2, CONFIDENCE)
+    if u.size < _NEIGHBOURS and (reach >= 1.0).all():
+        return None
+    radius = np.zeros(L.size)
+    radius[usable] = np.abs(L[usable]) * reach
     return radius
 
 
@@ -197,6 +210,7 @@ def _checked(confidence: float) -> float:
     return confidence
 
 
-def _student(freedom: int, confidence: float) -> float:
+def student(freedom: ArrayLike, confidence: float) -> Real:
     """Root of the quantile of F(2, 2 freedom), which has a closed form."""
-    return math.sqrt(freedom * ((1.0 - confidence) ** (-1.0 / freedom) - 1.0))
+    freedom = np.asarray(freedom, dtype=float)
+    return np.sqrt(freedom * ((1.0 - confidence) ** (-1.0 / freedom) - 1.0))

@@ -51,7 +51,6 @@ def compare_signals(
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.linspace(0.0, 1.0, 1001)
     >>> c = compare_signals("speed", "rad/s", t, np.sin(6.0 * (t - 0.01)), np.sin(6.0 * t))
     >>> round(c.delay_s, 4)

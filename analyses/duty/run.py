@@ -1,5 +1,6 @@
 """Simulate a duty, then heat the winding and the overload state with its current."""
 
+from bisect import bisect_left
 from dataclasses import dataclass, replace
 from math import exp, inf, isfinite, log
 
@@ -68,7 +69,7 @@ class Duty:
 PERIODS = 3  # of the sine that pass before one is taken
 HOLD_S = 1.0
 MOST_TICKS = 2_000_000
-MOST_CYCLES = 10_000
+MOST_CYCLES = 2**40
 _DRAWN = 200
 
 
@@ -97,7 +98,9 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     if asked.share < 1.0:
         resting = simulate(free, commands.hold(), HOLD_S, asked.load_Nm).current_A
         still = resting[resting.size // 2 :]
-    moving, held = (float(np.sqrt(np.mean(part**2))) for part in (current, still))
+    periods, more = divmod(_moving_ticks(asked, design.controller.period_s, ticks), ticks)
+    squares = periods * np.sum(current**2) + np.sum(current[:more] ** 2)
+    moving, held = float(np.sqrt(squares / (periods * ticks + more))), float(np.sqrt(np.mean(still**2)))
     peak = max(float(np.abs(part).max()) for part in (current, still))
     rms = float(np.sqrt(asked.share * moving**2 + (1.0 - asked.share) * held**2))
     acts = [name for name in run.limits if run.limit_active(name)[-ticks:].any()]
@@ -129,28 +132,41 @@ def _overload(design: Design, asked: Asked, current: Floats, held: float) -> Ove
     if tau is None:
         return None
     drive = (current / design.limits.continuous_current_A) ** 2
-    resting = asked.share < 1.0
-    periods = max(1, round(asked.share * asked.cycle_s * asked.frequency_hz)) if resting else 1
+    still = (held / design.limits.continuous_current_A) ** 2
     a = 1.0 - Ts / tau
     gained = lfilter([Ts / tau], [1.0, -a], drive)  # over a period, from 0
     decay = a ** (np.arange(drive.size) + 1.0)
-    earlier = (1.0 - decay[-1] ** (periods - 1)) / (1.0 - decay[-1])
-    rest_s = periods * drive.size * Ts * (1.0 / asked.share - 1.0)
-    cooled, still = exp(-rest_s / tau), (held / design.limits.continuous_current_A) ** 2
+    moving = _moving_ticks(asked, Ts, drive.size)
+    periods, part = divmod(moving, drive.size)
+    rest_s = moving * Ts * (1.0 / asked.share - 1.0)
+    cooled = exp(-rest_s / tau)
 
-    def highest(x: float) -> float:
-        """Largest in the motion that begins with x: in its first or its last period."""
-        last = decay[-1] ** (periods - 1) * x + gained[-1] * earlier
-        return max(float((decay * start + gained).max()) for start in (x, last))
+    def after(x: float, periods: int) -> float:
+        left = decay[-1] ** periods
+        return float(left * x + gained[-1] * (1.0 - left) / (1.0 - decay[-1]))
 
-    slope = float(decay[-1] ** periods * cooled)  # of the state after a cycle over that before
-    end = float(gained[-1] * (earlier * decay[-1] + 1.0))
-    settled = (still + (end - still) * cooled) / (1.0 - slope)
-    peak = max(highest(settled), still if resting else 0.0)
+    def cycle(x: float) -> tuple[float, float]:
+        """Largest in the cycle that begins with x, in its first or last period or its rest; its end."""
+        last = after(x, periods)
+        courses = [decay * start + gained for start in (x, after(x, periods - 1), last)]
+        courses[2] = courses[2][:part]
+        end = float(courses[2][-1]) if part else last
+        end = still + (end - still) * cooled
+        return max(end, *(float(one.max(initial=0.0)) for one in courses)), end
+
+    start = cycle(0.0)[1]
+    slope = cycle(1.0)[1] - start  # of the state after a cycle over that before
+    settled = start / (1.0 - slope)
+    peak, _ = cycle(settled)
     if peak < 1.0:
         return Overload(peak, None)
-    cycles = next((k for k in range(MOST_CYCLES) if highest(settled * (1.0 - slope**k)) >= 1.0), MOST_CYCLES)
-    return Overload(peak, (cycles + 1) * (periods * drive.size * Ts + rest_s))
+    cycles = bisect_left(range(MOST_CYCLES), 1.0, key=lambda k: cycle(settled * (1.0 - slope**k))[0])
+    return Overload(peak, (cycles + 1) * (moving * Ts + rest_s))
+
+
+def _moving_ticks(asked: Asked, Ts: float, period: int) -> int:
+    """Ticks of the motion in a cycle, at least a period; of one that does not rest, a period."""
+    return max(period, round(asked.share * asked.cycle_s / Ts)) if asked.share < 1.0 else period
 
 
 def heating(design: Design, rms_A: float) -> Heating | None:

@@ -49,7 +49,6 @@ def told_apart(
 
     Examples
     --------
-    >>> import numpy as np
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
     >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
     >>> kept, [f"{one.name} {one}" for one in left]

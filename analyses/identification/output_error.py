@@ -77,18 +77,15 @@ def fit_output(
     output_of: Callable[[Design], Floats],
     measured: Floats,
     progress: Progress = None,
-    *,
-    step: float = STEP,
-    iterations: int = ITERATIONS,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
     Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
-    differences of a share ``step`` of each value.
+    differences of a share `STEP` of each value.
     """
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
-    count, most = 0, iterations * (2 * len(paths) + 1)
+    count, most = 0, ITERATIONS * (2 * len(paths) + 1)
 
     box = 1.0 + (ends - start) / scale
 
@@ -108,13 +105,13 @@ def fit_output(
     first = residual(begin)
 
     def slopes(moved: Floats) -> Floats:
-        to = step * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
+        to = STEP * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
         both = [np.clip(moved + side * to, *box) for side in (1.0, -1.0)]
         pairs = zip(*both, strict=True)
         change = np.array([residual(up) - residual(down) for up, down in pairs])
         return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
 
-    options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": iterations}
+    options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": ITERATIONS}
     found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
     values = values_at(found.x)
     return Moved(

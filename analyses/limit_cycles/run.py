@@ -16,6 +16,7 @@ from nonlinear.bench.operating_motion import without_counts
 
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 24
+AS_PREDICTED = 1.25  # a factor: a describing function knows the fundamental alone
 _STARTS = {**PLACES, **ELASTIC}
 
 
@@ -25,14 +26,16 @@ class Confirmation:
 
     cycle: describing.Cycle
     # Amplitude of the output over the predicted one: of a stable cycle where the motion ends, of an unstable
-    # one the size from which it grows; ``None``: refuted
+    # one the size from which it grows; ``None``: it does so nowhere
     ratio: float | None
-    frequency_hz: float | None  # where the motion ends, of a stable one
+    frequency_hz: float | None  # there; of a stable cycle in the second half of what is watched
 
     @property
     def verdict(self) -> Literal["confirmed", "refuted"]:
-        """In one word."""
-        return "refuted" if self.ratio is None else "confirmed"
+        """Whether amplitude and frequency are within `AS_PREDICTED` of the predicted."""
+        ratios = (self.ratio, self.frequency_hz and self.frequency_hz / self.cycle.frequency_hz)
+        near = [one is not None and 1.0 / AS_PREDICTED <= one <= AS_PREDICTED for one in ratios]
+        return "confirmed" if all(near) else "refuted"
 
 
 @dataclass(frozen=True)
@@ -110,9 +113,11 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     ratios = np.sqrt(SCALES[turns] * SCALES[turns + 1])
     nearest = int(np.argmin(np.abs(np.log(ratios))))
     row = rows.take(int(turns[nearest]))
-    row["ticks"] = window
+    if not cycle.stable:
+        row["ticks"] = window
     run = row.trajectory()
-    t, w = run.time_s, run.motor_speed_rad_s
+    begin = run.time_s.size // 2 if cycle.stable else 0  # what other motion the start brings is gone by then
+    t, w = run.time_s[begin:-1], np.diff(run.output_angle_rad[begin:])
     up = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
     rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
     hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None

@@ -226,5 +226,29 @@ def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     crossover = min((m.frequency_rad_s for m in result.margins.phase_margins), default=100.0)
     nyquist = min(path.nyquist_rad_s for path in loops.limiters.values())
     high = min(crossover * 30.0, nyquist * (1.0 - 1e-9))
-    border = onset(loops, np.geomspace(crossover / 100.0, high, 160))
+    border = with_cogging(loops, onset(loops, np.geomspace(crossover / 100.0, high, 160)))
     return border if np.isfinite(border.amplitude_rad).any() else None
+
+
+COGGING_PART = (
+    0.1  # of a period of the cogging, peak: its spring is 5 % softer there, 2 J1(x)/x of x = 0.2 pi
+)
+
+
+def with_cogging(loops: Loops, border: Onset) -> Onset:
+    """The border with ``"cogging"``: the linear loop has the spring that the cogging is at the motor's angle.
+
+    Its line is where a sine turns the motor by `COGGING_PART` of a period.
+    """
+    design, response = loops.design, loops.plain_response
+    outermost = design.controller.outermost
+    if response is None or design.motor.cogging_Nm == 0.0 or outermost not in ("position", "velocity"):
+        return border
+    s = 1j * border.omega_rad_s
+    turned = np.abs(response(np.exp(s * response.dt))) * design.total_ratio
+    turned = turned / np.abs(s) if outermost == "velocity" else turned
+    own = COGGING_PART * 2.0 * np.pi / design.motor.cogging_periods / turned
+    first = own < border.amplitude_rad
+    active = tuple("cogging" if of else name for of, name in zip(first, border.active, strict=True))
+    lowest = np.minimum(own, border.amplitude_rad)
+    return Onset(border.omega_rad_s, lowest, active, {**border.each_rad, "cogging": own})

@@ -34,7 +34,7 @@ class Asked:
         Option(
             "Measured response of a loop, laid over the model: CSV or .mat with frequency, dB and "
             "deg or real and imaginary part, perhaps coherence or deviation (rms of the complex error "
-            "over the size of the value).",
+            "over the size of the value, or in dB of the gain, in deg of the phase).",
             "FILE",
         ),
     ] = None
@@ -46,4 +46,6 @@ class Asked:
             "LOOP",
         ),
     ] = ""
-    averages: Annotated[int | None, Option("Averages behind the coherence of --response.")] = None
+    averages: Annotated[
+        int | None, Option("Averages behind the coherence of --response, which tells the noise with them.")
+    ] = None

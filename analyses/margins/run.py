@@ -10,7 +10,7 @@ from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.response import Loop as Kind
-from actuator_lti.files.response import read_response
+from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
 from actuator_lti.systems.measured_response import MeasuredResponse
@@ -47,12 +47,18 @@ class Measured:
     margins: StabilityMargins | None
     note: str
     beyond: int  # points above half the sampling frequency, left out
-    left_out: int  # rows of the file without numbers
+    left_out: int  # rows of the file without numbers, or at 0 Hz
+    read_as: str = ""  # how the columns of the file were taken
 
     def __repr__(self) -> str:
         f, off = self.frequency_hz, np.abs(self.difference_db).max()
         said = f"{self.name}: {f.size} frequencies, {f[0]:.4g} to {f[-1]:.4g} Hz, {self.of} of {self.loop}; "
         return said + f"the model within {off:.2f} dB and {np.abs(self.difference_deg).max():.1f} deg"
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What has to be known of the measured margins."""
+        return () if self.margins is None else (self.margins.evidence_reason, *self.margins.notes)
 
     @property
     def nearer(self) -> tuple[str, float] | None:
@@ -89,13 +95,14 @@ def measured_if_asked(loops: Loops, source: Any, place: str, averages: int | Non
 
 
 def measured_over(loops: Loops, source: Any, place: str = "", averages: int | None = None) -> Measured:
-    """Lay a measured response (a path, or python-control's data) over the loop that it was measured of.
+    """Lay a measured response over the loop that it was measured of.
 
+    ``source``: a path, python-control's data, or a MeasuredResponse, whose noise is kept.
     ``place``: a loop or a break point, and what of it was measured behind a colon: ``"velocity"`` (its open
     loop), ``"position:T"`` (closed), ``"i_ref:S"`` (sensitivity); empty: the open outermost loop.
     ``averages``: those behind the coherence.
 
-    Raises `InputError`: for a file that is no response, or a loop that is not there.
+    Raises `InputError`: for a file that is no response, a loop that is not there, or data of another period.
     """
     every = {**loops.break_points, **loops.present}
     name, _, of = place.partition(":")
@@ -104,6 +111,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         allowed = f"{', '.join(every)}, each with :T (closed loop) or :S (sensitivity) behind it, or without"
         raise InputError(f"--response-of {place}: allowed: {allowed}")
     loop, read = every[name], read_response(source, averages)
+    _refuse_other_period(source, name, loop.period_s)
     below = np.full(read.frequency_hz.size, True)
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
@@ -112,12 +120,14 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         raise InputError(f"{read.name}: {told}")
     omega, values = 2.0 * np.pi * read.frequency_hz[below], read.response[below]
     points = 1j * omega if loop.period_s is None else np.exp(1j * omega * loop.period_s)
-    found = _with_spread(omega, values, read.deviation[below], loop.period_s)
-    spread_of = np.divide(found.radius, np.abs(values), out=np.zeros(omega.size), where=values != 0.0)
-    opened = replace(read, response=values, deviation=spread_of).as_loop(cast("Kind", of))
+    read = replace(read, response=values, deviation=read.deviation[below], radius=read.radius[below])
+    found = _with_spread(omega, read, loop.period_s)
+    size = np.abs(values)
+    spread_of = np.divide(found.radius, size, out=np.zeros(omega.size), where=size > 0.0)
+    opened = replace(read, radius=spread_of).as_loop(cast("Kind", of))
     size = np.abs(opened.response)  # where it is 0 a circle says nothing
-    radius = np.multiply(size, opened.deviation, out=np.zeros(omega.size), where=size > 0.0)
-    data = MeasuredResponse(omega, opened.response, radius, loop.period_s, found.source)
+    radius = np.multiply(size, opened.radius, out=np.zeros(omega.size), where=size > 0.0)
+    data = replace(found, frdata=opened.response, radius=radius)
     L = np.asarray(loop.plain_open(points)).reshape(-1)
     top = 10.0 * read.frequency_hz[-1] if loop.period_s is None else 0.5 / loop.period_s
     grid = np.geomspace(0.1 * read.frequency_hz[0], top, CURVE_POINTS)
@@ -132,6 +142,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         radius=np.asarray(found.radius, dtype=np.float64), source=found.source,
         curve_hz=grid, curve=response_at(loop.plain_open, 2.0 * np.pi * grid),
         margins=margins, note=note, beyond=int((~below).sum()), left_out=read.left_out,
+        read_as=read.read_as,
     )  # fmt: skip
 
 
@@ -140,14 +151,22 @@ def _closed(L: np.ndarray) -> dict[str, np.ndarray]:
     return {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
 
 
-def _with_spread(
-    omega: Floats, values: np.ndarray, deviation: Floats, period_s: float | None
-) -> MeasuredResponse:
+def _refuse_other_period(source: Any, name: str, period_s: float | None) -> None:
+    """Refuse data that say another sampling period than that of the loop."""
+    said = getattr(source, "dt", None)
+    if said is None or said is True or said == 0 or period_s is None:
+        return
+    if abs(said - period_s) > 1e-6 * period_s:
+        raise InputError(
+            f"measured response: dt = {said:g} s; allowed: {period_s:g} s, of the {name} loop, or none"
+        )
+
+
+def _with_spread(omega: Floats, read: RecordedResponse, period_s: float | None) -> MeasuredResponse:
     """What was measured with its noise: as it is known, else as the points scatter about their neighbours."""
-    data = MeasuredResponse(omega, values, np.zeros(omega.size), period_s, "")
-    if np.isfinite(deviation).all():
-        return MeasuredResponse.with_noise(data, np.abs(values) * deviation)
-    return MeasuredResponse.from_scatter(data)
+    radius = np.abs(read.response) * read.radius
+    data = MeasuredResponse(omega, read.response, radius, period_s, read.noise)
+    return data if np.isfinite(radius).all() else MeasuredResponse.from_scatter(data)
 
 
 @dataclass(frozen=True, kw_only=True)

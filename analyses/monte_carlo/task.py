@@ -119,9 +119,9 @@ def _whole(path: Path, count: int) -> bool:
 
 @dataclass(frozen=True)
 class StepCheck:
-    """A step command at the output shaft, from rest."""
+    """A step command from rest, of what the outermost loop follows."""
 
-    amplitude_rad: float  # linear axis: m
+    amplitude_rad: float  # linear axis: m; rad/s of a speed drive
     duration_s: float = 0.5
     load_Nm: float = 0.0  # load torque, constant
 
@@ -142,7 +142,7 @@ STEP: Mapping[str, tuple[str, Callable[[BatchResult], np.ndarray]]] = {
 }
 """Figures of a nonlinear step: unit, and how they are read.
 
-Rise, overshoot and settling against the commanded angle (missing where it is not reached); the error at the
+Rise, overshoot and settling against the command (missing where it is not reached); the error at the
 end in percent of it; shares of the time in which a limiter acted.
 """
 

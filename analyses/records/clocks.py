@@ -121,7 +121,6 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
 
     Examples
     --------
-    >>> import numpy as np
     >>> t = np.arange(0.0, 10.0, 0.1)
     >>> start, lasts = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
     >>> round(start, 6), lasts

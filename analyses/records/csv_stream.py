@@ -255,7 +255,6 @@ class BoundedRows:
 
     Examples
     --------
-    >>> import numpy as np
     >>> rows = BoundedRows(columns=1, limit=4)
     >>> rows.add(np.arange(8.0).reshape(-1, 1))
     >>> rows.array()[:, 0].tolist(), rows.factor

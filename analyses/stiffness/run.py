@@ -274,7 +274,7 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
         if state != "shorted" or design.motor.has_electrical_dynamics:
             seen = design if state == "powered" else unpowered(design, state)
             response = linear.compliance(seen, Operating(load_Nm=load))
-            hertz = linear.frequencies_hz(response)
+            hertz = np.union1d(linear.frequencies_hz(response), linear.weakest_hz(response))
             K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
             curves.append(StiffnessCurve(state, hertz, K, static, load))
     return tuple(curves)

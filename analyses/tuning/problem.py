@@ -135,17 +135,18 @@ class Problem:
     ) -> Floats:
         """Distance of every requirement over its size, shape (candidates, corners, requirements).
 
-        Unstable designs get a number below -3 that falls with the distance of the poles from the circle; inf
-        where nothing bounds the figure. ``factors`` are those of the corners, where not those of the problem.
+        Unstable designs get a number of at most -3 that falls with the distance of the poles from the circle,
+        of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the
+        corners, where not those of the problem.
         """
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
         linear = self._looked_at(gains, corners, self.factors if factors is None else factors, timed)
         columns = loop_columns(linear)
         out = np.empty((len(gains) * len(corners), len(self.requirements)))
-        radius = np.max([linear.pole_radius(loop) for loop in linear.loops], axis=0)
+        radius = np.fmax.reduce([linear.pole_radius(loop) for loop in linear.loops], initial=1.0)
         for k, requirement in enumerate(self.requirements):
             result = judge(requirement, self.design, columns).distance / size_of(requirement)
-            out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * np.maximum(radius - 1.0, 0.0), result)
+            out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * (radius - 1.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
 
     def figure(self, quantity: str, loop: str, gains: Floats, corners: Floats) -> Floats:

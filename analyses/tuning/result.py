@@ -150,7 +150,7 @@ def hunting(tuned: Design) -> str:
 
 
 def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[NonlinearCheck, ...]:
-    """Steps of a twentieth of full deflection and of full deflection, with every limit and friction on."""
+    """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]

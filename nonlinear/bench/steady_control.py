@@ -83,7 +83,7 @@ def own_start(design: Design, bias: OperatingMotion, wanted: float) -> OwnStart:
     stage, law = own
     A, B, C, D, _ = law.sampled
     n, gain = len(A), law.gain
-    T = design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
+    T = design.controller.period_of(stage)
     direct, per_speed = fed_forward(design) if stage == "current" else (0.0, 0.0)
     e0, e1, per_command = (
         np.array([part.get(name, 0.0) for name in law.inputs]) for part in _inputs(design, stage, bias, T)

@@ -5,7 +5,7 @@ import re
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from actuator_lti.design.field import BIG
+from actuator_lti.design.field import BIG, unit_on
 from actuator_lti.design.fields import fields_in, parts_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import reachable_speed
@@ -59,10 +59,6 @@ def supply_voltage(design: Design) -> float:
     return min(design.limits.voltage_V, BIG)
 
 
-def _units(design: Design) -> tuple[str, str]:
-    return ("m", "N") if design.axis == "linear" else ("rad", "N*m")
-
-
 def sizes(design: Design) -> dict[str, float]:
     """Size in use of each quantity, on the output shaft and on the motor; ``inf`` where nothing bounds it."""
     ratio, angle, motor = design.total_ratio, design.validation.full_deflection_rad, design.effective_motor
@@ -101,7 +97,7 @@ def _signal(design: Design, number: int, text: tuple[str, str, str], **more: Any
 
 
 def _inputs(design: Design) -> tuple[Variable, ...]:
-    (words, unit), (_, torque) = stage_words(design), _units(design)
+    (words, unit), torque = stage_words(design), unit_on(design.axis, "{torque}")
     moment = "moment of the load on the output shaft, beside that of the design"
     texts = (
         ("command", words, unit, 0.0, -math.inf),
@@ -116,7 +112,7 @@ def _inputs(design: Design) -> tuple[Variable, ...]:
 
 
 def _outputs(design: Design) -> tuple[Variable, ...]:
-    angle, torque = _units(design)
+    angle, torque = unit_on(design.axis, "{angle}"), unit_on(design.axis, "{torque}")
     texts = (
         ("output.angle", "output position" if angle == "m" else "output angle", angle),
         ("output.rate", "rate of the output", f"{angle}/s"),
@@ -142,7 +138,7 @@ def _flags() -> tuple[Variable, ...]:
 
 
 def _parameters(design: Design, trace: KeyTrace) -> tuple[Variable, ...]:
-    angle, _ = _units(design)
+    angle = unit_on(design.axis, "{angle}")
     start = Variable(
         name="initial.angle", reference=INITIAL_ANGLE, causality="parameter", variability="fixed",
         description="output angle at the start, everything at rest", unit=angle, start=0.0,

@@ -118,21 +118,18 @@ class Run:
         return row
 
 
+_kept_row = lru_cache(maxsize=16)(design_row)  # a design is mostly run more than once
+
+
 def _design_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
     """The row of a design alone."""
     for name, switch in (("friction_on", friction_on), ("limits_on", limits_on)):
         if switch not in (True, False):
             raise InputError(f"{name} = {shown(switch)}: allowed: True or False")
     try:
-        return _kept_row(design, friction_on, limits_on)
+        return _kept_row(design, friction_on=friction_on, limits_on=limits_on)
     except TypeError:  # a list in place of a tuple
         return design_row(design, friction_on=friction_on, limits_on=limits_on)
-
-
-@lru_cache(maxsize=16)
-def _kept_row(design: Design, friction_on: bool, limits_on: bool) -> Floats:
-    """The same, kept: a design is mostly run more than once."""
-    return design_row(design, friction_on=friction_on, limits_on=limits_on)
 
 
 def ticks_of(duration_s: float, period_s: float) -> int:
@@ -164,9 +161,9 @@ def check_frequency(design: Design, command: Command) -> None:
     """Refuse what is no command, and one that the outermost loop, sampled, cannot follow in principle."""
     check_command(command)
     control = design.controller
-    loop = {"position": control.position, "velocity": control.velocity}.get(control.outermost)
-    nyquist = 0.5 / (control.period_s * (1 if loop is None else loop.every))
-    stage = "the drive" if loop is None else f"the {control.outermost} loop"
+    nyquist = 0.5 / control.period_of(control.outermost)
+    sampled = control.outermost in ("position", "velocity")
+    stage = f"the {control.outermost} loop" if sampled else "the drive"
     if command.highest_hz >= nyquist:
         message = f"command {command.kind}: {command.highest_hz:g} Hz: must be below the Nyquist frequency"
         raise InputError(f"{message} of {stage}, {nyquist:g} Hz", where=design.name)

@@ -57,52 +57,34 @@ def simulate(
     are located inside the tick in closed form, so there is no integration error (the tanh law: see
     ``tanh_tolerance``).
 
+    ``design``: a design, a shipped name, or the path of a design file.
+    ``command``: output angle against time, from `nonlinear.commands`.
+    ``duration_s``: rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
+    ``load_Nm``: load torque at the output shaft, held over each tick; slope and gravity of the design add to
+    it.
+    ``bias``: motion added under the command, in the same unit.
+    ``probes``: instruments at break points.
+    ``initial``: by default everything at rest at zero.
+    ``disturbance_Nm``: extra torque at the motor shaft, one value a tick (the last is held).
+    ``supply``: bus voltage against time (`nonlinear.commands.sampled`), at the ticks; it takes the place of
+    ``limits.voltage`` and of the design's own supply.
+    ``supply_scales``: the controller's output is a duty ratio of the bus, as in a servo without a current
+    loop: the motor has ``u U(t) / limits.voltage``, with u the controller's voltage, limited by
+    ``limits.voltage``.
+    ``friction_on``, ``limits_on``: ``friction_on=False`` leaves out dry friction and offset;
+    ``limits_on=False`` all four limits.
+    ``energy``: integrate the energies (at most some twice as slow).
+    ``record_every``: keep every so many rows.
+    ``tanh_tolerance``: error of the speed that one tick may add under the tanh law, in smoothing speeds w_s;
+    sets its sub-steps.
+    ``max_events``: most events in one tick before the run is given up.
+    ``raise_on_failure``: ``False`` returns a failed run with its status instead; rows not reached are NaN.
+    ``progress``: called as ``progress(done, total)`` in ticks from time to time, and once at the end.
+
     Raises `InputError`: for a command faster than the Nyquist frequency of the position loop, a duration of
     no tick, values that are not finite, a probe at a stage that the design does not have; `NumericalError`:
     if the run ends early (state not finite, too many events in a tick).
 
-    Parameters
-    ----------
-    design : Design, str or path
-        A design, a shipped name, or the path of a design file.
-    command : Command
-        Output angle against time, from `nonlinear.commands`.
-    duration_s : float
-        Rounded to whole ticks; row k is sampled at ``t_k = k Ts``, k = 0 .. n - 1.
-    load_Nm : float or LoadMoment
-        Load torque at the output shaft, held over each tick; slope and gravity of the design add to it.
-    bias : Command, optional
-        Motion added under the command, in the same unit.
-    probes : sequence of Probe
-        Instruments at break points.
-    initial : State, optional
-        Default: everything at rest at zero.
-    disturbance_Nm : array_like, optional
-        Extra torque at the motor shaft, one value a tick (the last is held).
-    supply : Command, optional
-        Bus voltage against time (`nonlinear.commands.sampled`), at the ticks; it takes the place of
-        ``limits.voltage`` and of the design's own supply.
-    supply_scales : bool
-        The controller's output is a duty ratio of the bus, as in a servo without a current loop: the motor
-        has ``u U(t) / limits.voltage``, with u the controller's voltage, limited by ``limits.voltage``.
-    friction_on, limits_on : bool
-        ``friction_on=False`` leaves out dry friction and offset; ``limits_on=False`` all four limits.
-    energy : bool
-        Integrate the energies (at most some twice as slow).
-    record_every : int
-        Keep every so many rows.
-    tanh_tolerance : float
-        Error of the speed that one tick may add under the tanh law, in smoothing speeds w_s; sets its
-        sub-steps.
-    max_events : int
-        Most events in one tick before the run is given up.
-    raise_on_failure : bool
-        ``False`` returns a failed run with its status instead; rows not reached are NaN.
-    progress : callable, optional
-        Called as ``progress(done, total)`` in ticks from time to time, and once at the end.
-
-    Notes
-    -----
     At a zero crossing the rotor rests while ``|drive torque| <= Tc * breakaway_ratio``, as model.md says of
     stick; it passes through otherwise.  Counts are the floor of angle times counts per rad; they enter the
     speed estimate by difference only, the position controller sees the angle itself.  The reference before

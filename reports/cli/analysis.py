@@ -143,6 +143,8 @@ def answer(
         doc.waived(parts, drive)
     passed = getattr(result, "passed", None)
     passed = passed or getattr(result, "verdict", passed)
+    if passed is not None:
+        parts[bool(missing)]["verdict"] = Verdict.of(passed)
     files = one.shows("write", lambda *_: [])(result, out)
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)

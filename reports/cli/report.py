@@ -97,7 +97,8 @@ def _sections(path: Path) -> list[Any]:
         which = "whole report" if made["kind"] == "report" else f"document of {made['kind']}"
         words = f"--include: a {which}, whose sections a report has by itself"
         raise InputError(f"{words}; allowed: what identify or correlate wrote with --out", where=str(path))
-    return [part for part in made["sections"] if part["id"] != "provenance"]
+    kept = [part for part in made["sections"] if part["id"] != "provenance"]
+    return [{key: own for key, own in part.items() if key != "verdict"} for part in kept]
 
 
 def pdf(

@@ -39,7 +39,10 @@ def build(payload: Mapping[str, Any]) -> tuple[Tree, dict[str, bytes]]:
     settings, comparison = payload.get("settings", {}), "study" in payload
     made = _comparison(payload) if comparison else _report(_design(payload), settings)
     plain = doc.loads(doc.dumps(made))
-    files = {"report.html": page(plain).encode(), "report.json": doc.dumps(plain).encode()}
+    files = {
+        "report.html": page(plain, beside="report.json").encode(),
+        "report.json": doc.dumps(plain).encode(),
+    }
     if settings.get("pdf"):
         files["report.pdf"] = pdf_bytes(plain)
     meta = digest({**plain, "sections": []} if comparison else plain)

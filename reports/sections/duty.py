@@ -1,6 +1,8 @@
 """Duty cycle against the continuous rating: current, overload protection and winding temperature."""
 
 import math
+from collections.abc import Mapping
+from typing import Any
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.duty.run import Duty
@@ -52,11 +54,24 @@ def asked_words(result: Duty) -> str:
 
 
 def summary(result: Duty) -> str:
+    limited = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
+    said = f"{asked_words(result)} is {RATED[result.verdict]}: {_found(result)}"
+    return said + limited * bool(result.limited) + "."
+
+
+def _found(result: Duty) -> str:
+    """What is beyond its limit, else the current."""
+    beyond = [row for row in _rows(result) if row["_status"] == "fail"]
+    if beyond:
+        return "; ".join(map(_beyond, beyond))
     known = math.isfinite(result.continuous_A)
-    part = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
-    if result.limited:
-        part += f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
-    return f"{asked_words(result)} is {RATED[result.verdict]}: {result.rms_A:.4g} A, rms over time{part}."
+    limit = f", limit {result.continuous_A:.4g} A" if known else ", and no continuous current is stated"
+    return f"{result.rms_A:.4g} A, rms over time{limit}"
+
+
+def _beyond(row: Mapping[str, Any]) -> str:
+    unit = f" {row['unit']}".rstrip()
+    return f"{row['what']} {row['value']:.4g}{unit}, limit {row['limit']:.4g}{unit}"
 
 
 def _rows(result: Duty) -> list[doc.Row]:

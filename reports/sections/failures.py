@@ -26,7 +26,7 @@ _SHOWN = 400
 
 
 def section(result: Failures) -> doc.Section:
-    out, asked = output_unit(result.design.axis), result.asked
+    out, asked, push = output_unit(result.design.axis), result.asked, push_words(result.design)
     held = "has come to rest"
     if (swing := noticed(result.design, result.before)) is not None:
         held = f"does not come to rest, {told(result.design, swing, *out)},"
@@ -34,7 +34,7 @@ def section(result: Failures) -> doc.Section:
         f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} "
         f"{load_unit(result.design)} (positive pushes forward). Deflection counts from where the output was; "
         f"the stop is {out.of(asked.stop_rad, 4)} away, and detection takes {1e3 * asked.detection_s:.4g} "
-        "ms. The torque is that in the coupling; in a rigid train the motor's torque times the reduction."
+        f"ms. The {push} is that in the coupling; in a rigid train the motor's torque times the reduction."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     blocks = [_table(result, out), _figure(result, out), *map(doc.text, left)]

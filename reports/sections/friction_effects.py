@@ -64,9 +64,9 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
 def _predicted(item: Confirmation, fine: Unit) -> str:
     one = item.cycle
     kind = "stable" if one.stable else "unstable, the limit of what friction damps"
-    seen = "refuted" if item.ratio is None else f"simulated at {item.ratio:.2f} of that"
+    seen = "" if item.ratio is None else f", simulated at {item.ratio:.2f} of that"
     hz = "" if item.frequency_hz is None else f", {item.frequency_hz:.4g} Hz"
-    return f"±{fine.of(one.output_rad)} at {one.frequency_hz:.4g} Hz ({kind}; {seen}{hz})"
+    return f"±{fine.of(one.output_rad)} at {one.frequency_hz:.4g} Hz ({kind}; {item.verdict}{seen}{hz})"
 
 
 def _threshold_table(result: FrictionEffects, fine: Unit, load: str) -> doc.Block:

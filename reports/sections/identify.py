@@ -125,7 +125,7 @@ SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "close
 
 
 def _of_loop(result: ResponseResult) -> doc.Section:
-    fit, measured = result.fit, result.measured
+    fit, measured, read = result.fit, result.measured, result.measured.read_as
     noise = "no deviations were measured: errors are those of the residual"
     if np.isfinite(measured.coherence).any():
         noise = f"the coherence is not read without --averages N, {noise}"
@@ -134,7 +134,7 @@ def _of_loop(result: ResponseResult) -> doc.Section:
     intro = (
         f"{measured.name}: {len(measured.frequency_hz)} frequencies from {measured.frequency_hz[0]:.4g} to "
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
-        f"sampled loop, {noise}."
+        f"sampled loop, {noise}.{f' {read[:1].upper()}{read[1:]}.' if read else ''}"
     )
     blocks: list[doc.Block] = [identified.parameter_table("Identified values", fit, axis=result.design.axis)]
     both = decibels_and_degrees(measured.response, result.modelled)

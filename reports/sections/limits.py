@@ -78,6 +78,9 @@ def _result(rows: Sequence[_Linear], border: Onset, scale: float, unit: str) -> 
         part = (
             "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
         )
+        if row.hz == 0.0:
+            said = f"A sine of {part} ({row.amplitude:.3g} {unit}) is linear at no frequency looked at"
+            return f"{said}: the {_noun(row.limiter)} acts."
         size = f"A sine of {part} ({row.amplitude:.3g} {unit}) stays linear"
         if row.hz is None:
             return f"{size} over the whole frequency range."
@@ -91,13 +94,13 @@ def _result(rows: Sequence[_Linear], border: Onset, scale: float, unit: str) -> 
 
 
 def _noun(limiter: str) -> str:
-    whole = limiter in (words_of("profile"), words_of("overload"))
+    whole = limiter in (words_of("profile"), words_of("overload"), COGGING)
     return limiter if whole or "limit" in limiter else f"{limiter} limit"
 
 
 def words_of(limiter: str) -> str:
     """Say which limiter acts, by its name; ``""`` is none."""
-    return LIMITERS[limiter].words if limiter else "none"
+    return COGGING if limiter == "cogging" else LIMITERS[limiter].words if limiter else "none"
 
 
 @dataclass(frozen=True)
@@ -114,7 +117,7 @@ def _rows(design: Design, border: Onset, scale: float) -> list[_Linear]:
         amplitude, up_to, limiter = fraction * _full(design), None, "none in this range"
         reached = np.nonzero(border.amplitude_rad < amplitude)[0]
         if len(reached):
-            up_to = hertz(_crossing(border, int(reached[0]), amplitude))
+            up_to = hertz(_crossing(border, int(reached[0]), amplitude)) if reached[0] else 0.0
             limiter = words_of(border.active[int(reached[0])])
         rows.append(_Linear(amplitude * scale, fraction, up_to, limiter))
     return rows
@@ -131,9 +134,10 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
 
 
 PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
-LINES = {name: k for k, name in enumerate(LIMITERS)}
+LINES = {name: k for k, name in enumerate((*LIMITERS, "cogging"))}
 COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED}
 COLOURS |= {name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()}
+COGGING = "cogging (the motor turned by a tenth of its period)"
 WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"}
 WORDS |= {"other": "play, gravity or counts"} | {name: one.words for name, one in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
@@ -198,7 +202,7 @@ def _onsets(panel: style.Panel, hertz: np.ndarray, each_rad: Mapping[str, np.nda
         if np.isfinite(values).any():
             limited = np.where(np.isfinite(values), scale * np.asarray(values), np.nan)
             look: style.Style = {"colour": COLOURS[name], "dash": LINES[name], "width": 2.3}
-            panel.curve(hertz, limited, LIMITERS[name].words, **look)
+            panel.curve(hertz, limited, words_of(name), **look)
 
 
 def _deepest(mask: np.ndarray) -> tuple[int, int]:

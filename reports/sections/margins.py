@@ -118,7 +118,7 @@ def brief(result: Margins) -> Brief:
     more, told = [crossing_table(own)] if max(counts, default=0) > 2 else [], list[str]()
     if result.measured is not None:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
-        told.append(measured.words(result.measured))
+        told += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
     return Brief(first["result"], [SideBySide(head, tables), *more, *judged["blocks"]], notes)
 

@@ -23,8 +23,9 @@ def words(one: Measured) -> str:
         of, off = one.nearer
         like = f" It is nearer to {of} of the model, {off:.2f} dB rms: was it measured of {one.loop}:{of}?"
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
-    left = f" {one.left_out} rows without numbers are left out." if one.left_out else ""
-    return f"{one.name} over the {_place(one)}. {told}.{like}{beyond}{left} {one.note}".strip()
+    left = f" {one.left_out} rows without numbers or at 0 Hz are left out." if one.left_out else ""
+    read = f" {one.read_as[:1].upper()}{one.read_as[1:]}." if one.read_as else ""
+    return f"{one.name} over the {_place(one)}. {told}.{like}{beyond}{left}{read} {one.note}".strip()
 
 
 WHAT = {"L": "open {}", "T": "closed {}", "S": "sensitivity of the {}"}
@@ -41,7 +42,7 @@ def section(one: Measured) -> doc.Section:
 def blocks(one: Measured) -> list[doc.Block]:
     made = [doc.text(words(one))]
     if one.margins is not None:
-        made.append(_margins(one.margins))
+        made += [_margins(one.margins), *map(doc.remark, one.notes)]
     rows = doc.details("Difference to the model at each frequency", [differences(one)])
     return [*made, rows, _bode(one), _nyquist(one)]
 
@@ -67,6 +68,16 @@ def _margins(of: StabilityMargins) -> doc.Block:
     found: list[tuple[str, float | None, Any, str, float | None]]
     found = [("Gain margin", db, range_, "dB", m.frequency_rad_s) for db, range_, m in gains]
     found += [("Phase margin", m.deg, m.deg_range, "deg", m.frequency_rad_s) for m in of.phase_margins]
+    found += [
+        (
+            "Delay margin",
+            m.seconds * 1e3,
+            m.seconds_range and 1e3 * np.array(m.seconds_range),
+            "ms",
+            m.frequency_rad_s,
+        )
+        for m in of.delay_margins
+    ]
     modulus = of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s
     found.append(("Modulus margin", *modulus))
     columns = [

@@ -10,9 +10,10 @@ from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.result import BindingRequirement, TuningResult
+from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import in_shown, output_unit
+from reports.sections.names import Unit, in_shown
 
 
 def section(result: TuningResult) -> doc.Section:
@@ -151,9 +152,10 @@ def _curve(result: TuningResult) -> doc.Block:
 
 
 def checks(result: TuningResult) -> doc.Block:
+    unit, per_SI = COMMAND_UNITS[result.design.axis, result.design.controller.outermost]
     columns = [
         doc.of("corner", "corner", "Design"),
-        doc.of("amplitude_rad", "amplitude", "Step", **output_unit(result.design.axis).column()),
+        doc.of("amplitude_rad", "amplitude", "Step", **Unit(per_SI, unit).column()),
         doc.of("rise_time_s", "rise", "Rise", "ms", scale=1e3, format="ms:3", better=-1),
         doc.of("overshoot_percent", "overshoot", "Overshoot", "%", format="fix:1", better=-1),
         doc.of("settling_time_s", "settling", "Settling 2 %", "ms", scale=1e3, format="ms:3", better=-1),

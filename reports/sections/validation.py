@@ -94,8 +94,8 @@ def summary(validation: Validation) -> doc.Section:
         "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands, "
         "then without dry friction and friction by load: its figures differ from those of sliding by that. "
         "What is large, starts from rest, or is shaken by counts is a finding of its own. An error of less "
-        "than 10⁻⁹ of its value is rounding: that bound stands for it. A break point at which both show the "
-        "outermost loop again is listed as that loop."
+        "than 10⁻⁹ of its value is rounding: that bound, or what is allowed where that is less, stands for "
+        "it. A break point at which both show the outermost loop again is listed as that loop."
     )
     words = " ".join(f"{capital(each)}." for each in validation.sentences())
     return doc.section(
@@ -171,9 +171,11 @@ def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:
     def at_most(row: Check) -> float:
-        """A bound of the error: no digits that are noise of the last bit."""
+        """A bound of the error: no digits that are noise of the last bit; of one that is allowed that."""
         bound = _scaled(row)[0] * max(row.error, NOISE * abs(row.predicted or 1.0))
-        return float(UP.create_decimal(f"{bound:.12g}"))
+        allowed = _rounded(row, row.allowed, 2)
+        most = allowed if row.error <= row.allowed and allowed is not None else math.inf
+        return min(float(UP.create_decimal(f"{bound:.12g}")), most)
 
     columns = [
         doc.of(quantity_name, "quantity", "Prediction"),

@@ -292,9 +292,15 @@ def test_closed_loops_and_how_their_errors_grow(tmp_path, of):
         ("f,re,im\n1,2,3\n1,2,3", "a frequency is given twice"),
         ("f,re,im\n0,2,3\n1,2,3", "frequencies above 0"),
         ("f,re,im,coherence\n1,2,3,1.2\n2,2,3,1", "a coherence outside 0 to 1"),
-        ("f,re,im\n1,2,3\n2,2", "rows of 3"),
+        ("f,re,im\n1,2,3\n2,2", "2 columns in line 3, 3 in the first"),
+        ("[motor]\nR = 1", "a heading such as f_hz,gain_db,phase_deg"),
         ("# bench\nf,re,im\n1,2,3\n\n2,x,1\n3,1,1", 'line 5: "x" is no number'),
-        ("f,re,im\n0,2,3\n1,2,3\n2,2,2", "each at a frequency above 0 Hz"),
+        ("f,re,im\n-1,2,3\n1,2,3\n2,2,2", "each at a frequency above 0 Hz"),
+        ("f,gain_db,gain_db,phase_deg\n1,2,3,-4\n2,1,3,-5", "contradicts the magnitude"),
+        ("f,re,im,gain_db\n1,3,4,0\n2,3,4,0", '"gain_db" contradicts the magnitude'),
+        ("f,re,im,phase_deg\n1,3,4,-53.13\n2,3,4,-53.13", '"phase_deg" contradicts the phase'),
+        ("f,re,im,std_abs\n1,3,4,1\n2,3,4,1", "deviations in abs; allowed: one over the size"),
+        ("f,re,im,std,sigma\n1,3,4,1,1\n2,3,4,1,1", "deviations in no unit and no unit"),
         ("f,re,im\n1,0,0\n2,2,1", "a value that is 0"),
         ("", "is empty"),
     ],
@@ -304,3 +310,47 @@ def test_what_is_no_response_is_refused(tmp_path, text, words):
     with pytest.raises(InputError, match=r"r\.csv") as refused:
         read_response(tmp_path / "r.csv")
     assert words in str(refused.value)
+
+
+def test_a_deviation_counts_in_its_unit(tmp_path):
+    """Of many values with a complex error of 2 % rms: the deviations of their dB and deg."""
+    n = np.random.default_rng(1).normal(size=(2, 400_000))
+    values = 1.0 + 0.02 * (n[0] + 1j * n[1]) / np.sqrt(2.0)
+    std = np.std(20.0 * np.log10(np.abs(values))), np.std(np.degrees(np.angle(values)))
+    for names, told in (
+        ("Deviation (dB)", std[:1]),
+        ("std_deg", std[1:]),
+        ("gain_std_db,phase_std_deg", std),
+        ("sigma_rad", (np.radians(std[1]),)),
+        ("deviation_percent", (2.0,)),
+    ):
+        row = ",".join(map(str, told))
+        (tmp_path / "r.csv").write_text(f"f,re,im,{names}\n1,3,4,{row}\n2,3,4,{row}\n")
+        read = read_response(tmp_path / "r.csv")
+        np.testing.assert_allclose(read.deviation, 0.02, rtol=0.01)
+        np.testing.assert_allclose(read.radius, 0.02 * np.sqrt(np.log(100.0)), rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1,2,-3\n2,1,-4", 'without a heading, read as frequency "f_hz" in Hz, magnitude "gain_db" in dB, '),
+        ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '"Frequency" in Hz (it says no unit), real part "re"'),
+        ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '; not read: "error"'),
+        ("omega,gain,phase_rad\n1,2,3\n2,-1,4", '"omega" in rad/s, magnitude "gain" in dB (it says no unit)'),
+        ("w,re,im,coherence\n1,2,3,.9\n2,2,3,.9", "coherence tells no noise without averages (--averages N)"),
+        ("f,re,re_std,im,,\n1,2,1,3,,\n2,-1,1,4,,", '"im"; not read: "re_std"'),
+        ("f,re,im,gain_db\n1,3,4,13.98\n2,3,4,13.98", 'imaginary part "im"; not read: "gain_db"'),
+    ],
+)  # fmt: skip
+def test_how_the_columns_are_taken_is_told(tmp_path, text, words):
+    (tmp_path / "r.csv").write_text(text)
+    assert words in read_response(tmp_path / "r.csv").read_as
+
+
+def test_a_row_at_0_hz_is_left_out_and_averages_want_a_coherence(tmp_path):
+    (tmp_path / "r.csv").write_text("f_hz,re,im\n0,9,0\n1,2,3\n2,2,2\n")
+    read = read_response(tmp_path / "r.csv")
+    assert (read.frequency_hz.tolist(), read.left_out) == ([1.0, 2.0], 1)
+    with pytest.raises(InputError, match="averages: allowed with a column of coherence"):
+        read_response(tmp_path / "r.csv", 8)

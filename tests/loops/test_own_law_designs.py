@@ -130,6 +130,15 @@ def test_every_prediction_is_met(stage: str) -> None:
     assert len(result.rows) > 60
 
 
+def test_a_law_on_a_counted_output_meets_its_predictions() -> None:
+    """With the twist among its signals; what a law does with counts is tested with its limits."""
+    base = load_design("joint")
+    gain, T = base.controller.position.gain, period_s(base, "position")
+    law = ([[0.5]], [[0.1 * gain, 0.2]], [[0.5]], [[0.9 * gain, -3.0]], T)
+    rows = validate(base.with_law("position", law, ["error", "twist"])).rows
+    assert not [row for row in rows if row.verdict != "met"]
+
+
 @pytest.mark.skipif(system_compiler() is None or not sys.platform.startswith("linux"), reason="no C compiler")
 def test_the_compiled_code_meets_the_loops() -> None:
     assert not check_code(lead("position")).failed

@@ -255,7 +255,10 @@ def test_crossings_that_a_coarse_measurement_tells_apart_are_listed_apart() -> N
         return 300 / s * mode * np.exp(-3e-4 * s) / (1 + s / 3000)
 
     omega = np.geomspace(20.0, 3000.0, 12)
-    m = stability_margins(control.frd(L(omega), omega))
+    m = stability_margins(MeasuredResponse.with_noise(control.frd(L(omega), omega), 0.0))
+    plain = stability_margins(control.frd(L(omega), omega))  # its bends may be noise: figures, no ranges
+    assert [p.deg for p in plain.phase_margins] == [p.deg for p in m.phase_margins]
+    assert {p.deg_range for p in plain.phase_margins} == {None}
     side = np.abs(L(omega)) > 1.0
     passed = np.flatnonzero(side[1:] != side[:-1])
     assert len(m.phase_margins) == len(passed) == 3
@@ -267,3 +270,39 @@ def test_crossings_that_a_coarse_measurement_tells_apart_are_listed_apart() -> N
     for k in np.flatnonzero((np.abs(y[1:]) > 1) != (np.abs(y[:-1]) > 1)):
         (margin,) = (p for p in m.phase_margins if p.bracket_rad_s[0] <= fine[k] <= p.bracket_rad_s[1])
         assert _holds(margin, math.degrees(np.angle(-y[k])))
+
+
+def lagging(wc: float, lag: float, delay: float) -> Response:
+    return lambda w: (wc / (1j * w)) * np.exp(-1j * w * delay) / (1 + 1j * w / lag)
+
+
+@pytest.mark.parametrize("count", [6, 8, 12, 16, 24])
+def test_few_noisy_points_hold_the_truth_in_99_of_100(count: int) -> None:
+    """A crossover in closed form: (w/wc)^2 (1 + (w/lag)^2) = 1; margin and delay margin at it."""
+    rng = np.random.default_rng(count)
+    held = listed = 0
+    for _ in range(200):
+        wc, lag, delay = 10.0 ** rng.uniform((1.0, 1.0, -4.0), (1.5, 3.0, -2.3))
+        w = lag * math.sqrt(0.5 * (math.sqrt(1.0 + 4.0 * (wc / lag) ** 2) - 1.0))
+        deg = 90.0 - math.degrees(math.atan(w / lag) + w * delay)
+        omega = np.geomspace(w / 3.0, 3.0 * w, count)
+        noisy = lagging(wc, lag, delay)(omega) * (1.0 + 0.02 * circular(rng, omega.shape))
+        m = stability_margins(control.frd(noisy, omega))
+        for phase, late in zip(m.phase_margins, m.delay_margins, strict=True):
+            listed += 1
+            inside = phase.deg_range[0] <= deg <= phase.deg_range[1]
+            held += inside and late.seconds_range[0] <= math.radians(deg) / w <= late.seconds_range[1]
+    assert listed >= 190
+    assert held >= 0.99 * listed
+
+
+@pytest.mark.parametrize("count", [2, 3, 5])
+def test_noise_that_so_few_points_do_not_show_is_said_and_no_range_stated(count: int) -> None:
+    omega = np.geomspace(8.0, 12.0, count)
+    data = control.frd(lagging(10.0, 100.0, 1e-3)(omega), omega)
+    m = stability_margins(data)
+    (phase,), (late,) = m.phase_margins, m.delay_margins
+    assert (phase.deg_range, late.seconds_range, m.modulus_range, m.disk_margin.alpha_range) == (None,) * 4
+    assert any("noise: not known, as so few points" in note for note in m.notes)
+    known = stability_margins(MeasuredResponse.with_noise(data, 0.01))
+    assert known.phase_margins[0].deg_range[0] < known.phase_margins[0].deg

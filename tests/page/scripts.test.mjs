@@ -84,7 +84,7 @@ test("columns are found by name and unit, or as chosen, or refused in words", ()
   assert.deepEqual(read("0,1,2\n1,1,2\n").command, [1, 1]);
   assert.deepEqual(read("0;1,5;2\n1;1,5;2\n").command, [1.5, 1.5]);
   for (const [told, words] of [["time,angle\n0,1\n1,2\n", /the command: choose/], ["time,command,angle\n1,0,0\n0,0,0\n", /backwards/], ["time,command,angle\n1,0,0\n1,0,0\n", /still/],
-    ["time,command,angle\n1,0,0\n", /two rows/], ["\0PNG", /no text/], ["", /nothing/], ["5\n6\n", /one column/], ["f_Hz,dB,deg\n0,1,2\n1,1,2\n", /above 0/],
+    ["time,command,angle\n1,0,0\n", /two rows/], ["\0PNG", /no text/], ["", /nothing/], ["5\n6\n", /one column/], ["f_Hz,dB,deg\n-1,1,2\n1,1,2\n", /above 0/],
     ["f_Hz,re,phase_deg\n1,1,2\n2,1,2\n", /real part goes/]]) assert.throws(() => read(told), words, told);
 });
 

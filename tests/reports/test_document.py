@@ -67,7 +67,7 @@ GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
         ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
         ([REFUTED], "report", "not met",  # what decides it first
          ["0 of 1 checks by simulation met, 1 not met", "the design states no requirements"]),
-        ([OPEN], "compare", "met", []),
+        ([OPEN], "compare", "not proven", ["not proven: Margins"]),
         ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
         ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide
         (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),

@@ -4,17 +4,21 @@ import re
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 from built_report import Built
 
-from actuator_lti import load_design
+from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs
 from analyses.corners import corners
 from analyses.large_signal.from_rest import AmplitudeMargin
+from analyses.linear.loop_survey import with_cogging
 from reports import document as doc
 from reports.build import design_report
+from reports.sections import limits
 from reports.sections.in_time import remark
 from reports.verdict_summary import gathered
+from tests.changed import changed
 
 AS_IT_IS = (
     "The position loop, without dry friction, sustains an oscillation as designed, started from 2 %% of full "
@@ -54,6 +58,23 @@ def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(bui
     assert result["linear"] not in [item["text"] for item in result["findings"]]
     ids = {part["id"] for part in built.document["sections"]}
     assert {item["where"] for item in result["findings"]} <= ids  # each leads to a section
+
+
+@pytest.mark.parametrize("stage", ["position", "velocity"])
+def test_cogging_is_a_border_of_the_linear_model_by_name(stage: str) -> None:
+    """Slow sines are followed: the motor turns N A, of a speed N A/w, and a tenth of a period is 0.2 pi/Z."""
+    motor = {"cogging_Nm": 1e-7, "cogging_periods": 24.0}
+    controller = {} if stage == "position" else {"position": None}
+    drive = changed(load_design("ilr33-amber"), motor=motor, controller=controller, requirements=())
+    w = np.array([1e-3, 2e-3])
+    loops = assemble_loops(drive)
+    border = with_cogging(loops, onset(loops, w))
+    by_hand = 0.2 * np.pi / 24.0 / drive.total_ratio * (1.0 if stage == "position" else w)
+    assert border.each_rad["cogging"] == pytest.approx(by_hand, rel=2e-3)
+    assert border.active == ("cogging", "cogging")
+    assert (
+        "cogging (the motor turned by a tenth of its period) acts" in limits.section(drive, border)["result"]
+    )
 
 
 def test_a_bar_has_the_band_of_the_corners(built: Built) -> None:

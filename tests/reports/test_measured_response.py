@@ -1,5 +1,7 @@
 """A measured response over the model: truth is the model itself times a known error."""
 
+import html
+import json
 from pathlib import Path
 
 import control
@@ -7,6 +9,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti.margins import MeasuredResponse
 from analyses.margins.run import measured_over
 from reports import report
 from reports.sections.measured import blocks, words
@@ -108,3 +111,66 @@ def test_command_line(tmp_path, cli) -> None:
     assert "--response-of speed: allowed: " in cli.refused(*asked, "speed")
     with pytest.raises(InputError, match="no two frequencies below"):
         measured_over(LOOPS, Response([1.0, 1j], [1e6, 2e6]), "current")
+
+
+def test_what_the_points_hide_is_told_wherever_the_margins_stand(tmp_path, cli) -> None:
+    """An antiresonance at 60 rad/s of a thousandth of damping, its resonance at 150, points a third apart."""
+    omega = np.geomspace(8.0, 9000.0, 26)
+    s = 1j * omega
+    L = 3000.0 / s * ((s / 60.0) ** 2 + 2e-3 * s / 60.0 + 1.0) / ((s / 150.0) ** 2 + 2e-3 * s / 150.0 + 1.0)
+    columns = (20.0 * np.log10(np.abs(L)), np.degrees(np.unwrap(np.angle(L))), np.full(omega.size, 0.003))
+    path = saved(tmp_path / "r.csv", Response(L, omega), "gain_db,phase_deg,deviation", *columns)
+    one = measured_over(LOOPS, path, "current")
+    assert any("resonance lies between these points" in note for note in one.notes)
+    assert any("margins there may be missing" in note for note in one.notes)
+    assert set(one.margins.notes) < set(one.notes)
+    asked = (
+        "margins",
+        "ilr33-amber",
+        "--response",
+        path,
+        "--response-of",
+        "current",
+        "--out",
+        tmp_path / "x",
+    )
+    printed = cli.text(*asked)
+    page = html.unescape((tmp_path / "x" / "margins.html").read_text(encoding="utf-8"))
+    held = json.dumps(json.loads((tmp_path / "x" / "margins.json").read_text()), ensure_ascii=False)
+    made = report("ilr33-amber", validation=False, response=path, response_of="current")
+    for told in (printed, page, held, json.dumps(made, ensure_ascii=False)):
+        plain = "".join(told.split()).casefold().replace("\u2212", "-")
+        assert all("".join(note.split()).casefold() in plain for note in one.notes)
+        assert "readasfrequency" in plain
+
+
+@pytest.mark.parametrize("kind", ["L", "T"])
+def test_a_given_noise_is_the_one_that_counts(kind: str) -> None:
+    truth = bench("velocity", kind, 1.0)
+    given = MeasuredResponse.with_noise(truth, 0.3 * np.abs(truth.frdata.ravel()))
+    one = measured_over(LOOPS, given, f"velocity:{kind}")
+    np.testing.assert_allclose(one.radius, given.radius, rtol=1e-12)
+    assert one.source == given.source
+    if kind == "L":
+        assert one.margins.modulus_range == pytest.approx(stability_margins(given).modulus_range)
+    else:  # dL = dT/(1 - T)^2
+        T = truth.frdata.ravel()
+        np.testing.assert_allclose(one.open_loop.radius, given.radius / np.abs(1.0 - T) ** 2, rtol=1e-9)
+
+
+def test_data_of_another_sampling_period_are_refused() -> None:
+    truth, period = bench("velocity", gain=1.0), LOOPS.velocity.period_s
+    for dt in (None, True, 0, period):
+        measured_over(LOOPS, Response(truth.frdata.ravel(), truth.omega, dt=dt), "velocity")
+    with pytest.raises(InputError, match=r"dt = 0\.5 s; allowed: .* of the velocity loop"):
+        measured_over(LOOPS, Response(truth.frdata.ravel()[:4], truth.omega[:4] / 1e3, dt=0.5), "velocity")
+
+
+def test_a_coherence_of_few_averages_is_as_wide_as_its_quantile_says(tmp_path) -> None:
+    """Of two averages: F(2, 2) is exceeded by 99 in 1 of 100 cases, |e|^2 = 99 |L|^2 (1 - g2)/g2."""
+    truth = bench("velocity", gain=1.0)
+    L = truth.frdata.ravel()
+    path = saved(tmp_path / "r.csv", truth, "re,im,coherence", L.real, L.imag, np.full(L.size, 0.999))
+    one = measured_over(LOOPS, path, "velocity", 2)
+    np.testing.assert_allclose(one.radius / np.abs(L), np.sqrt(99.0 * 0.001 / 0.999), rtol=1e-9)
+    assert one.source == "coherence of 2 averages"

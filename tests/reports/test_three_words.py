@@ -18,8 +18,11 @@ from analyses.isolation import drain
 from analyses.linear import loop_figures
 from analyses.margins import run
 from analyses.validation import CHECKS, validate
+from reports.document import load
+from reports.pdf import printable
 from reports.sections.corners import summary as corners_summary
 from reports.sections.validation import section
+from reports.terminal import HEADS
 from reports.verdict_summary import verdict_of
 from tests.changed import changed
 from tests.command_line import Command, Ran
@@ -183,3 +186,27 @@ def test_without_requirements_margins_below_custom_are_named(written, cli) -> No
     gain = design.controller.position_loop.gain * 10.0 ** ((room_db - 3.0) / 20.0)
     text = cli.text("margins", written(changed(design, controller={"position": {"gain": gain}})))
     assert "position loop, gain margin 3 dB (of 6 dB)" in " ".join(text.split())
+
+
+@pytest.mark.parametrize(
+    ("call", "word"),
+    [
+        (("duty", "joint"), "met"),
+        (("duty", "joint", "--load", "200 N*m"), "not met"),
+        (("duty", "fin"), "not proven"),
+        (("stiffness", "emps"), "met"),
+        (("cycles", "joint"), "not met"),
+        (("corners", "ilr33-amber", "--hot", "400"), "not met"),
+    ],
+)
+def test_terminal_json_page_and_pdf_of_an_analysis_have_one_verdict(call, word: str, tmp_path, cli) -> None:
+    said = cli.text(*call, "--out", tmp_path, status=int(word != "met"))
+    assert said.startswith(HEADS[word])
+    document = load(next(tmp_path.glob("*.json")))
+    assert (document["verdict"]["verdict"], document["verdict"]["passed"]) == (word, word == "met")
+    (overall,) = printable(document)["overall"]
+    assert overall[1] == Verdict(word).role()
+    page = next(tmp_path.glob("*.html"))
+    assert f'<p class="overall {overall[1]}">' in page.read_text()
+    assert f"The same figures stand in {page.stem}.json beside this page." in page.read_text()
+    assert cli.data(*call, status=int(word != "met"))["verdict"] == word

@@ -150,6 +150,13 @@ def test_predictions_tell_seconds_and_decibels_as_elsewhere() -> None:
     assert names == ["gain margin, 12.04 dB", "gain margin, down to −6.02 dB"]  # 20 log10 4, 20 log10 1/2
 
 
+@pytest.mark.parametrize(("error", "allowed"), [(0.0, 9.112e-11), (1.3e-10, 1.35e-10), (2e-10, 1e-10)])
+def test_what_bounds_an_error_does_not_contradict_its_verdict(error: float, allowed: float) -> None:
+    """A value of 1 N m: rounding of 1e-9 of it would pass what is allowed."""
+    (row,) = predicted(judged("coupling_torque", "drive", 1.0, 1.0 + error, allowed, unit="N*m"))
+    assert (row["error"] <= row["allowed"]) == (row["verdict"] == "met") == (error < allowed)
+
+
 def test_friction_is_not_blamed_for_another_limit() -> None:
     """At the second frequency the protection was predicted and the current limit came first: no shift."""
     shift = LimitShift(

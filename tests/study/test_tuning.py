@@ -11,10 +11,12 @@ from toleranced import QUICK, need, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
+from actuator_lti.batch import Population
 from actuator_lti.design import model, with_values
-from actuator_lti.design.model import Coupling, Gear, PositionLoop
+from actuator_lti.design.model import Coupling, Gear, PositionLoop, VelocityLoop
 from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
+from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
@@ -53,6 +55,30 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
     )  # fmt: skip
     omega = math.radians(90.0 - margin) / (DELAY + 0.5 * PERIOD)
     assert gains[0] == pytest.approx(2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, rel=1e-3)
+
+
+def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
+    """w[k] = r (1 - (1 - a)^k) with a = K T/J: its levels lie on straight lines from tick to tick."""
+    K, J, size, ticks = 1.0, 0.1, 0.5, 400
+    design = source_drive(J, 1.0, PERIOD, 10.0, controller={"velocity": VelocityLoop(gain=K)})
+    found = step_columns(StepCheck(size, ticks * PERIOD), Population(design, {}, 1))
+    k = np.arange(ticks + 1)
+    y = 1.0 - (1.0 - K * PERIOD / J) ** k
+    ten, ninety = np.interp([0.1, 0.9], y, k) * PERIOD
+    assert found["nonlinear.rise_time"][0] == pytest.approx(ninety - ten, rel=1e-9)
+    assert found["nonlinear.settling_time"][0] == pytest.approx(PERIOD * k[y >= 0.98][0])
+    assert found["nonlinear.overshoot"][0] == 0.0
+    assert found["nonlinear.final_error"][0] == pytest.approx(100.0 * (1.0 - y[ticks - 1]), rel=1e-6)
+
+
+def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():
+    """A thousand times its current gain: the radius of the position loop is NaN, which is no reserve."""
+    design = load_design("ballscrew")
+    problem = problem_of(design, loop_requirements(design), {})
+    gains = np.array([problem.present * [1e3 if "current.gain" in path else 1.0 for path in problem.paths]])
+    wild = with_values(design, dict(zip(problem.paths, map(float, gains[0]), strict=True)))
+    assert not stability_margins(assemble_loops(wild).current.open_loop).stable
+    assert problem.distances(gains, problem.all_corners[:1]).max() <= -3.0
 
 
 def test_what_cannot_be_met_is_refused_with_its_distance():

@@ -15,8 +15,13 @@ from actuator_lti.drive.operating import dead_zone
 from analyses.large_signal.tones import settling_ticks_of
 from analyses.limit_cycles import limit_cycles
 from analyses.limit_cycles.counts import Counts, counted_gain, counts_of, linear_ratio
-from analyses.limit_cycles.describing import cycles_of_play, cycles_of_quantisation, without_nonlinearities
-from analyses.limit_cycles.run import confirm
+from analyses.limit_cycles.describing import (
+    Cycle,
+    cycles_of_play,
+    cycles_of_quantisation,
+    without_nonlinearities,
+)
+from analyses.limit_cycles.run import Confirmation, confirm
 from nonlinear import commands, simulate
 from reports.certain import certain
 from reports.sections.beyond import counts as counts_section
@@ -190,3 +195,27 @@ def test_section_and_refusal() -> None:
     assert made["result"] == words
     with pytest.raises(InputError, match="position loop"):
         limit_cycles(changed(FIN, controller={"position": None}))
+
+
+@pytest.mark.parametrize(
+    ("ratio", "hertz", "verdict"),
+    [
+        (1.0, 10.0, "confirmed"),
+        (1.2, 8.5, "confirmed"),
+        (1.0, 20.0, "refuted"),
+        (1.0, None, "refuted"),
+        (1.8, 10.0, "refuted"),
+        (None, None, "refuted"),
+    ],
+)
+def test_confirmed_is_a_cycle_of_about_the_predicted_size_and_frequency(ratio, hertz, verdict) -> None:
+    cycle = Cycle("play", False, 1e-3, 1e-3, 10.0, True, {})
+    assert Confirmation(cycle, ratio, hertz).verdict == verdict
+
+
+def test_the_frequency_of_a_cycle_is_that_of_where_the_motion_ends() -> None:
+    """A relay in the sensor: in its first periods the joint still follows what it was started with."""
+    (cycle, *_) = cycles_of_quantisation(load_design("joint"))
+    seen = confirm(load_design("joint"), cycle)
+    assert seen.frequency_hz == pytest.approx(cycle.frequency_hz, rel=0.02)
+    assert seen.verdict == "confirmed"

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import replace
-from math import exp, inf, pi, sin
+from math import ceil, exp, inf, pi, sin
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
 
 from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
@@ -234,6 +235,34 @@ def test_the_protection_acts_when_the_running_drive_says() -> None:
         drive.step(0.4 * sin(2 * pi * k / ticks))
         k += 1
     assert result.overload.acts_after_s == pytest.approx(k * design.controller.period_s, abs=1.01 * 0.5)
+
+
+@pytest.mark.parametrize("cycle_s", [3.0, 40.0])
+def test_the_overload_state_of_motion_and_rest_is_its_recursion(cycle_s: float) -> None:
+    """Tick by tick from the cold drive: 40 % of the cycle in motion, whole periods or not, 60 % at rest."""
+    design = with_overrides(JOINT, {"limits.peak_time": "20 s", "limits.continuous_current": "4 A"})
+    asked = Asked.of(design, amplitude_rad=0.3, frequency_hz=1.0, load_Nm=70.0, share=0.4, cycle_s=cycle_s)
+    result, Ts = duty(design, asked), design.controller.period_s
+    ticks = round(0.4 * cycle_s / Ts)
+    moving = (np.resize(result.current_A, ticks) / 4.0) ** 2
+    still = np.full(round(1.5 * ticks), (result.holding_A / 4.0) ** 2)
+    a, tau = Ts / design.limits.overload_time_s, design.limits.overload_time_s
+    cycles = ceil(30.0 * tau / cycle_s)
+    states = lfilter([a], [1.0, a - 1.0], np.tile(np.concatenate([moving, still]), cycles))
+    assert result.moving_rms_A == pytest.approx(4.0 * np.sqrt(moving.mean()), rel=1e-12)
+    assert result.overload.peak == pytest.approx(states[-round(cycle_s / Ts) :].max(), rel=1e-5)
+    over = np.flatnonzero(states >= 1.0)
+    ends = ceil((over[0] + 1) * Ts / cycle_s) * cycle_s if over.size else None
+    assert result.overload.acts_after_s == (ends and pytest.approx(ends))
+    assert result.holding_A > 4.0 * np.sqrt(result.overload.peak)  # which the rest is too short to reach
+
+
+def test_a_duty_names_what_is_beyond_its_limit() -> None:
+    """Its current within, the winding not: the first line does not tell the current as the reason."""
+    made = section(duty(with_overrides(JOINT, {**HOT, "temperature.winding_limit": "30 degC"})))
+    assert "is beyond continuous rating: winding temperature " in made["result"]
+    assert "°C, limit 30 °C." in made["result"]
+    assert "rms over time" not in made["result"]
 
 
 @pytest.mark.parametrize("rms", [1.0, 6.0, 11.0, 13.0])

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
@@ -158,6 +159,24 @@ def test_unpowered_cogging_and_the_moment_push_away_or_hold(phase: float, slope:
         assert open_winding.least == (open_winding.static_Nm_rad, 0.0)
         (table,) = [one for one in section(stiffness(design, simulated=False))["blocks"] if "rows" in one]
         assert "Below 0" in table["note"]
+
+
+@pytest.mark.parametrize("spring", [30.0, 2000.0])
+def test_the_least_stiffness_of_an_undamped_mass_is_no_number_of_a_grid(spring: float) -> None:
+    """A held moment on J and a spring that is held too: K = S - 4 J/T^2 sin^2(a)/cos(a) e^(ja), a = w T/2."""
+    load = Load(inertia_kgm2=1e-3, path="back-drivable", moment_slope_Nm_rad=-spring)
+    design = changed(drive_e(), load=load, coupling=None, friction={"viscous_Nms_rad": 0.0})
+    J, T = 1e-3 + 10.0**2 * design.motor.rotor_inertia_kgm2, design.controller.period_s
+
+    def size(w: float) -> float:
+        a = 0.5 * w * T
+        return abs(spring - 4.0 * J / T**2 * np.sin(a) ** 2 / np.cos(a) * np.exp(1j * a))
+
+    w = np.sqrt(spring / J)
+    truth = minimize_scalar(size, bounds=(0.95 * w, 1.05 * w), method="bounded", options={"xatol": 1e-9 * w})
+    least, hertz = stiffness_curves(design)[2].least
+    assert least == pytest.approx(truth.fun, rel=1e-6)
+    assert hertz == pytest.approx(truth.x / (2.0 * np.pi), rel=1e-6)
 
 
 def test_a_load_chooses_the_piece_of_a_spring_that_bends() -> None:

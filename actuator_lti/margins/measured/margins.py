@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,18 +48,20 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
     result = bounds(omega, L, radius, delay_s)
     refuse_coarse(omega, L, result)
     L = L * np.exp(-1j * omega * delay_s)
-    phase_margins, grazed = _phase_margins(omega, result)
+    phase_margins, spans, grazed = _phase_margins(omega, result)
+    delays = delay_margins(phase_margins, response.dt)
     gain_margins, touched = _gain_margins(omega, result)
     distance, alpha = MODULUS.of(L), DISK.of(L)
     k, j = int(distance.argmin()), int(alpha.argmin())
     modulus_range, alpha_range = distance_ranges(L, radius, result)
-    noise = f"noise: {response.source}" if radius.any() else "noise: none, the ranges leave it out"
-    return StabilityMargins(
+    known = radius.any() or not response.noise_known
+    noise = f"noise: {response.source}" if known else "noise: none, the ranges leave it out"
+    margins = StabilityMargins(
         stable=None,
         verdict="undecided",
         gain_margins=gain_margins,
         phase_margins=phase_margins,
-        delay_margins=delay_margins(phase_margins, response.dt),
+        delay_margins=tuple(replace(d, seconds_range=r) for d, r in zip(delays, spans, strict=True)),
         modulus_margin=float(distance[k]),
         modulus_frequency_rad_s=float(omega[k]),
         disk_margin=DiskMargin(float(alpha[j]), float(omega[j]), alpha_range),
@@ -69,8 +71,20 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         band_rad_s=(float(omega[0]), float(omega[-1])),
         method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
         agreement=Agreement(None, None),
-        evidence_reason=_reason(omega, result),
-        notes=(*_NOTES, noise, *_hidden(omega, result), *_lost(omega, result), *grazed, *touched),
+        evidence_reason=_reason(omega, result, response.noise_known),
+        notes=(*_hidden(omega, result), *_lost(omega, result), *grazed, *touched, noise, *_NOTES),
+    )
+    return margins if response.noise_known else _without_ranges(margins)
+
+
+def _without_ranges(margins: StabilityMargins) -> StabilityMargins:
+    return replace(
+        margins,
+        gain_margins=tuple(replace(each, ratio_range=None) for each in margins.gain_margins),
+        phase_margins=tuple(replace(each, deg_range=None) for each in margins.phase_margins),
+        delay_margins=tuple(replace(each, seconds_range=None) for each in margins.delay_margins),
+        disk_margin=margins.disk_margin and replace(margins.disk_margin, alpha_range=None),
+        modulus_range=None,
     )
 
 
@@ -190,8 +204,11 @@ def _passages(
             notes.append(f"{where} {what} as it is known: crossings there are neither sure nor excluded")
 
 
-def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...], list[str]]:
-    out, notes = [], list[str]()
+def _phase_margins(
+    omega: Real, result: Bounds
+) -> tuple[tuple[PhaseMargin, ...], list[tuple[float, float]], list[str]]:
+    """Phase margins, the ranges of their delay margins in s, and notes."""
+    out, delays, notes = [], list[tuple[float, float]](), list[str]()
     near = "the gain comes as near to one"
     for group, k, t in _passages(omega, result, result.log_gain, 0.0, notes, near):
         deg = math.degrees(_chord(result.phase.middle, k, t)) + 180.0
@@ -199,7 +216,16 @@ def _phase_margins(omega: Real, result: Bounds) -> tuple[tuple[PhaseMargin, ...]
         low, high = (math.degrees(each) + 180.0 - turns for each in group.over(result.phase))
         known = (-180.0, 180.0) if high - low >= 360.0 else (low, high)
         out.append(PhaseMargin(deg - turns, between(omega, k, t), False, group.bracket(omega), known))
-    return tuple(out), notes
+        delays.append(_delay_range(known, group, omega))
+    return tuple(out), delays, notes
+
+
+def _delay_range(deg: tuple[float, float], group: Group, omega: Real) -> tuple[float, float]:
+    """Range of the delay in s that uses up a phase margin; a negative one by way of a full turn."""
+    first = between(omega, group.first, float(group.t0[0]))
+    last = between(omega, group.last, float(group.t1[-1]))
+    low, high = (math.radians(each + (360.0 if deg[1] < 0.0 else 0.0)) for each in deg)
+    return (low / last, high / first) if low >= 0.0 else (0.0, 2.0 * math.pi / first)
 
 
 def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], list[str]]:
@@ -215,12 +241,13 @@ def _gain_margins(omega: Real, result: Bounds) -> tuple[tuple[GainMargin, ...], 
     return tuple(sorted(out, key=lambda margin: margin.frequency_rad_s)), notes
 
 
-def _reason(omega: Real, result: Bounds) -> str:
-    reason = "measured points: the figures lie in their ranges, stability is not determined"
+def _reason(omega: Real, result: Bounds, known: bool) -> str:
+    ranges = "the figures lie in their ranges" if known else "the figures have no ranges"
+    reason = f"measured points: {ranges}, stability is not determined"
     if not result.unresolved.any():
         return reason
-    count = np.count_nonzero(result.unresolved)
-    more = f" and in {count - 1} more places" if count > 1 else ""
+    others = np.count_nonzero(result.unresolved) - 1
+    more = f" and in {others} more place{'s' * int(others > 1)}" if others else ""
     return f"{reason}; {result.too_coarse(omega)}{more}: margins there may be missing"
 
 

@@ -53,7 +53,7 @@ const taken = ({ rows }, { kind, columns, units }, measured) => {
   if (missing) throw new Error(`no column for the ${roles[missing].words.toLowerCase()}: choose one`);
   const unsaid = wanted.find((role) => !(units[role] in roles[role].units));
   if (unsaid) throw new Error(`the heading of the ${roles[unsaid].words.toLowerCase()} says no unit: choose one`);
-  const good = rows.filter((row) => wanted.every((role) => Number.isFinite(row[columns[role]]) && (role !== "coherence" || row[columns[role]] !== 0)));
+  const good = rows.filter((row) => wanted.every((role) => Number.isFinite(row[columns[role]]) && (!["coherence", "frequency"].includes(role) || row[columns[role]] !== 0)));
   if (good.length < 2) throw new Error("fewer than two rows of numbers");
   return { good, list: (role) => good.map((row) => row[columns[role]]), unit: (role) => roles[role].units[units[role]][0], left: rows.length - good.length };
 };

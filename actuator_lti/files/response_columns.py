@@ -1,0 +1,172 @@
+"""Columns of a measured frequency response: what each is, in which unit, and what it tells of the noise."""
+
+import re
+from collections.abc import Mapping
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_lti.errors import InputError
+from actuator_lti.files.reading import shown
+from actuator_lti.systems.measured_response import CONFIDENCE, GAUSSIAN, student
+from actuator_lti.types import Floats, Mask
+
+WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
+HEADS = "f_hz,gain_db,phase_deg or f_hz,real,imag"
+TABLE = f"{WHAT}: a heading such as {HEADS}, then a row of numbers for each frequency"
+
+_ERROR = re.compile(r"std|dev|sigma|spread|uncert|err", re.I)
+_DEVIATION = (
+    re.compile(r"^(?!re|im|f)(.*[_ ])?(std|dev|sigma|spread|uncert)", re.I),
+    {"%|percent": "%", "db": "dB", "deg|°": "deg", "rad": "rad", "abs": "abs"},
+)
+# what each column is named, by which it is known, and how a name says its unit
+_UNITS: dict[str, tuple[re.Pattern[str], dict[str, str]]] = {
+    "coherence": (re.compile(r"coh|gamma", re.I), {}),
+    "averages": (re.compile(r"^n?_?av(g|erages?)\b", re.I), {}),
+    "deviation": _DEVIATION,
+    "deviation beside it": _DEVIATION,
+    "frequency": (
+        re.compile(r"^f(req|_|\b)|^(omega|w)(_|\b)|hz\b", re.I),
+        {"khz": "kHz", "hz": "Hz", r"rad|^omega|^w(_|\b)": "rad/s"},
+    ),
+    "real": (re.compile(r"^re(al)?(_|\b)|[._]re(al)?\b", re.I), {}),
+    "imaginary": (re.compile(r"^im(ag)?[a-z]*(_|\b)|[._]im(ag)?\b", re.I), {}),
+    "phase": (re.compile(r"phase|^arg|deg\b|^ph(_|\b)", re.I), {"deg|°": "deg", "rad": "rad"}),
+    "size": (re.compile(r"mag|gain|abs|amp|db\b", re.I), {"db": "dB", r"abs|ratio|lin|\b1\b|[/]": "ratio"}),
+}
+SI = {"": 1.0, "kHz": 1e3, "Hz": 1.0, "rad/s": 0.5 / np.pi, "deg": np.pi / 180.0, "rad": 1.0, "%": 0.01}
+_WORDS = {"size": "magnitude", "real": "real part", "imaginary": "imaginary part"}
+_ORDER = ("frequency", "size", "phase", "real", "imaginary")
+_DEVIATIONS = ("deviation", "deviation beside it")
+_DB = np.log(10.0) / 20.0
+_APART = 0.02  # nine tenths of what is said twice agrees so closely, rounded as it may be
+
+
+def roles(columns: Mapping[str, Floats]) -> dict[str, str]:
+    """Names of the columns that are read, by what they are: the first that may be."""
+    found: dict[str, str] = {}
+    for role, (like, _) in _UNITS.items():
+        named = next((one for one in columns if one not in found.values() and like.search(one)), None)
+        if named is not None:
+            found[role] = named
+    if "coherence" not in found:
+        found.pop("averages", None)
+    parts = {"real", "imaginary"} <= set(found)
+    wanted = ("frequency", "real", "imaginary") if "real" in found else ("frequency", "size", "phase")
+    if missing := [role for role in wanted if role not in found]:
+        held = ", ".join(shown(one)[1:-1] for one in list(columns)[:12])
+        raise InputError(f"no {' and no '.join(missing)} in the columns {held}; allowed: a {TABLE}")
+    return {role: own for role, own in found.items() if not (parts and role in ("size", "phase"))}
+
+
+def unit_of(role: str, name: str, values: Floats) -> str:
+    """Unit of a column: as its name says, else as its numbers do; frequencies are in Hz then."""
+    if said := _said(role, name):
+        return said
+    if role == "size" and not (values < 0.0).any():
+        raise InputError(f"{shown(name)} says no unit; allowed: gain_db or gain_ratio")
+    if role == "phase" and not (np.abs(values) > 2.0 * np.pi).any():
+        raise InputError(f"{shown(name)} says no unit; allowed: phase_deg or phase_rad")
+    return {"size": "dB", "phase": "deg", "frequency": "Hz"}.get(role, "")
+
+
+def _said(role: str, name: str) -> str:
+    """What the name of a column says of its unit."""
+    return next((unit for like, unit in _UNITS[role][1].items() if re.search(like, name, re.I)), "")
+
+
+def _size(values: Floats, unit: str) -> Floats:
+    with np.errstate(over="ignore", under="ignore"):
+        return 10.0 ** (values / 20.0) if unit == "dB" else values
+
+
+def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> NDArray[np.complex128]:
+    """The response, from its parts or from magnitude and phase."""
+    if "real" in table:
+        return table["real"] + 1j * table["imaginary"]
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        made = _size(table["size"], units["size"]) * np.exp(1j * SI[units["phase"]] * table["phase"])
+    return cast("NDArray[np.complex128]", made)
+
+
+def refuse_contradiction(beside: Mapping[str, Floats], z: NDArray[np.complex128], good: Mask) -> None:
+    """Refuse a response that columns beside those which are read tell otherwise."""
+    for name, values in beside.items():
+        role = next((role for role, (like, _) in _UNITS.items() if like.search(name)), "")
+        if (
+            _ERROR.search(name)
+            or values.size != good.size
+            or (off := _off(role, name, values[good], z)) is None
+        ):
+            continue
+        off = np.abs(off[np.isfinite(off)])
+        if off.size and np.quantile(off, 0.9) > _APART:
+            which = _WORDS.get(role, role)
+            raise InputError(f"{shown(name)} contradicts the {which} that is read; allowed: one of them")
+
+
+def _off(role: str, name: str, values: Floats, z: NDArray[np.complex128]) -> Floats | None:
+    """How far off z a column is, over the size; ``None`` where it does not say that it is the same."""
+    if role in ("real", "imaginary"):
+        return (values - (z.real if role == "real" else z.imag)) / np.abs(z)
+    if role not in ("size", "phase") or not (unit := _said(role, name)):
+        return None
+    if role == "size":
+        return _size(values, unit) / np.abs(z) - 1.0
+    return cast("Floats", np.angle(np.exp(1j * SI[unit] * values) / z))
+
+
+def noise_of(
+    table: Mapping[str, Floats], units: Mapping[str, str], averages: int | None
+) -> tuple[Floats, Floats, str]:
+    """Deviation and radius over the size of each value, and where they are from."""
+    if averages is not None and "coherence" not in table:
+        raise InputError("averages: allowed with a column of coherence")
+    if "deviation" in table:
+        deviation = _deviation(table, units)
+        return deviation, GAUSSIAN * deviation, "noise as given"
+    coherence = table.get("coherence", np.full(table["frequency"].size, np.nan))
+    n = np.broadcast_to(table.get("averages", np.nan) if averages is None else averages, coherence.shape)
+    if (n < 2.0).any():
+        raise InputError("averages: at least 2")
+    deviation = np.sqrt((1.0 - coherence) / (coherence * (n - 1.0)))
+    told = f"coherence of {n.min():g} averages{' or more' if n.min() < n.max() else ''}"
+    return deviation, deviation * student(n - 1.0, CONFIDENCE), told if np.isfinite(n).all() else ""
+
+
+def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
+    """Root mean square of the complex error over the size, from that or from one or both of its parts."""
+    told = [(units[role], table[role]) for role in _DEVIATIONS if role in table]
+    if not all((values >= 0.0).all() for _, values in told):
+        raise InputError("a deviation below 0")
+    kinds = tuple(sorted(unit for unit, _ in told))
+    if kinds in (("",), ("%",)):
+        return told[0][1] * SI[kinds[0]]
+    if kinds not in (("dB",), ("deg",), ("rad",), ("dB", "deg"), ("dB", "rad")):
+        words = " and ".join(unit or "no unit" for unit in kinds)
+        allowed = (
+            "over the size of the value (a ratio or %), or of the gain in dB, of the phase in deg, or both"
+        )
+        raise InputError(f"deviations in {words}; allowed: one {allowed}")
+    parts = [np.expm1(values * _DB) if unit == "dB" else SI[unit] * values for unit, values in told]
+    return np.sqrt(2.0 / len(parts) * np.sum(np.square(parts), axis=0))
+
+
+def taken_as(
+    columns: Mapping[str, Floats], found: Mapping[str, str], units: Mapping[str, str], *, known: bool
+) -> str:
+    """How the columns were taken, and which were not."""
+    told = []
+    for role in sorted(found, key=lambda role: (*_ORDER, role).index(role)):
+        unsaid = units[role] and not _said(role, found[role])
+        unit = f" in {units[role]}{' (it says no unit)' if unsaid else ''}" if units[role] else ""
+        told.append(f"{_WORDS.get(role, role)} {shown(found[role])}{unit}")
+    left = [shown(name) for name in columns if name and name not in found.values()]
+    more = f"; not read: {', '.join(left[:12])}" if left else ""
+    if "coherence" in found and not known:
+        more += "; the coherence tells no noise without averages (--averages N)"
+    elif "coherence" in found and "deviation" in found:
+        more += "; the noise is that of the deviation, not of the coherence"
+    return f"read as {', '.join(told)}{more}"

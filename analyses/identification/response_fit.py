@@ -1,0 +1,240 @@
+"""The values of a design with which its loop has a measured response: least squares, and profiles of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import stdtrit
+
+from actuator_lti.design import parameter_value
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from actuator_lti.types import Floats, Progress
+from analyses.estimation.fit import COVERAGE, Fit, Fixed
+from analyses.estimation.least_squares import told_apart
+from analyses.identification.response_model import Seen
+from analyses.identification.response_search import ROUNDS, Point, Search
+from analyses.records.consistency import SURE
+
+NOT_TOLD = "not determined, the design's value kept"
+RESOLVED = 1e-5
+"""Share of a slope that is its own: below it two values do the same."""
+STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
+"""Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
+REACH = 30.0
+"""Factor: a value is not told where as much more, or of an inertia or stiffness less, explains as well."""
+ROUGH = 1e-3
+"""Part of what is left that another step of a rough fit has to be expected to save."""
+FAR = 10.0
+"""Levels by which a point to begin with may be off; another is tried nearer."""
+CLOSE = 0.01
+"""Part of its level that an end of an interval is found to."""
+
+
+class _Lower(Exception):
+    """A profile has met a better fit, at these coordinates, than the one that it is of."""
+
+
+@dataclass(frozen=True)
+class _Side:
+    """Points of a profile to one side of a fit: a coordinate held off by some distance, the others fitted.
+
+    ``straight``: coordinates over that distance, of a straight response. ``most``: how far is looked; where
+    the deviation is below its ``level`` there, the end of the interval is ``bound``.
+    """
+
+    search: Search
+    best: Point
+    k: int
+    level: float
+    straight: Floats
+    most: float
+    bound: float
+
+    def fitted(self, begin: Point, at: float) -> tuple[Floats, float]:
+        """The others fitted again, and the deviation over its level; at the farthest only which is more."""
+        goal = self.best.cost + self.level**2 if at == self.most else 0.0
+        there = self.search.least(begin, enough=ROUGH, hold=self.k, goal=goal)
+        if there.cost < self.best.cost - CLOSE * self.level**2:
+            raise _Lower(there.x)
+        return there.x, float(np.sqrt(max(there.cost - self.best.cost, 0.0))) / self.level
+
+    def untold(self) -> bool:
+        """Whether values as far as is looked explain the response as well."""
+        return self.fitted(self.search.at(self.best.x + self.most * self.straight), self.most)[1] < 1.0
+
+    def end(self, guess: float) -> float:
+        """How far the end of the interval is."""
+        path = [(0.0, self.best.x), (1.0, self.best.x + self.straight)]
+        low, high, at = (0.0, 0.0), (np.inf, np.inf), min(guess, self.most)
+        for _ in range(ROUNDS if at > 0.0 else 0):
+            begin = self.search.at(_along(path, at))
+            while begin.cost > self.best.cost + (FAR * self.level) ** 2 and at - low[0] > CLOSE * at:
+                at = 0.5 * (low[0] + at)
+                begin = self.search.at(_along(path, at))
+            x, share = self.fitted(begin, at)
+            if share < 1.0 and at == self.most:
+                return self.bound
+            if abs(share - 1.0) < CLOSE or high[0] - low[0] < CLOSE * at:
+                break
+            if share < 1.0:  # beyond, the others may be those of another valley
+                path = sorted([(at, x), *path], key=lambda one: abs(one[0] - at))[:3]
+            low, high = ((at, share), high) if share < 1.0 else (low, (at, share))
+            part = (1.0 - low[1]) / (high[1] - low[1])
+            inside = low[0] + float(np.clip(part, 0.1, 0.9)) * (high[0] - low[0])
+            at = inside if np.isfinite(high[0]) else min(at * min(1.01 / max(share, 0.25), 4.0), self.most)
+        return at
+
+
+def _interval(search: Search, best: Point, k: int, level: float, ranged: bool) -> Floats:
+    """Both ends of the interval of one coordinate, from it; infinite where it has none.
+
+    There the deviation is ``level``, all others fitted again (Bates and Watts, Nonlinear Regression Analysis,
+    1988, 6.1). ``ranged``: a factor `REACH` is as far as none. What a straight response would not tell is
+    looked at there first, and where one end is not there the other is not looked for.
+    """
+    variance, sides = float(best.covariance[k, k]), list[_Side]()
+    guess = level * float(np.sqrt(variance))
+    for side, edge in zip((-1.0, 1.0), search.box[:, k], strict=True):
+        room = float(abs(edge - best.x[k]))
+        most = min(room, float(np.log(REACH)) if ranged else REACH * max(abs(best.x[k]), 1.0))
+        bound = room if most == room and not ranged else np.inf
+        sides.append(_Side(search, best, k, level, side * best.covariance[k] / variance, most, bound))
+    untold = [guess >= one.most and np.isinf(one.bound) and one.untold() for one in sides]
+    ends = np.where(untold, np.inf, 0.0) if any(untold) else np.array([one.end(guess) for one in sides])
+    return np.array([-1.0, 1.0]) * ends
+
+
+def _along(path: Sequence[tuple[float, Floats]], at: float) -> Floats:
+    """The polynomial through the points of a path."""
+    weights = [np.prod([(at - t) / (own - t) for t, _ in path if t != own]) for own, _ in path]
+    return np.asarray(weights) @ np.array([x for _, x in path])
+
+
+@dataclass(frozen=True, kw_only=True)
+class ResponseFit(Fit):
+    """Values by key with which a loop's response is the measured one.
+
+    ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
+    Errors are widened by a misfit above 1; without deviations they are those of the residual, with Student's
+    factor at its degrees of freedom. ``ends`` are 95 % intervals by profiles, shape (p, 2), with the error of
+    what is kept; 1.96 standard errors reach their farther end. ``also`` are other values, beyond these, that
+    explain the response as well. ``covariance``: at what is kept; ``joint``: with the error of that.
+    ``slopes`` of what is left (``rest``, in its deviations), over the values.
+    """
+
+    misfit: float | None
+    at_bound: tuple[str, ...]
+    also: Mapping[str, float]
+    ends: Floats = field(repr=False)
+    joint: Floats = field(repr=False)
+    rest: Floats = field(repr=False)
+    slopes: Floats = field(repr=False)
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """95 % interval of one value, longer to the side where the response tells it less."""
+        low, high = self.ends[self.names.index(name)].tolist()
+        return low, high
+
+
+def determined(start: Design, names: tuple[str, ...], seen: Seen, progress: Progress = None) -> ResponseFit:
+    """The fit of what is determined; of the others the one told worst is kept first."""
+    left, better = dict[str, str](), list[Floats]()
+    while mine := tuple(name for name in names if name not in left):
+        if progress is not None:
+            progress(len(left), len(names))
+        n, kept = len(mine), tuple(key for key in left if parameter_value(start, key))
+        search, rough = (Search.of(start, mine, residual) for residual in (seen.off, seen.ratio))
+        best, *others = _fits(search, rough, [x[:n] for x in better])
+        freedom = len(best.rest) - n
+        variance = best.cost / freedom
+        unit = float(np.sqrt(max(variance, 1.0) if seen.known else variance))
+        level = COVERAGE if seen.known else float(stdtrit(freedom, 0.975))
+        beside = Search.of(start, mine, seen.off, kept, unit)
+        begins = [np.append(best.x, np.zeros(len(kept))), *better]
+        joint = min((beside.least(beside.at(x)) for x in begins), key=lambda one: one.cost)
+        try:
+            ends, untold = _asked(start, beside, joint, level)
+        except _Lower as lower:
+            better.append(lower.args[0])
+            continue
+        if not untold:
+            fit = _told(search, [best, *others], beside, joint, ends, level)
+            own = {key: parameter_value(start, key) for key in left}
+            fixed = {key: Fixed(value=own[key], reason=f"{why}: {NOT_TOLD}") for key, why in left.items()}
+            return replace(fit, fixed=fixed, misfit=float(np.sqrt(variance)) if seen.known else None)
+        left, better = left | untold, []
+    raise InputError(f"the response determines nothing of {', '.join(left)}", where=start.name)
+
+
+def _fits(search: Search, rough: Search, more: Sequence[Floats]) -> list[Point]:
+    """Fits from several stiffnesses, of the response's logarithm first, and from more; the best one first."""
+    spring = np.array([name == "coupling.stiffness" for name in search.names])
+    begin = np.where(search.logs, 0.0, 1.0)
+    starts = [begin + np.log(factor) * spring for factor in (STARTS if spring.any() else STARTS[:1])]
+    ended = [rough.least(rough.at(x), enough=ROUGH) for x in starts]
+    least = min(one.cost for one in ended)
+    good = [one.x for one in ended if one.cost <= 2.0 * least]
+    return sorted((search.least(search.at(x)) for x in (*good, *more)), key=lambda one: one.cost)
+
+
+def _asked(start: Design, search: Search, joint: Point, level: float) -> tuple[Floats, dict[str, str]]:
+    """The ends of all intervals in coordinates, shape (p, 2), or the worst that is not told, and why.
+
+    An inertia beside another that is looked for, and a stiffness, are told where their interval has two ends,
+    another value where its standard error is below the design's value, or a quarter of what it is off.
+    """
+    n, ends = search.count, np.zeros((search.count, 2))
+    names, x = search.names[:n], joint.x[:n]
+    gone = np.argsort(np.abs(x) > np.where(search.logs[:n], np.log(REACH), REACH), kind="stable")
+    _, like = told_apart(joint.slopes[:, gone], [names[k] for k in gone], least=RESOLVED)
+    if like:  # the last one: of those at the end of a valley, where others do the same
+        return ends, {like[-1].name: str(like[-1])}
+    std = np.sqrt(np.diag(joint.covariance))[:n]
+    own = np.array([parameter_value(start, name) for name in names])
+    off = np.abs(search.values(joint.x)[:n] - own)
+    share = std * search.sizes(joint.x) / np.maximum(np.maximum(np.abs(own), off / SURE), 1e-300)
+    inertia = np.char.endswith(names, "inertia")
+    ranged = search.logs[:n] & ~(inertia & (inertia.sum() == 1))
+    share[ranged] = level * std[ranged] / np.log(REACH)
+    order = sorted(range(n), key=lambda k: (not (ranged[k] or share[k] > 1.0), -share[k]))
+    for k in order:
+        if not ranged[k] and share[k] > 1.0:
+            return ends, {names[k]: "its standard error is larger than the design's value"}
+        ends[k] = joint.x[k] + _interval(search, joint, k, level, bool(ranged[k]))
+        if np.isinf(ends[k]).any():
+            much = f"{REACH:g} times as much" if np.isinf(ends[k, 1]) else f"a {REACH:g}th of it"
+            return ends, {names[k]: f"{much} explains the response as well"}
+    return ends, {}
+
+
+def _told(
+    search: Search, fits: Sequence[Point], beside: Search, joint: Point, ends: Floats, level: float
+) -> ResponseFit:
+    """What is told, in values, of the fits at what is kept, and of the one beside it."""
+    (best, *others), n = fits, search.count
+    values, size = search.values(best.x), search.sizes(best.x)
+    far = np.tile(joint.x, (2, 1))
+    far[:, :n] = ends.T
+    lower, upper = beside.values(far)[:, :n]
+    ends = np.column_stack([np.minimum(lower, values), np.maximum(upper, values)])
+    wide = np.abs(ends - values[:, None]).max(axis=1) / COVERAGE / np.sqrt(np.diag(joint.covariance)[:n])
+    gained = np.linalg.qr(best.slopes)[0].T @ best.rest / beside.unit  # by leaving the box
+    ended = np.any(best.x == search.box, axis=0) & (search.logs | (gained @ gained > level**2))
+    most = best.cost + (level * beside.unit) ** 2
+    also = [search.values(one.x) for one in others if one.cost <= most]
+    also = [one for one in also if np.any((one < ends[:, 0]) | (one > ends[:, 1]))]
+    return ResponseFit(
+        names=search.names,
+        values=values,
+        covariance=beside.unit**2 * best.covariance * np.outer(wide, wide),
+        misfit=None,
+        at_bound=tuple(np.array(search.names)[ended].tolist()),
+        also=dict(zip(search.names, also[0].tolist(), strict=True)) if also else {},
+        ends=ends,
+        joint=joint.covariance[:n, :n] * np.outer(wide, wide),
+        rest=best.rest,
+        slopes=best.slopes / size,
+    )

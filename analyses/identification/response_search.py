@@ -1,0 +1,177 @@
+"""Coordinates in which the values of a design are looked for, and the least squares in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from actuator_lti.design import parameter_value
+from actuator_lti.design.model import Design
+from actuator_lti.types import Floats
+from analyses.estimation.parameters import own_share
+from analyses.identification.output_error import LEAST_STEPPED, box_of
+from analyses.identification.response_model import Values
+from analyses.studies.sampling import correlation_of
+
+NEVER_ZERO = "motor.rotor_inertia", "load.inertia", "coupling.stiffness"
+"""Above 0: their logarithms are looked for."""
+STEP = 1e-5
+"""Share of a value for its differences: those of a sharp resonance curve at 1e-3 already."""
+FURTHEST = 1e6
+"""Factor of the design's inertia or stiffness at which a search ends."""
+MOST_TICKS = 100.0
+"""Of computing delay: a design has no more."""
+FINE, CRAWL = 1e-6, 1e-4
+"""Parts of what is left that a step has to be expected to save, and to save, for another to follow."""
+ROUNDS = 100
+"""Steps of a fit."""
+MOST_DAMPED = 1e10
+"""Of a step: one that is damped more is none."""
+BEND = 0.1
+"""Part of a step after which the bend of the response along it is looked at."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """Coordinates, shape (p,), what the response is off by there in its deviations, and slopes of that."""
+
+    x: Floats
+    rest: Floats
+    slopes: Floats
+
+    @cached_property
+    def cost(self) -> float:
+        """Sum of squares."""
+        return float(self.rest @ self.rest)
+
+    @cached_property
+    def covariance(self) -> Floats:
+        """Of the coordinates, as if the response were straight in them; of a QR factor, so never below 0."""
+        size = np.linalg.norm(self.slopes, axis=0)
+        spread = np.linalg.inv(np.linalg.qr(self.slopes / size, mode="r")) / size[:, None]
+        return np.asarray(spread @ spread.T)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """Coordinates of the first ``count`` values, which are looked for, and of others that are kept.
+
+    ``origin + turn y``, y the exponential of a coordinate where it is a logarithm (``logs``): that of an
+    inertia or a stiffness over the design's. What is kept has independent deviations of the design's own
+    error, which weigh as measured. ``box`` holds the coordinates, ``ends`` the values, each of shape (2, p).
+    ``unit``: deviation of what is left of the response.
+    """
+
+    residual: Callable[[Values], Floats]
+    names: tuple[str, ...]
+    count: int
+    logs: NDArray[np.bool_]
+    origin: Floats
+    turn: Floats
+    box: Floats
+    ends: Floats
+    unit: float
+
+    @classmethod
+    def of(
+        cls,
+        start: Design,
+        names: tuple[str, ...],
+        residual: Callable[[Values], Floats],
+        kept: tuple[str, ...] = (),
+        unit: float = 1.0,
+    ) -> Search:
+        """The search of some values beside others, within what their keys allow."""
+        every, n = np.array((*names, *kept)), len(names)
+        scale, ends = box_of(start, (*names, *kept))
+        ends[1, every == "control.computing_delay"] = MOST_TICKS * start.controller.period_s
+        own = np.array([parameter_value(start, key) for key in kept])
+        std = own * [own_share(start, key) for key in kept]
+        size, turn = np.linalg.eigh(np.outer(std, std) * correlation_of(start, kept))
+        logs = np.isin(every, NEVER_ZERO) & (np.arange(len(every)) < n)
+        box = np.where(logs, np.log(np.clip(ends / scale, 1.0 / FURTHEST, FURTHEST)), ends / scale)
+        box[:, n:] = [[-np.inf], [np.inf]]
+        return cls(
+            residual=residual,
+            names=(*names, *kept),
+            count=n,
+            logs=logs,
+            origin=np.append(np.zeros(n), own),
+            turn=block_diag(np.diag(scale[:n]), turn * np.sqrt(np.maximum(size, 0.0))),
+            box=box,
+            ends=ends,
+            unit=unit,
+        )
+
+    def values(self, x: Floats) -> Floats:
+        """Values of coordinates, shape (..., p)."""
+        straight = np.where(self.logs, np.exp(np.where(self.logs, x, 0.0)), x)
+        return np.clip(self.origin + straight @ self.turn.T, *self.ends)
+
+    def sizes(self, x: Floats) -> Floats:
+        """By how much a value that is looked for changes with its coordinate, shape (count,)."""
+        size = np.where(self.logs, np.exp(np.where(self.logs, x, 0.0)), 1.0) * np.diag(self.turn)
+        return np.asarray(size[: self.count])
+
+    def off(self, x: Floats) -> Floats:
+        """What is left at coordinates of shape (K, p), beside it the deviations of what is kept."""
+        values = dict(zip(self.names, self.values(x).T, strict=True))
+        return np.hstack([self.residual(values) / self.unit, x[:, self.count :]])
+
+    def at(self, x: Floats) -> Point:
+        """What is left at coordinates, held in the box, and its slopes by central differences."""
+        x = np.clip(x, *self.box)
+        straight = ~self.logs & (np.arange(len(x)) < self.count)
+        step = STEP * np.diag(np.where(straight, np.maximum(np.abs(x), LEAST_STEPPED), 1.0))
+        up, down = (np.clip(x + side * step, *self.box) for side in (1.0, -1.0))
+        here, *moved = self.off(np.vstack([x, up, down]))
+        change = np.subtract(*np.split(np.array(moved), 2))
+        return Point(x, here, (change / np.diag(up - down)[:, None]).T)
+
+    def least(
+        self, begin: Point, *, enough: float = FINE, hold: int | None = None, goal: float = 0.0
+    ) -> Point:
+        """The least sum of squares near a point, in the box, one coordinate of which may be held.
+
+        Levenberg and Marquardt's steps, bent as the response is along them (Transtrum and Sethna,
+        arXiv:1201.5885). It ends below a ``goal``, or where a step would save less than a part ``enough`` of
+        what is left: the values are off by as little of their errors (Bates and Watts, Technometrics 23,
+        1981).
+        """
+        here, damp, size = begin, 1e-3, np.zeros(len(begin.x))
+        for _ in range(ROUNDS):
+            downhill = -here.slopes.T @ here.rest
+            free = np.where(downhill > 0.0, here.x < self.box[1], here.x > self.box[0]) & (downhill != 0.0)
+            free[[] if hold is None else hold] = False
+            size = np.maximum(size, np.linalg.norm(here.slopes, axis=0))
+            slopes = here.slopes[:, free] / size[free]
+            saved = float(np.sum((np.linalg.qr(slopes)[0].T @ here.rest) ** 2))
+            while here.cost > goal and saved > enough * (here.cost - saved) and damp < MOST_DAMPED:
+                there = self.at(here.x + self._step(here, slopes, size, free, damp))
+                if there.cost < here.cost and np.isfinite(there.slopes).all():
+                    break
+                damp *= 10.0
+            else:
+                return here
+            saved, here, damp = here.cost - there.cost, there, 0.1 * damp
+            if saved < max(enough, CRAWL) * here.cost:
+                break
+        return here
+
+    def _step(
+        self, here: Point, slopes: Floats, size: Floats, free: NDArray[np.bool_], damp: float
+    ) -> Floats:
+        """One step of the free coordinates, whose slopes are over their sizes."""
+        table = np.vstack([slopes, np.sqrt(damp) * np.eye(slopes.shape[1])])
+        solve = np.linalg.pinv(table)[:, : len(here.rest)]
+        step, bend = np.zeros(len(size)), np.zeros(len(size))
+        step[free] = -solve @ here.rest / size[free]
+        moved = self.off(np.clip(here.x + BEND * step, *self.box)[None])[0]
+        bend[free] = -solve @ (moved - here.rest - BEND * here.slopes @ step) / BEND**2 / size[free]
+        bent = np.linalg.norm(bend * size) < 0.4 * np.linalg.norm(step * size)  # else no series in it
+        return step + bend if bent else step
