@@ -73,8 +73,12 @@ class RationalLoop:
         return float(self._values(p)[0].real)
 
     def at_rest(self) -> complex:
-        """L at zero frequency."""
-        if self.coefficients is None or self.in_z:
+        """L at zero frequency; by matrices refined once, so that states which are 0 there add no rounding."""
+        if self.coefficients is None:
+            matrix = self._resolvent(self._variable(np.zeros(1)))[0].real
+            x = np.linalg.solve(matrix, self.b)
+            return complex(self.d + self.c @ (x + np.linalg.solve(matrix, self.b - matrix @ x)))
+        if self.in_z:
             return complex(self._values(self._variable(np.zeros(1)))[0].real)
         above, below = self.coefficients[:, -1]
         return complex(above / below)

@@ -13,6 +13,7 @@ from actuator_lti.batch import Population, linear_figures
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import assemble_loops
 from actuator_lti.margins import Agreement, StabilityMargins, stability_margins
+from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
 from tests.changed import changed
 
@@ -251,3 +252,12 @@ def test_a_loop_of_hundreds_of_states_that_double_precision_does_not_place_is_wi
     m = stability_margins(loop, certify=True)
     assert (m.stable, m.evidence) == (None, "withheld")
     assert "exact arithmetic decides up to 120 states, these are 150" in m.evidence_reason
+
+
+def test_a_gain_margin_at_rest_has_its_digits_where_states_that_are_0_there_weigh_more() -> None:
+    """L(0) = num[-1]/den[-1], 179.5 dB from -1: rounding of a derivative that is 0 was 5e-5 of it."""
+    num = [4.12934957e10, 1.34229615e6, 2.94665573e3]
+    den = [1.0, 2.67107570e3, 8.00878945e7, 1.80697861e10, -2.77795264e12]
+    series = DelaySystem.from_system(control.tf(num, den)) * DelaySystem.delay(1e-3)
+    ratios = [g.ratio for g in stability_margins(series).gain_margins if g.frequency_rad_s == 0.0]
+    assert ratios == [pytest.approx(2.77795264e12 / 2.94665573e3, rel=1e-12)]
