@@ -48,6 +48,16 @@ def evaluated(m, factors, w, parts, at):
 
 
 @kernel
+def _sizes(m, factors, parts, kind, left, right):
+    """Sum of the sizes of what makes up a kind at both slots."""
+    total = 0.0
+    for k in range(m):
+        ends = abs(parts[left + 4 * k + kind]) + abs(parts[right + 4 * k + kind])
+        total += abs(factors[WEIGHT * m + k]) * ends
+    return total
+
+
+@kernel
 def bounded(m, factors, parts, left, right, bounds):
     """Least and most of log gain, phase and their rates between two slots, between places.
 
@@ -57,13 +67,12 @@ def bounded(m, factors, parts, left, right, bounds):
     a, b = left + 4 * m, right + 4 * m
     width = parts[b + 4] - parts[a + 4]
     for kind in range(4):
-        spread, size = 0.0, 0.0
+        spread = 0.0
         for k in range(m):
-            first, last = parts[left + 4 * k + kind], parts[right + 4 * k + kind]
-            spread += abs(factors[WEIGHT * m + k] * (last - first))
-            size += abs(factors[WEIGHT * m + k]) * (abs(first) + abs(last))
+            change = parts[right + 4 * k + kind] - parts[left + 4 * k + kind]
+            spread += abs(factors[WEIGHT * m + k] * change)
         if kind >= LEAST_RATE:
-            spread += EPS * m * size
+            spread += EPS * m * _sizes(m, factors, parts, kind, left, right)
         if kind == 1:
             spread += factors[FACTOR * m + DELAY] * width
         middle = parts[a + kind] + parts[b + kind]

@@ -119,9 +119,11 @@ class Law(StateSpace):
     @property
     def integrates(self) -> bool:
         """Whether it has a pole at z = 1."""
+        if not self.A:
+            return False
         A, B, C, _, _ = self.sampled
         t = balance(A, B, C)  # the size of a state is a matter of taste
-        return bool(self.A) and bool(np.linalg.cond(np.eye(len(A)) - A * t / t[:, None]) > SINGULAR)
+        return bool(np.linalg.cond(np.eye(len(A)) - A * t / t[:, None]) > SINGULAR)
 
     @property
     def direct(self) -> float:

@@ -55,7 +55,8 @@ def stability_margins(
         the whole axis in any case.
     certify : bool, optional
         Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
-        ones with exact delays. A fraction of a sample and measured data stay as they are.
+        ones with exact delays. A fraction of a sample, measured data and state spaces of more than 120
+        states stay as they are.
 
     Returns
     -------
@@ -110,16 +111,16 @@ def _band(band: Any) -> tuple[float, float] | None:
 
 
 def _rational(given: Given, band: tuple[float, float] | None, certify: bool) -> StabilityMargins:
-    """In double precision, and by exact arithmetic where that is not sure of itself."""
-    doubt = ""
+    """In double precision, and by exact arithmetic where that is not sure of itself (of no large loop)."""
     if not certify or _too_large(given):
         try:
             return checked_margins(loop_of(given, warp=True), 0.0, band)
-        except Doubtful as error:
-            doubt = str(error)
-    if _too_large(given):
-        why = f"{doubt}; exact arithmetic decides up to {MOST_STATES} states, these are {given.b.size}"
-        return _withheld(given.period_s, 0.0, "factors of the loop", why)
+        except Doubtful as doubt:
+            if _too_large(given):
+                why = (
+                    f"{doubt}; exact arithmetic decides up to {MOST_STATES} states, these are {given.b.size}"
+                )
+                return _withheld(given.period_s, 0.0, "factors of the loop", why)
     from actuator_lti.margins.exact.certified import certified_margins  # python-flint only where it is needed
 
     return certified_margins(given, band)

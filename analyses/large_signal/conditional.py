@@ -12,6 +12,7 @@ it and goes on integrating.
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from math import asin, ceil, isfinite, pi, sqrt
 from typing import Any, Literal
@@ -27,7 +28,7 @@ from actuator_lti.types import Floats
 from analyses.motion.settling import accepted_rad, settle, step_rows
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.operating_motion import quiet
-from nonlinear.settling.rest import MOST_WORK, Rest, judge
+from nonlinear.settling.rest import Rest, judge
 
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
 ENDINGS: dict[str, Ending] = {
@@ -223,7 +224,7 @@ def settles(design: Design, size_rad: float) -> bool:
     without any limit, is kept going by something else (dry friction, counts); a swing that a requirement
     accepts is accepted here.
     """
-    rest = settle(design, 0.0, size_rad).rest
+    rest = _ending(design, size_rad)
     if not _limits_of(rest) or (rest.verdict == "limit cycle" and rest.amplitude <= accepted_rad(design)):
         return True
     if rest.verdict == "still moving" and _dies_out(design, size_rad, rest):
@@ -233,12 +234,18 @@ def settles(design: Design, size_rad: float) -> bool:
     return not without.comes_to_rest and rest.amplitude <= ABOUT * without.amplitude
 
 
+@lru_cache(maxsize=64)
+def _ending(design: Design, size_rad: float) -> Rest:
+    """What a step ends in; those about the threshold are asked for again."""
+    return settle(design, 0.0, size_rad).rest
+
+
 def _dies_out(design: Design, size_rad: float, rest: Rest) -> bool:
     """Whether a motion that was followed in vain falls over four times that time.
 
     A swing against a limit dies out by a constant amount a period, not by a share of itself.
     """
-    run = _halves(design, size_rad, 4.0 * rest.after_s).run()
+    run = _halves(design, size_rad, rest, times=4).run()
     late, early = (np.abs(np.array(run.span("output_angle_rad", k)) - size_rad).max() for k in (0, 1))
     return bool(run.ok[0] and late < LASTING * early)
 
@@ -250,8 +257,8 @@ def _limits_of(rest: Rest) -> list[str]:
 
 def _end(design: Design, size_rad: float) -> dict[str, Any]:
     """What the smallest step that does not settle ends in, and which limit acts then for how much of it."""
-    rest = settle(design, 0.0, size_rad).rest
-    run = _halves(design, size_rad, rest.after_s).run()
+    rest = _ending(design, size_rad)
+    run = _halves(design, size_rad, rest).run()
     used = run.window_limit_fraction if run.ok[0] else run.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in _limits_of(rest)}
     limiter = max(shares, key=lambda name: shares[name])
@@ -260,10 +267,10 @@ def _end(design: Design, size_rad: float) -> dict[str, Any]:
     return {"limiter": limiter, "limiter_share": share, "ending": ending, "end_rad": rest.amplitude}
 
 
-def _halves(design: Design, size_rad: float, duration_s: float) -> Rows:
-    """The run of a step, its halves windows."""
+def _halves(design: Design, size_rad: float, rest: Rest, times: int = 1) -> Rows:
+    """The run of a step as long as it was followed, less what was leapt over, so many times; two windows."""
     rows = step_rows(design, 0.0, size_rad)
-    half = min(ceil(0.5 * duration_s / design.controller.period_s), 4 * MOST_WORK)
+    half = times * ceil(0.5 * min(rest.after_s / design.controller.period_s, rest.work))
     rows["ticks"] = 2 * half
     rows.window(half, 1, 0)
     return rows
@@ -271,7 +278,7 @@ def _halves(design: Design, size_rad: float, duration_s: float) -> Rows:
 
 def _hovering(design: Design, size_rad: float) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    run = _halves(design, size_rad, settle(design, 0.0, size_rad).rest.after_s).trajectory()
+    run = _halves(design, size_rad, _ending(design, size_rad)).trajectory()
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))

@@ -230,9 +230,8 @@ def _onset(loops: Loops, figures: Mapping[str, LoopFigures]) -> Onset | None:
     return border if np.isfinite(border.amplitude_rad).any() else None
 
 
-COGGING_PART = (
-    0.1  # of a period of the cogging, peak: its spring is 5 % softer there, 2 J1(x)/x of x = 0.2 pi
-)
+COGGING_PART = 0.1
+"""Of a period of the cogging, peak: its spring is 5 % softer there, 2 J1(x)/x of x = 0.2 pi."""
 
 
 def with_cogging(loops: Loops, border: Onset) -> Onset:
