@@ -28,7 +28,7 @@ from actuator_lti.types import Floats
 from analyses.motion.settling import accepted_rad, settle, step_rows
 from nonlinear import LIMITERS, Rows
 from nonlinear.bench.operating_motion import quiet
-from nonlinear.settling.rest import Rest, judge
+from nonlinear.settling.rest import MOST_WORK, Rest, judge
 
 Ending = Literal["diverges", "keeps oscillating", "is held by a limit"]
 ENDINGS: dict[str, Ending] = {
@@ -245,7 +245,7 @@ def _dies_out(design: Design, size_rad: float, rest: Rest) -> bool:
 
     A swing against a limit dies out by a constant amount a period, not by a share of itself.
     """
-    run = _halves(design, size_rad, rest, times=4).run()
+    run = _halves(design, size_rad, 4.0 * rest.after_s).run()
     late, early = (np.abs(np.array(run.span("output_angle_rad", k)) - size_rad).max() for k in (0, 1))
     return bool(run.ok[0] and late < LASTING * early)
 
@@ -258,7 +258,7 @@ def _limits_of(rest: Rest) -> list[str]:
 def _end(design: Design, size_rad: float) -> dict[str, Any]:
     """What the smallest step that does not settle ends in, and which limit acts then for how much of it."""
     rest = _ending(design, size_rad)
-    run = _halves(design, size_rad, rest).run()
+    run = _halves(design, size_rad, rest.after_s).run()
     used = run.window_limit_fraction if run.ok[0] else run.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in _limits_of(rest)}
     limiter = max(shares, key=lambda name: shares[name])
@@ -267,10 +267,10 @@ def _end(design: Design, size_rad: float) -> dict[str, Any]:
     return {"limiter": limiter, "limiter_share": share, "ending": ending, "end_rad": rest.amplitude}
 
 
-def _halves(design: Design, size_rad: float, rest: Rest, times: int = 1) -> Rows:
-    """The run of a step as long as it was followed, less what was leapt over, so many times; two windows."""
+def _halves(design: Design, size_rad: float, duration_s: float, most_ticks: int = 8 * MOST_WORK) -> Rows:
+    """The run of a step, its halves windows."""
     rows = step_rows(design, 0.0, size_rad)
-    half = times * ceil(0.5 * min(rest.after_s / design.controller.period_s, rest.work))
+    half = ceil(0.5 * min(duration_s / design.controller.period_s, most_ticks))
     rows["ticks"] = 2 * half
     rows.window(half, 1, 0)
     return rows
@@ -278,7 +278,8 @@ def _halves(design: Design, size_rad: float, rest: Rest, times: int = 1) -> Rows
 
 def _hovering(design: Design, size_rad: float) -> tuple[float | None, float | None]:
     """Frequency and amplitude of the oscillation at the threshold, from the half waves that change least."""
-    run = _halves(design, size_rad, _ending(design, size_rad)).trajectory()
+    rest = _ending(design, size_rad)
+    run = _halves(design, size_rad, rest.after_s, rest.work).trajectory()  # kept: no longer than followed
     error = run.output_angle_rad - size_rad
     error = error[np.isfinite(error)]
     crossings = np.flatnonzero(np.diff(np.signbit(error)))
