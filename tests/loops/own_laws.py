@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti import assemble_loops, load_design
-from actuator_lti.design.law import LAW_WORDS, Law
+from actuator_lti.design.law import LAW_INPUTS, LAW_WORDS, Law
 from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
 from tests.changed import changed
@@ -51,11 +51,17 @@ def radius(design: Design) -> float:
 
 
 def random_law(
-    rng: np.random.Generator, design: Design, stage: str, *, order: int | None = None, stable: bool = False
+    rng: np.random.Generator,
+    design: Design,
+    stage: str,
+    *,
+    order: int | None = None,
+    stable: bool = False,
+    words: tuple[str, ...] = LAW_INPUTS,
 ) -> Design:
-    """A law on any inputs, over decades of the stage's gain; at most so large that the loop is stable."""
+    """A law on any of ``words``, over decades of the stage's gain; at most so large that the loop is stable."""
     lacking = {"current": not design.motor.has_electrical_dynamics, "twist": design.coupling is None}
-    known = [name for name in LAW_WORDS if not lacking.get(name)]
+    known = [name for name in words if not lacking.get(name)]
     inputs = [name for name in known if rng.random() < 0.6]
     inputs += [] if {"command", "error"} & {*inputs} else ["error"]
     n, m, size = (
@@ -89,7 +95,7 @@ def drawn(case: int, stable: bool = False) -> tuple[Design, str] | None:
         tracking = Encoder(speed="tracking", bandwidth_rad_s=0.3 / period_s(design, "velocity"))
         counted = Encoder(speed="difference", difference_samples=3)
         design = replace(design, encoder=(tracking, counted)[int(rng.integers(2))])
-    return random_law(rng, design, stage, stable=stable), stage
+    return random_law(rng, design, stage, stable=stable, words=LAW_WORDS), stage
 
 
 class PlainLaw:
