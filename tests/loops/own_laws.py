@@ -59,7 +59,7 @@ def random_law(
     stable: bool = False,
     words: tuple[str, ...] = LAW_INPUTS,
 ) -> Design:
-    """A law on any of ``words``, over decades of the stage's gain; at most so large that the loop is stable."""
+    """A law on any inputs, over decades of the stage's gain; at most so large that the loop is stable."""
     lacking = {"current": not design.motor.has_electrical_dynamics, "twist": design.coupling is None}
     known = [name for name in words if not lacking.get(name)]
     inputs = [name for name in known if rng.random() < 0.6]
