@@ -76,6 +76,15 @@ def fundamental(blocks: Sequence[Block]) -> Block:
     return replace(closed, A=closed.A + closed.B @ closed.C).pruned()
 
 
+def shown(blocks: Sequence[Block]) -> list[Block]:
+    """The blocks of one design without the modes at rest that no update shows, or drives (`rest_mode`)."""
+    if len(blocks) == 1:
+        return list(blocks)
+    systems, kept = _without_rest([(one.A, one.B, one.C) for one in blocks])
+    names = tuple(np.array(blocks[0].states)[kept])
+    return [Block(*each, one.D, names) for each, one in zip(systems, blocks, strict=True)]
+
+
 @dataclass(frozen=True)
 class ExactMargins:
     """Borders of stability of a sampled loop from the eigenvalues over one whole period."""
@@ -174,7 +183,7 @@ def _parts(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     of a rounding only.
     """
     moved, others = _split(blocks)
-    return _without_rest(moved), _without_rest(others)
+    return _without_rest(moved)[0], _without_rest(others)[0]
 
 
 def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
@@ -187,16 +196,18 @@ def _split(blocks: Sequence[Block]) -> tuple[list[System], list[System]]:
     return moved, [(a, np.zeros_like(b), np.zeros_like(c)) for a, b, c in others]
 
 
-def _without_rest(systems: list[System]) -> list[System]:
+def _without_rest(systems: list[System]) -> tuple[list[System], np.ndarray]:
     """Without the modes at rest that no tick shows, or moves: no gain moves them either (`rest_mode`).
 
-    A velocity controller's integral under a load that is a spring is one.
+    A velocity controller's integral under a load that is a spring is one. And which states are kept.
     """
-    while systems[0][0].size:
+    left = np.arange(len(systems[0][0]))
+    while left.size:
         systems, kept = without_common_rest_mode(systems, 1.0, alone=True)
         if kept.all():
             break
-    return systems
+        left = left[kept]
+    return systems, left
 
 
 def _first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
@@ -254,7 +265,7 @@ def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> floa
     @cache
     def part(ticks: float) -> PeriodicLoop:
         later, _ = _split(point_blocks(wired.later(ticks * Ts), "u"))
-        left = _without_rest(later) if resting else later
+        left = _without_rest(later)[0] if resting else later
         taken = _states(later) - _states(left)
         return PeriodicLoop(left, Ts, now.hidden + resting - taken)
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from actuator_lti.drive.wiring import COMMANDS, Drive
 from actuator_lti.loops.limiters import LimiterPath, Response, limiter_paths
-from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks
+from actuator_lti.loops.periodic import cyclic, fundamental, phase_blocks, point_blocks, shown
 from actuator_lti.loops.result import Loop, loop_of
 from actuator_lti.loops.simulation import OUTPUTS, TickSystem
 from actuator_lti.loops.tick import Block, TickProgram, compose
@@ -32,7 +32,8 @@ def loop(wired: Drive, place: str, opened: tuple[str, ...] = ()) -> Loop:
     """The loop of a stage, see `stage_blocks`, or at a break point with all other loops closed."""
     is_stage = place in wired.stages
     blocks = stage_blocks(wired, place, opened) if is_stage else point_blocks(wired, place)
-    block, period = fundamental(blocks).shown(), wired.period_s(place if is_stage else wired.producer(place))
+    block = fundamental(shown(blocks)).shown()
+    period = wired.period_s(place if is_stage else wired.producer(place))
     parts, named = (block, block.feedback(), block.sensitivity()), partial(_system, period_s=period)
     return loop_of(wired, place, parts, named, period, periodic=len(blocks) > 1)
 

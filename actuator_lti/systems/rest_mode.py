@@ -35,51 +35,65 @@ def without_rest_mode(
 def without_common_rest_mode(
     systems: Sequence[System], at: float, *, alone: bool = False
 ) -> tuple[list[System], np.ndarray]:
-    """Take out a mode that several systems on the same states, one tick after the other, all hide.
+    """Take out a mode that systems on the same states, one tick after the other and round again, all hide.
 
-    ``alone``: also an integrator that moves nothing else and is not seen, or is not driven.
+    It comes back to where it was after all of them; on the way it may change: what a stage has counted since
+    a slower one last read it does. ``alone``: also an integrator that moves nothing else and is not seen, or
+    is not driven.
     """
-    for turned in (False, True):  # not seen; not driven: the same of the transposed systems
-        tried = [(A.T, C.T, B.T) for A, B, C in systems] if turned else list(systems)
+    for turned in (False, True):  # not seen; not driven: the same of the transposed systems, backwards
+        tried = [(A.T, C.T, B.T) for A, B, C in reversed(systems)] if turned else list(systems)
         found = _own(tried, at, alone)
         if found is not None:
             j, v = found
-            o = np.arange(len(v)) != j
-            left = [(A[np.ix_(o, o)] - np.outer(v[o], A[j, o]), B[o] - np.outer(v[o], B[j]), C[:, o])
-                    for A, B, C in tried]  # fmt: skip
-            return [(A.T, C.T, B.T) for A, B, C in left] if turned else left, o
+            o = np.arange(v.shape[1]) != j
+            left = [(A[np.ix_(o, o)] - np.outer(w[o], A[j, o]), B[o] - np.outer(w[o], B[j]), C[:, o])
+                    for (A, B, C), w in zip(tried, np.roll(v, -1, axis=0), strict=True)]  # fmt: skip
+            return [(A.T, C.T, B.T) for A, B, C in reversed(left)] if turned else left, o
     return list(systems), np.ones(len(systems[0][0]), dtype=bool)
 
 
 def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.ndarray] | None:
-    """A mode at rest over the integrator that is the largest part of it; ``None`` where there is none.
+    """A mode at rest over the integrator that is the largest part of it, a row a tick; ``None`` if none.
 
     Any integrator may have found it, but by one that takes part by 1e-10 only it would leave the difference
-    of large numbers.
+    of large numbers. Over several ticks any state may: a held one is written anew in one of them.
     """
     As, Cs = (np.stack([each[k] for each in systems]) for k in (0, 2))
     if As.shape[1] < 2 or not (np.isfinite(As).all() and np.isfinite(Cs).all()):
         return None
-    integrators = np.flatnonzero((np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0))
-    found = [v for j in integrators if (v := _at_rest(As, Cs, at, int(j), alone)) is not None]
+    integrators = np.flatnonzero((np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0) | (len(As) > 1))
+    over, seen = np.eye(As.shape[1]), []
+    for A, C in zip(As, Cs, strict=True):
+        seen.append(C @ over)
+        over = A @ over
+    found = [v for j in integrators if (v := _at_rest(over, np.vstack(seen), at, int(j), alone)) is not None]
     if not found:
         return None
     parts = np.abs(found) / balanced(As[0])[1]
     shares = parts[:, integrators] / parts.max(axis=1, keepdims=True)
     k, largest = np.unravel_index(np.argmax(shares), shares.shape)
     j = int(integrators[largest])
-    return j, found[k] / found[k][j]
+    v = _on_its_way(As, found[k])
+    return (j, v / v[:, [j]]) if v[:, j].all() else None
 
 
-def _at_rest(As: np.ndarray, Cs: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:
+def _on_its_way(As: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """The mode before each tick; what rounding leaves of zero is zero."""
+    way = [v]
+    for A in As[:-1]:
+        after = A @ way[-1]
+        way.append(np.where(np.abs(after) > ROUNDED * (np.abs(A) @ np.abs(way[-1])), after, 0.0))
+    return np.array(way)
+
+
+def _at_rest(A: np.ndarray, c: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:
     """The vector v with v_j = 1, A v = ``at`` v and C v = 0 within rounding; ``None`` where there is none."""
-    n = As.shape[-1]
+    n = len(A)
     o = np.arange(n) != j
-    turned = As - at * np.eye(n)
-    rows = turned.reshape(-1, n)
-    rounded = (As != at) & np.eye(n, dtype=bool)  # of an integrator only what it sums is, not itself
-    allowed = np.where(rounded, np.abs(As) + abs(at), np.abs(turned)).reshape(-1, n)
-    c = Cs.reshape(-1, n)
+    rows = A - at * np.eye(n)
+    rounded = (at != A) & np.eye(n, dtype=bool)  # of an integrator only what it sums is, not itself
+    allowed = np.where(rounded, np.abs(A) + abs(at), np.abs(rows))
     v = np.zeros(n)
     v[j] = 1.0
     largest = np.abs(rows).max(axis=1)

@@ -332,10 +332,13 @@ class _Watch:
         return STILL * float(self.scales.signals[1])
 
     def _bent(self) -> bool:
-        """Whether anything but a linear drive is in the last half: events, limits, counts."""
+        """Whether anything but a linear drive is in the last half: events, limits, counts, waves."""
         p, limits = self.drive.p, ~at.FLAG_STICK
         counted = max(p[at.COUNTS_PER_RAD], p[at.POSITION_COUNTS], p[at.CURRENT_RESOLUTION]) > 0.0
-        return bool(counted or p[at.LAW] > 0.0 or any(flags & limits or n for _, flags, n in self._late()))
+        passes = self._turning and bool(p[[at.MOMENT_PEAK, at.MOMENT_PEAK_2, at.TORQUE_PEAK]].any())
+        return bool(
+            counted or passes or p[at.LAW] > 0.0 or any(flags & limits or n for _, flags, n in self._late())
+        )
 
     def _late(self) -> list[tuple[int, int, int]]:
         """What acted in the last half of the entries."""

@@ -1,6 +1,7 @@
 """Loops at zero frequency: a spring or pendulum, a free rotor; what cancels there is known so."""
 
 import warnings
+from dataclasses import replace
 from typing import Any
 
 import control
@@ -9,12 +10,12 @@ import pytest
 from loop_designs import controlled, sprung
 from mpmath import lu_solve, matrix, mp
 
-from actuator_lti import closed_loop_bandwidth, stability_margins, step_figures
+from actuator_lti import closed_loop_bandwidth, load_design, stability_margins, step_figures
 from actuator_lti.design import model
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import assemble_loops, exact_margins
-from actuator_lti.loops.periodic import fundamental, point_blocks
+from actuator_lti.loops.periodic import cyclic, fundamental, point_blocks
 from actuator_lti.loops.sampled import stage_blocks
 from actuator_lti.loops.tick import Block
 from actuator_lti.systems.rest_mode import without_rest_mode
@@ -83,6 +84,41 @@ def closed_exactly(block: Block, x: complex) -> complex:
     with mp.workdps(60):
         A, B, C = (matrix(part.tolist()) for part in (block.A, block.B, block.C))
         return complex((C * lu_solve(mp.mpmathify(x) * mp.eye(A.rows) - A + B * C, B))[0])
+
+
+@pytest.mark.parametrize("every", [2, 4, 8])
+def test_a_mode_at_rest_that_moves_from_tick_to_tick_is_taken_out(every: int) -> None:
+    """A rotor without friction, its back-EMF fed forward from a slower speed: no current shows its speed.
+
+    The angle it gains between two measurements belongs to the mode and begins anew with each. Truth is the
+    closed loop over a whole period with the mode in it, the eigenvalue at 1 that stays.
+    """
+    drive = load_design("ilr33-amber-multirate")
+    law = drive.controller
+    law = replace(
+        law,
+        current=replace(law.current, back_emf_feedforward=1.0),
+        velocity=replace(law.velocity, gain=0.02, every=every),
+        position=replace(law.position, every=every),
+    )
+    drive = replace(
+        drive, controller=law, friction=model.Friction(), encoder=replace(drive.encoder, speed="difference")
+    )
+    blocks = stage_blocks(wire(drive, Operating()), "current")
+    over = np.linalg.multi_dot([np.eye(len(blocks[0].A)), *(b.feedback().A for b in reversed(blocks))])
+    modes = np.linalg.eigvals(over)
+    at_rest = np.abs(modes - 1.0) < 1e-9
+    assert at_rest.sum() == 2  # and the angle itself
+    assert np.abs(modes[~at_rest]).max() < 1.0
+    loop = assemble_loops(drive).current
+    m = stability_margins(loop.open_loop)
+    assert m.stable is True
+    assert m.evidence in ("checked", "certified")
+    whole = cyclic([b.feedback() for b in blocks])
+    open_again = replace(whole, A=whole.A + whole.B @ whole.C)
+    for x in np.exp(1j * np.array([1e-3, 0.1, 3.0])):
+        truth = closed_exactly(open_again, x)
+        assert loop.closed_loop(x) == pytest.approx(truth, rel=1e-9)
 
 
 def test_a_soft_spring_is_no_mode_at_rest() -> None:
