@@ -133,17 +133,8 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
     return float(low * (high / low) ** part)
 
 
-PALETTE = (
-    style.BLUE,
-    style.ORANGE,
-    style.GREEN,
-    style.RED,
-    style.SKY,
-    style.INK,
-    style.MUTED,
-    style.BROWN,
-    style.PURPLE,
-)
+_LAST = (style.RED, style.SKY, style.INK, style.MUTED, style.BROWN, style.PURPLE)
+PALETTE = (style.BLUE, style.ORANGE, style.GREEN, *_LAST)
 LINES = {name: k for k, name in enumerate((*LIMITERS, "cogging"))}
 COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED}
 COLOURS |= {name: PALETTE[k] for name, k in LINES.items()}
