@@ -54,7 +54,7 @@ $(ALL): $(CORE) requirements-all.lock
 # The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
 # that run here, and ten processors that are not at hand (tests/machines/beside.py).
 MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test_margin_edges.py \
-  tests/margins/test_margin_reference_loops.py tests/margins/test_unstable_inner_loops.py \
+  tests/margins/test_unstable_inner_loops.py \
   tests/margins/test_delay_margins.py tests/margins/test_step_random.py \
   tests/margins/test_bandwidth.py tests/loops/test_loops_forms.py tests/loops/test_loops_published.py \
   tests/loops/test_rest_mode.py tests/study/test_compiled_figures.py \

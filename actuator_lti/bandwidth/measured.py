@@ -38,10 +38,8 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     T at zero frequency is the point measured there; without one the lowest point, which may lie off it by as
     much as the gain changes over the first octave (a third of that for the first term in w^2).
 
-    Raises
-    ------
-    InputError
-        Data as `stability_margins` refuses them, or a phase at the lowest point that leaves the sign open.
+    Raises `InputError`: data as `stability_margins` refuses them, or a phase at the lowest point that leaves
+    the sign open.
     """
     response = measured_response(data)
     omega, T, radius = measured_points(response, None)

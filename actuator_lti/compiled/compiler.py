@@ -4,7 +4,6 @@ import importlib.util
 import os
 import platform
 import shutil
-import struct
 import subprocess
 import sys
 import tempfile
@@ -18,7 +17,6 @@ FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fno-strict-aliasing")
 # values do not depend on these: nobody reads errno or the flags of exceptions
 # and numbers of a row are stored one by one: read as a pair soon after, they would be waited for
 LIBRARY_FLAGS = ("-O3", "-fno-math-errno", "-fno-trapping-math", "-fno-tree-slp-vectorize")
-_DEBUG = 6  # of the data directories of a Windows library
 ZIG_TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu", "wasm": "wasm32-wasi"}
 
 
@@ -59,11 +57,7 @@ def compiler_for(target: str) -> list[str]:
     """Command and target flags of a compiler for ``linux64``, ``win64`` or ``wasm``.
 
     ziglang's comes first, as its Linux binary runs with any glibc from 2.17 on; ``CC`` names another.
-
-    Raises
-    ------
-    InputError
-        Where this machine has none; says which package brings one.
+    Raises `InputError`: where this machine has none; says which package brings one.
     """
     allowed = f"{'gcc or clang, or ' if target == 'linux64' else ''}pip install 'actuator-lti[export]'"
     own = target == "linux64" and HERE == "linux-x86_64"
@@ -90,7 +84,7 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
     more = ["-target", TARGETS[target].zig] if target in TARGETS else []
     allowed = "gcc, clang, or pip install ziglang"
     command = _chosen(target, more, allowed, own=target == HERE and not portable)
-    flags = (*LIBRARY_FLAGS, "-shared", *(() if output.endswith(".dll") else ("-fPIC",)))
+    flags = (*LIBRARY_FLAGS, "-shared", "-s" if output.endswith(".dll") else "-fPIC")
     return compile_files({"kernels.c": text}, output, target, flags, command=command)
 
 
@@ -104,10 +98,8 @@ def compile_files(
 ) -> bytes:
     """Compile C files given as text; returns the bytes of ``output``.
 
-    Raises
-    ------
-    InputError
-        Where there is no compiler, or it fails; with the first line that it says.
+    A Windows library has the same bytes each time where it is stripped (``-s``) of its debug file's name.
+    Raises `InputError`: where there is no compiler, or it fails; with the first line that it says.
     """
     chosen = list(command or compiler_for(target))
     with tempfile.TemporaryDirectory() as name:
@@ -124,33 +116,7 @@ def compile_files(
         if done.returncode != 0:
             said = next((line for line in done.stderr.splitlines() if "error" in line), done.stderr[:200])
             raise InputError(f"the C compiler for {target} fails: {said}", where=chosen[0])
-        data = (folder / output).read_bytes()
-    return _without_time(data) if output.endswith(".dll") else data
-
-
-def _without_time(data: bytes) -> bytes:
-    """A 64-bit PE file with its time stamps and the identifier of its debug file set to zero.
-
-    The same sources give the same bytes then.
-    """
-    held = bytearray(data)
-    (header,) = struct.unpack_from("<I", held, 0x3C)
-    if held[header : header + 4] != b"PE\0\0":
-        raise ValueError("not a PE file")
-    held[header + 8 : header + 12] = bytes(4)
-    sections, optional = struct.unpack_from("<H12xH", held, header + 6)
-    start = header + 24
-    address, size = struct.unpack_from("<II", held, start + 112 + 8 * _DEBUG)
-    for place in range(start + optional, start + optional + 40 * sections, 40):
-        length, first, _, offset = struct.unpack_from("<IIII", held, place + 8)
-        if first <= address < first + length:
-            begin = offset + address - first
-            for entry in range(begin, begin + size, 28):
-                held[entry + 4 : entry + 8] = bytes(4)
-                _, long, _, named = struct.unpack_from("<IIII", held, entry + 12)
-                if held[named : named + 4] == b"RSDS" and long >= 24:
-                    held[named + 4 : named + 24] = bytes(20)
-    return bytes(held)
+        return (folder / output).read_bytes()
 
 
 if __name__ == "__main__":  # for the makefile

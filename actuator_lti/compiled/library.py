@@ -118,10 +118,7 @@ class Library:
     def build(self) -> Path:
         """Emit, compile and keep the library, if it is not there; older ones of this kind of machine go.
 
-        Raises
-        ------
-        InputError
-            Without a C compiler, or where the folder cannot be written.
+        Raises `InputError`: without a C compiler, or where the folder cannot be written.
         """
         path = self.path()
         if not path.is_file():
@@ -134,10 +131,7 @@ class Library:
     def write(self, package: Path, target: str = "") -> None:
         """Compile the library into a package, for this machine or for every one of `TARGETS[target]`.
 
-        Raises
-        ------
-        InputError
-            As `build`.
+        Raises `InputError`: as `build`.
         """
         from actuator_lti.files.atomic import write_bytes
 
@@ -149,10 +143,7 @@ class Library:
     def functions(self) -> Any:
         """The entries by name, to be called.
 
-        Raises
-        ------
-        InputError
-            Where the library is missing and cannot be compiled here, or does not load.
+        Raises `InputError`: where the library is missing and cannot be compiled here, or does not load.
         """
         return self._others[-1] if self._others else self._opened
 

@@ -39,7 +39,6 @@ _CLONES = """\
 """
 _INLINED = "static inline __attribute__((always_inline)) "
 _ZERO: dict[Kind, str] = {"float": "0.0", "int": "0", "bool": "false", "count": "0"}
-__all__ = ["EmitError", "Program", "emit_c"]
 
 
 @dataclass(frozen=True)

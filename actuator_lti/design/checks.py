@@ -9,26 +9,9 @@ import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES, with_unit
 from actuator_lti.design.checks_control import CONTROL_CHECKS
-from actuator_lti.design.checks_plant import (
-    PLANT_CHECKS,
-    check_motor,
-    check_place,
-    check_temperature,
-    with_stand_ins,
-)
-from actuator_lti.design.fields import (
-    ALL_FIELDS,
-    FIELDS,
-    RECORDS,
-    SECTIONS,
-    Field,
-    Structure,
-    at_place,
-    fields_in,
-    part_at,
-    parts_of,
-    template_of,
-)
+from actuator_lti.design.checks_plant import FIRST_RELATIONS, PLANT_CHECKS, with_stand_ins
+from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.fields import FIELDS, TABLES, at_place, fields_in, part_at, parts_of, template_of
 from actuator_lti.design.mistakes import UNREAD, Check, Findings, Refusal, UnreadError, readable, told
 from actuator_lti.design.model import Correlation, Design, Requirement
 from actuator_lti.files.reading import shown
@@ -61,7 +44,7 @@ def _refuse(refusals: Iterable[Refusal], where: str) -> None:
 def misplaced(design: Design) -> Iterator[Refusal]:
     """Of a design made in Python: parts that are of another kind than what has to stand there."""
     wrong = set[str]()
-    for section in (*SECTIONS, *RECORDS):
+    for section in TABLES:
         if section.parent in wrong:
             wrong.add(section.path)
             continue
@@ -122,7 +105,7 @@ def _contradictions(design: Design) -> Iterator[Refusal]:
 
 def _most(design: Design) -> Iterator[Refusal]:
     """Keys that say themselves what bounds them."""
-    for field in ALL_FIELDS:
+    for field in FIELDS.values():
         if field.most is not None:
             yield from readable(_bounded(field, field.most, design))
 
@@ -134,7 +117,6 @@ def _bounded(field: Field, bound: Callable[[Design], tuple[float, str]], design:
         yield field.path, f"{value:g}{unit}", f"{why}; allowed: at most {most:.4g}{unit}"
 
 
-FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)  # of inertia, constants
 RELATIONS: tuple[Check, ...] = (_most, *CONTROL_CHECKS, *PLANT_CHECKS)
 """Between the numbers of a drive; an exported one checks them again when they are changed."""
 

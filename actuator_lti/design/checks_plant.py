@@ -255,6 +255,8 @@ def _friction_points(design: Design) -> Iterator[Refusal]:
             yield "friction.point", name, "allowed: not falling at the end, as the last slope continues"
 
 
+FIRST_RELATIONS: tuple[Check, ...] = (check_place, check_temperature, check_motor)
+"""Those whose refusals leave an inertia or the motor's constants open."""
 _SOURCE = "not allowed with motor.source_gain, which "
 _PEAK_TIME = ("limits.peak_time", "{d.limits.peak_time_s:g} s")
 PLANT_CHECKS: tuple[Check, ...] = (

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 
-from actuator_lti.design.field import BIG, choice, flag, integer, not_negative, positive, quantities, quantity
+from actuator_lti.design.field import choice, flag, integer, not_negative, positive, quantities, quantity
 from actuator_lti.design.law import Law
 from actuator_lti.errors import InputError
 
@@ -105,10 +105,9 @@ class Filter:
         example="50 rad/s")] = None
     pole_rad_s: Annotated[float | None, positive("pole, or frequency of a pair", unit="rad/s",
         example="500 rad/s")] = None
-    b: Annotated[tuple[float, ...], quantities("numerator of a biquad in z^-1, b0 b1 b2", low=-BIG,
-        high=BIG)] = ()
+    b: Annotated[tuple[float, ...], quantities("numerator of a biquad in z^-1, b0 b1 b2")] = ()
     a: Annotated[tuple[float, ...], quantities("denominator of a biquad in z^-1 after the leading 1, a1 a2 "
-        "(a = [0] for none)", low=-BIG, high=BIG)] = ()
+        "(a = [0] for none)")] = ()
 
     @property
     def polynomials(self) -> tuple[tuple[float, ...], tuple[float, ...]]:

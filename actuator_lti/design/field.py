@@ -180,7 +180,7 @@ positive = partial(quantity, low=SMALL)
 """A number above 0."""
 not_negative = partial(quantity, low=0.0)
 """A number of at least 0."""
-quantities = partial(_declared, "quantities")
+quantities = partial(_declared, "quantities", low=-BIG, high=BIG)
 """A list of numbers."""
 matrix = partial(_declared, "matrix", low=-BIG, high=BIG)
 """Rows of as many numbers each."""

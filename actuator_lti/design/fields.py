@@ -113,6 +113,7 @@ RECORDS: tuple[Section, ...] = (
 )
 """What is asked and known of a drive, at the end of its file: lists without numeric keys of the drive."""
 
+TABLES: tuple[Section, ...] = (*SECTIONS, *RECORDS)
 BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
 
 
@@ -198,13 +199,13 @@ def _words(kind: Any) -> tuple[str, ...]:
     return parts if all(isinstance(part, str) for part in parts) else get_args(parts[0])
 
 
-_IN = {one.template: tuple(_declared(one.kind, one.template)) for one in (HEAD, *SECTIONS, *RECORDS)}
+_IN = {one.template: tuple(_declared(one.kind, one.template)) for one in (HEAD, *TABLES)}
 
-ALL_FIELDS: tuple[Field, ...] = tuple(field for one in (HEAD, *SECTIONS) for field in _IN[one.template])
-"""Every key, in the order of a design file, without those of the lists at its end."""
+FIELDS: dict[str, Field] = {field.path: field for one in (HEAD, *SECTIONS) for field in _IN[one.template]}
+"""Every key by its dotted path, in the order of a design file, without those of the lists at its end.
 
-FIELDS: dict[str, Field] = {field.path: field for field in ALL_FIELDS}
-"""Every key of a design file by its dotted path; repeated tables stand under ``*`` (``gear.*``)."""
+Repeated tables stand under ``*`` (``gear.*``).
+"""
 
 
 def field_of(path: str) -> Field | None:

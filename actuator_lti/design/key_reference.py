@@ -6,7 +6,7 @@ from typing import Annotated
 
 from actuator_lti.design.data_sheet import SHEET
 from actuator_lti.design.field import BIG, Field, Structure
-from actuator_lti.design.fields import ALL_FIELDS, RECORDS, field_of, fields_in
+from actuator_lti.design.fields import FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
 from actuator_lti.files.tree import Tree
 
@@ -36,8 +36,8 @@ def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     >>> entry.default, entry.allowed
     ('1', 'at least 1 and at most 1000')
     """
-    order = list(dict.fromkeys(field.section for field in ALL_FIELDS))
-    listed = sorted((*ALL_FIELDS, *SHEET), key=lambda field: order.index(field.section))
+    order = list(dict.fromkeys(field.section for field in FIELDS.values()))
+    listed = sorted((*FIELDS.values(), *SHEET), key=lambda field: order.index(field.section))
     return tuple(_entry(field, Structure(axis)) for field in listed)
 
 

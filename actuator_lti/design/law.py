@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, NamedTuple, get_args
 
 import numpy as np
 
-from actuator_lti.design.field import BIG, matrix, names, positive, quantities, quantity, text
+from actuator_lti.design.field import matrix, names, positive, quantities, quantity, text
 
 LawInput = Literal["command", "error", "speed", "angle", "current", "output_angle", "output_speed", "twist"]
 LAW_WORDS: tuple[str, ...] = get_args(LawInput)
@@ -24,7 +24,6 @@ MOST_STATES = 16
 """Order of a law that the running drive has room for."""
 SINGULAR = 1e12  # condition of I - A beyond which a law integrates
 Matrix = tuple[tuple[float, ...], ...]
-_LIST = {"low": -BIG, "high": BIG}
 
 
 class Matrices(NamedTuple):
@@ -62,9 +61,9 @@ class StateSpace:
 
     A: Annotated[Matrix, matrix("n rows of n numbers; without states left out")] = ()
     B: Annotated[Matrix, matrix("n rows, a column for each input")] = ()
-    C: Annotated[tuple[float, ...], quantities("one row of n numbers", **_LIST)] = ()
-    D: Annotated[tuple[float, ...], quantities("one row, a number for each input; zeros where left out",
-        **_LIST)] = ()
+    C: Annotated[tuple[float, ...], quantities("one row of n numbers")] = ()
+    D: Annotated[tuple[float, ...], quantities("one row, a number for each input; "
+        "zeros where left out")] = ()
 
     def sizes(self, inputs: int) -> dict[str, tuple[str, bool]]:
         """Of each matrix the shape that it must have, and whether it has it."""
@@ -99,7 +98,7 @@ class Law(StateSpace):
     file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
         "their place. L, gain and inputs may stand in it or here")] = ""
     L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "
-        "where left out", **_LIST)] = ()
+        "where left out")] = ()
     gain: Annotated[float, quantity("factor on the law; its tolerance is that of the whole law",
         example="1")] = 1.0
     period_s: Annotated[float | None, positive("period that the law was made for: must be that of its stage",

@@ -332,8 +332,8 @@ class Friction:
         "CM", unit="{torque}/({torque})", example="1.34 mN*m/(N*m)")] = 0.0
     breakaway_ratio: Annotated[float, quantity("breakaway torque over dry friction", low=1.0, high=100.0,
         example="1")] = 1.0
-    smoothing_speed_rad_s: Annotated[float, positive("speed scale of the tanh law", "w_s",
-        example="1 rad/s")] = 1.0
+    smoothing_speed_rad_s: Annotated[float, positive("speed scale of the tanh law; of loops at rest with "
+        "either law", "w_s", example="1 rad/s")] = 1.0
     dry_torque_reverse_Nm: Annotated[float | None, not_negative("dry friction backward, where it differs",
         "C0-", example="2.3e-3 N*m")] = None
     viscous_reverse_Nms_rad: Annotated[float | None, not_negative("viscous friction backward, where it "

@@ -15,7 +15,7 @@ import tomli_w
 from actuator_lti.design.access import located, unit_in_file
 from actuator_lti.design.asked import ControllerObjects, Parameter, Tolerance, default_deflection
 from actuator_lti.design.data_sheet import as_stated
-from actuator_lti.design.fields import RECORDS, SECTIONS, Section, field_of, fields_in, parts_of
+from actuator_lti.design.fields import RECORDS, SECTIONS, TABLES, Section, field_of, fields_in, parts_of
 from actuator_lti.design.loader import as_design, design_from_tree, design_text, read_design_text
 from actuator_lti.design.mistakes import UNREAD, Findings
 from actuator_lti.design.model import Design
@@ -208,7 +208,7 @@ def read_value(design: Design, path: str, text: str | float) -> float:
 def _override(tree: Tree, path: str, value: Any, design: Design) -> None:
     parts = path.split(".")
     here: Any = tree
-    lists = [section.path for section in (*SECTIONS, *RECORDS) if section.many]
+    lists = [section.path for section in TABLES if section.many]
     for depth, part in enumerate(parts[:-1]):
         if isinstance(here, list):
             here = next((item for k, item in enumerate(here, 1) if _label(item, k) == part), None)

@@ -31,7 +31,20 @@ class Motion:
     @cached_property
     def ended(self) -> Conduct:
         """What it ends in."""
-        return conduct(self.run, self.design.validation.full_deflection_rad)
+        return conduct(self.run, self.design.validation.full_deflection_rad, self._passing_hz())
+
+    def _passing_hz(self) -> dict[str, float]:
+        """How often a period of each torque that bends with the angle passes at the commanded speed."""
+        if self.run.stage != "velocity":
+            return {}
+        motor, load = self.design.motor, self.design.load
+        orders = {
+            "cogging": bool(motor.cogging_Nm) * motor.cogging_periods * self.design.total_ratio,
+            "gear error": bool(load.gear_error_Nm) * load.gear_error_periods,
+            "gravity": float(load.gravity is not None),
+        }
+        turns = abs(float(self.run.reference_rad[-1])) / (2.0 * np.pi)
+        return {name: turns * order for name, order in orders.items() if turns * order}
 
     @property
     def passed(self) -> bool | None:

@@ -1,8 +1,9 @@
 """What a motion of a drive ends in, a step above all: one word (`nonlinear.settling.rest`) for all."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
+from types import MappingProxyType
 
 import numpy as np
 
@@ -16,10 +17,11 @@ from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
-from nonlinear.settling.rest import Rest, judge
+from nonlinear.settling.rest import ALIKE, Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NEAR = 0.02  # of the largest value: a run that ends within it has settled
+NOTHING: Mapping[str, float] = MappingProxyType({})
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 
@@ -229,8 +231,9 @@ class Conduct:
     """What a run ends in, the command and the load staying as they are at its end."""
 
     # ``"comes to rest"`` (of a speed or less: ``"becomes steady"``), ``"sits on a limit"`` (it does while
-    # this acts), ``"limit cycle"``, ``"still moving"``, ``"diverging"``; ``"following"`` where command or
-    # load go on changing, with the limits that act; or why the run stopped
+    # this acts), ``"limit cycle"``, ``"ripple"`` (of what passes as it turns), ``"still moving"``,
+    # ``"diverging"``; ``"following"`` where command or load go on changing, with the limits that act; or why
+    # the run stopped
     status: str
     detail: str = ""  # with figures; empty where there is nothing to say
     later: str = ""  # that it ends so only after the run, and how far from there the run's end is
@@ -246,10 +249,13 @@ class Conduct:
         return self.status in ("comes to rest", "becomes steady", "following")
 
 
-def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
+def conduct(
+    run: Trajectory, full_deflection_rad: float = 0.0, passing_hz: Mapping[str, float] = NOTHING
+) -> Conduct:
     """Judge a run; where its end comes too early, the drive is followed beyond it.
 
-    Swings that are too small beside full deflection (m on a linear axis) are rest.
+    Swings that are too small beside full deflection (m on a linear axis) are rest. One as often as something
+    passes at the commanded speed, cogging say, is its ripple.
 
     Examples
     --------
@@ -269,6 +275,9 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
         longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # a period than the run
         beyond = f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
+        hertz = rest.frequency_hz or 0.0
+        if of := [name for name, each in passing_hz.items() if abs(hertz - each) <= ALIKE * each]:
+            return Conduct("ripple", f"{text}, as often as a period of the {of[0]} passes", beyond)
         return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:

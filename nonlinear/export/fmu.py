@@ -23,7 +23,7 @@ from nonlinear.native import parameters
 Version = Literal[2, 3]
 _BUILDS = {  # folder of FMI 3.0 (that of FMI 2.0 is the platform), library, flags of the compiler
     "linux64": ("x86_64-linux", f"{MODEL}.so", ("-shared", "-fPIC", "-fvisibility=hidden", "-s")),
-    "win64": ("x86_64-windows", f"{MODEL}.dll", ("-shared", "-fvisibility=hidden")),
+    "win64": ("x86_64-windows", f"{MODEL}.dll", ("-shared", "-fvisibility=hidden", "-s")),
 }
 PLATFORMS = (*_BUILDS,)
 

@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
 
-from actuator_lti.compiled import Program, emit_c
 from actuator_lti.compiled.kinds import FUNCTIONS, Kind
+from actuator_lti.compiled.program import Program, emit_c
 from actuator_lti.drive.signals import LIMITERS
 from nonlinear._kernels import layout as at
 from nonlinear._kernels.control import control_tick

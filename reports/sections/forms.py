@@ -158,7 +158,8 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
     rows = [_operating_point(point, 1.0 if linear else 1e3) for point in points]
     note = (
         "Sliding: the dry part is a constant torque and leaves no trace in the loops, whatever the load. "
-        "At rest: slope Cv + Tc/w_s of the smoothed law. Speed amplitude W: describing function, "
+        "At rest: slope Cv + Tc/w_s of the law smoothed over friction.smoothing_speed, w_s: dry friction as "
+        "such has none there. Speed amplitude W: describing function, "
         "slope Cv + 4 Tc/(π W); Tc = C0 + CM |load|."
     )
     loops = [(f"{point.label}, {name} loop", f) for point in points for name, f in point.figures.items()]

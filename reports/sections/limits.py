@@ -139,7 +139,7 @@ COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUT
 COLOURS |= {name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()}
 COGGING = "cogging (the motor turned by a tenth of its period)"
 WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"}
-WORDS |= {"other": "play, gravity or counts"} | {name: one.words for name, one in LIMITERS.items()}
+WORDS |= {"other": "play, gravity, cogging or counts"} | {name: one.words for name, one in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},

@@ -12,7 +12,7 @@ from actuator_lti.design import check_design, design_tree, load_design, model, r
 from actuator_lti.design.access import stacked
 from actuator_lti.design.checks import misplaced
 from actuator_lti.design.checks_control import TRACKING_LIMIT
-from actuator_lti.design.fields import FIELDS, RECORDS, SECTIONS, at_place, part_at, template_of, with_part
+from actuator_lti.design.fields import FIELDS, TABLES, at_place, part_at, template_of, with_part
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError
@@ -237,7 +237,7 @@ def test_a_part_of_another_kind_is_refused_by_name(part: object) -> None:
         inputs=("error",), continuous=model.StateSpace(A=((-1.0,),), B=((1.0,),), C=((1.0,),), D=((0.0,),))
     )
     design = _with(AMBER, "controller.velocity.law", law)
-    for section in (*SECTIONS, *RECORDS):
+    for section in TABLES:
         if "." in section.place and at_place(design, section.place.rpartition(".")[0]) is None:
             continue
         wrong = _with(design, section.place, part)

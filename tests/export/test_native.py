@@ -14,8 +14,11 @@ from actuator_lti import Design, InputError, load_design, stability_margins
 from actuator_lti.axis.library import LIBRARY as AXIS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.batch.library import LIBRARY as FIGURES
-from actuator_lti.compiled import EmitError, Library, compiler, emit_c
+from actuator_lti.compiled import compiler
 from actuator_lti.compiled.kernel import kernel
+from actuator_lti.compiled.kinds import EmitError
+from actuator_lti.compiled.library import Library
+from actuator_lti.compiled.program import emit_c
 from nonlinear import Probe, Reducers, Run, Trajectory, commands, loads, native, simulate, simulate_many
 from nonlinear._kernels.forms import forms
 from nonlinear.row.parameters import design_row

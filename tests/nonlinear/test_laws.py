@@ -14,7 +14,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from actuator_lti import load_design
-from actuator_lti.compiled import emit_c
+from actuator_lti.compiled.program import emit_c
 from actuator_lti.design.model import Design, Limits
 from nonlinear import Probe, Rows, commands, loads, simulate
 from nonlinear._kernels.hyperbolic import LAST, STEPS, tanh

@@ -44,12 +44,13 @@ def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
     downwards = stability_margins(loop.open_loop).gain_margin_db
     assert downwards == pytest.approx(-3.64, abs=0.005)
     points = operating_points(design, [], described=False, certify=False)
+    held_at = "at rest, dry friction over 1 rad/s, load 8 N m"
     found = spread(points)["position"]["gain_margin"]
-    assert (found.least, found.where) == (pytest.approx(downwards), "at rest, load 8 N m")
+    assert (found.least, found.where) == (pytest.approx(downwards), held_at)
     table = spread_table(points, points[0].figures)
     row = next(row for row in table["rows"] if row["loop"] == "position")
-    assert row["gain"] == "down to −3.64 (at rest, load 8 N m) to 43.3"
-    held = next(one for one in points if one.place == "at rest, load 8 N m").figures
+    assert row["gain"] == f"down to −3.64 ({held_at}) to 43.3"
+    held = next(one for one in points if one.place == held_at).figures
     quoted = margin_table(held)
     own = next(row for row in quoted["rows"] if row["loop"] == "position")
     assert own["gain_margin_db"] == pytest.approx(downwards)

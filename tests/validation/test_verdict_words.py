@@ -193,6 +193,44 @@ def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
     assert float(beyond) > int(periods) / float(hertz) > 100.0
 
 
+SPEED_DRIVE = """[design]
+name = "turning"
+[motor]
+resistance = "0.6 ohm"
+inductance = "2 mH"
+torque_constant = "0.4 N*m/A"
+back_emf_constant = "0.4 V*s/rad"
+rotor_inertia = "460 g*cm^2"
+cogging = "{cogging}"
+cogging_periods = 50
+[limits]
+voltage = "48 V"
+speed = "900 rpm"
+[control]
+period = "25 us"
+computing_delay = "25 us"
+[control.current]
+gain = "4 V/A"
+integral_time = "3 ms"
+[control.velocity]
+gain = "0.3 A*s/rad"
+integral_time = "50 ms"
+every = 40
+"""
+
+
+@pytest.mark.parametrize(("cogging", "ends"), [("68 mN*m", "ripple"), ("0 N*m", "becomes steady")])
+def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(
+    cli, tmp_path, cogging: str, ends: str
+) -> None:
+    """50 periods a turn at one turn a second: 50 Hz."""
+    path = tmp_path / "turning.toml"
+    path.write_text(SPEED_DRIVE.format(cogging=cogging))
+    said = cli.data("simulate", str(path), "--amplitude", "360 deg/s", "--duration", "1")
+    assert said["status"] == ends
+    assert ("at 50 Hz" in said["status_detail"]) == (ends == "ripple")
+
+
 @pytest.mark.parametrize(("millionths", "verdict"), [(0.5, "at rest"), (2.0, "limit cycle")])
 def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, verdict: str) -> None:
     """The joint hunts by its counts; beside a full deflection of two or half a million such swings."""
