@@ -185,7 +185,7 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         raise InputError("a coherence outside 0 to 1")
     if not np.isfinite(z).all() or (z == 0.0).any():
         raise InputError("a value that is 0 or beyond the range of floats")
-    refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, z, good)
+    refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
     deviation, radius, noise = noise_of(table, units, averages)
     return RecordedResponse(
         f[order], z[order], deviation[order], coherence[order], name, count - int(good.sum()),

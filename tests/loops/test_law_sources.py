@@ -59,6 +59,15 @@ def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) 
     assert read(tmp_path, held, beside).controller == WANTED
 
 
+def test_an_unknown_key_is_named_where_a_law_is_all_that_is_held(tmp_path: Path) -> None:
+    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
+    for held in (json.dumps({**one, "gains": 2}), json.dumps({"K": {**one, "gains": 2}})):
+        said = refused(read, tmp_path, held, NAMES)
+        assert 'k.json": "gains": unknown key (nearest known: "gain"); allowed: a file of one law' in said
+    assert '"l", "state"' in refused(read, tmp_path, {"K": PARTS | {"l": L, "state": 1.0}}, NAMES)
+    assert read(tmp_path, PARTS | {"L": L, "plant": 2.0}, NAMES).controller == WANTED  # of a workspace
+
+
 def test_its_gain_is_taken(tmp_path: Path) -> None:
     assert read(tmp_path, PARTS | {"gain": 2.0}, NAMES).controller.velocity.law.gain == 2.0
 
