@@ -239,6 +239,16 @@ def test_periods_of_cogging_are_those_of_a_revolution_or_of_a_magnet_pitch() -> 
         (screw, "output_encoder.counts_per_rev", 1e7),
     ):
         assert parameter_value(with_overrides(design, {path: "10000 counts/mm"}), path) == counts
+    for text, says in (
+        ("4096 counts/rev", "those of a metre"),
+        ("0.5 um/count", "a metre over it is 2000000 c"),
+    ):
+        with pytest.raises(InputError, match=says):
+            with_overrides(screw, {"output_encoder.counts_per_rev": text})
+    with pytest.raises(InputError, match="a revolution over it is 20000 counts"):
+        with_overrides(screw, {"encoder.counts_per_rev": "0.5 um"})
+    counted = with_overrides(screw, {"encoder.counts_per_rev": "4096 counts per turn"})
+    assert counted.encoder.counts_per_rev == 4096
     # a bare number is per revolution of a rotary motor behind a screw, as its sheet has it
     motor = with_overrides(screw, {"motor.cogging_periods": 20, "motor.cogging": "1 mN*m"}).motor
     assert motor.cogging_periods == pytest.approx(20 / screw.screw.travel_m_rad, rel=1e-14)
