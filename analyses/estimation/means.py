@@ -13,16 +13,11 @@ MIN_BATCHES, MAX_BATCHES = 8, 64
 
 @dataclass(frozen=True, kw_only=True)
 class Means:
-    """Means of several signals over one stretch, shape (k,), and the covariance of these means, shape (k, k).
+    """Means of several signals over one stretch, and the covariance of these means."""
 
-    ``correlation_samples`` is the integrated autocorrelation time of each signal in samples (1: white): the
-    number of samples worth one independent one. The covariance is that of the means of stretches, each at
-    least five correlation times long where the record allows.
-    """
-
-    values: Floats
-    covariance: Floats
-    correlation_samples: Floats
+    values: Floats  # shape (k,)
+    covariance: Floats  # shape (k, k): of batches of five correlation times or more, where the record allows
+    correlation_samples: Floats  # integrated autocorrelation times (1: white): samples worth one independent
 
 
 def correlated_means(columns: Floats) -> Means:
