@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import correlate
 
 from actuator_lti.types import Floats
 
@@ -60,7 +61,4 @@ def autocovariance(values: Floats, lags: int) -> Floats:
 
 def best_lag(a: Floats, b: Floats) -> int:
     """Steps by which b is to be moved later to fit a, by the normalised cross-correlation."""
-    size = next_fast_len(len(a) + len(b) - 1, real=True)
-    cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
-    lag = int(np.argmax(cross))
-    return lag if lag < len(a) else lag - size
+    return int(np.argmax(correlate(a, b, method="fft"))) - (len(b) - 1)

@@ -229,9 +229,8 @@ def with_given_constant(
     Where a voltage tells kE (among the values ``compared``) closely, the intervals hold by how much the
     design's is off from it, and the error of that.
     """
-    names = {constant_of(start, record) for record in records}
-    name = names.pop() if len(names) == 1 else None
-    if name is None:
+    name, *others = {constant_of(start, record) for record in records}
+    if name is None or others:
         return model
     shares = _shares(start, name, model, records)
     words = ""

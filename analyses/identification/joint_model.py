@@ -95,12 +95,10 @@ class Rows:
 
     @property
     def rows_used(self) -> int:
-        """Rows of the regression."""
         return len(self.y)
 
     @property
     def rows_at_rest(self) -> int:
-        """Rows that were left out."""
         return int(np.count_nonzero(~self.keep))
 
     def shared(self, other: Rows) -> Mask:
@@ -207,10 +205,8 @@ class JointModel(Fit):
 
     @property
     def rows_in(self) -> int:
-        """Rows of all records."""
         return sum(record.rows_in for record in self.records)
 
     @property
     def rows_used(self) -> int:
-        """Rows of the regression."""
         return sum(record.rows_used for record in self.records)
