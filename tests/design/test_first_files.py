@@ -12,7 +12,6 @@ from actuator_lti.design import (
     write_design,
 )
 from actuator_lti.design.writing import write_changed
-from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import all_loop_figures
 from reports.sections.margins import by_itself_notes, response_row

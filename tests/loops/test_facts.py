@@ -10,7 +10,7 @@ from recursion import run
 from test_stacked import DRIVES, scattered
 from two_mass import drive_d, drive_e
 
-from actuator_lti import InputError, assemble_loops, load_design, onset
+from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import model
 from actuator_lti.design.access import stacked
 from actuator_lti.design.model import Design, Limits
