@@ -38,7 +38,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -100,7 +100,6 @@ class Campaign:
     instruments: Instruments
     runs: tuple[RunEntry, ...]
     origin: str
-    notes: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +129,6 @@ def load_campaign(path: str | Path) -> Campaign:
         instruments=_instruments(root.table("instruments")),
         runs=tuple(_run(table, path.parent) for table in root.tables("run")),
         origin=str(path),
-        notes=(),
     )
     campaign = campaign if "name" in head else replace(campaign, name=shown_path(path.stem))
     _check(campaign)
