@@ -81,7 +81,6 @@ def fit_output(
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
     count, most = 0, ITERATIONS * (2 * len(paths) + 1)
-
     box = 1.0 + (ends - start) / scale
 
     def values_at(moved: Floats) -> Floats:
