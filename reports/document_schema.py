@@ -118,20 +118,23 @@ class FactsBlock(TypedDict):
     items: list[FactItem]
 
 
-class VerdictItem(TypedDict):
-    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
-
-    ``gathers`` counts the checks that it stands for, where these are several.
-    """
-
+class _Asked(TypedDict):
     id: str
     label: str
     value: float | None
     limit: float | None
     comparison: str
     unit: str
-    distance: float | None
     verdict: Judged
+
+
+class VerdictItem(_Asked):
+    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
+
+    ``gathers`` counts the checks that it stands for, where these are several.
+    """
+
+    distance: float | None
     waiver: str
     source: str
     reason: str
@@ -190,16 +193,9 @@ class Weakest(TypedDict):
     move: NotRequired[str]
 
 
-class Bar(TypedDict):
+class Bar(_Asked):
     """A requirement on the first screen; ``band``: between which values its figure lies at the corners."""
 
-    id: str
-    label: str
-    value: float | None
-    limit: float | None
-    comparison: str
-    unit: str
-    verdict: Judged
     band: list[float] | None
 
 

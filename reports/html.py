@@ -48,12 +48,9 @@ def page(made: Mapping[str, Any], *, progress: Progress = None, beside: str = ""
     ``beside``: the file with its figures.
     """
     drawings = draw_all(figures(made), progress)
-
-    def drawn(block: Mapping[str, Any]) -> Markup:
-        return Markup(drawings[id(block)])
-
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
-    return render("report.html", doc=made, drawn=drawn, kicker=kicker, beside=beside, **_live(made))
+    about = {"doc": made, "kicker": kicker, "beside": beside, **_live(made)}
+    return render("report.html", drawn=lambda block: Markup(drawings[id(block)]), **about)
 
 
 def _live(made: Mapping[str, Any]) -> Tree:
