@@ -65,8 +65,6 @@ def plain(value: Any) -> Any:
 
     A TypeError for anything else (a complex number, an object): say which part of it is meant.
 
-    Examples
-    --------
     >>> plain({"a": (1, float("nan")), "b": np.float64(2.0)})
     {'a': [1, None], 'b': 2.0}
     """
@@ -122,8 +120,6 @@ def of(
 
     ``scale`` turns a number into ``unit``; what is not there stays nothing. ``look``: as of `column`.
 
-    Examples
-    --------
     >>> _, read = of("real.imag", "y", "y", "mm", scale=1e3)
     >>> read(2.0 + 3.0j), read(None)
     (0.0, None)
@@ -152,8 +148,6 @@ def listing(
 
     ``more``: what a row says besides, as ``_scale`` (see `reports.document_schema`).
 
-    Examples
-    --------
     >>> listing("Parts", [2 + 3j], [of("imag", "y", "y", "mm", scale=1e3)])["rows"]
     [{'y': 3000.0}]
     """
@@ -195,8 +189,6 @@ def text(content: str) -> Block:
 def remark(words: str) -> Block:
     """Make a paragraph of what a computation had to say: a sentence.
 
-    Examples
-    --------
     >>> remark("the loop is cut")["text"], remark("w_ref: no loop.")["text"]
     ('The loop is cut.', 'w_ref: no loop.')
     """

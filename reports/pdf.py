@@ -114,8 +114,6 @@ def printable(made: Mapping[str, Any]) -> Tree:
 def clean(value: object, limit: int = MAX_CELL) -> str:
     """Text that can be seen and can be broken into lines; longer than ``limit`` it is cut.
 
-    Examples
-    --------
     >>> clean("a\\u202eb"), clean(None), clean("abcdef", 4)
     ('a⟨U+202E⟩b', '', 'abc…')
     """

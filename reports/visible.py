@@ -16,8 +16,6 @@ def visible(text: str) -> str:
 
     Marks of direction let a name read otherwise than it is (``U+202E`` turns ``gpj.exe`` round).
 
-    Examples
-    --------
     >>> visible("a\\x00b\\u202ec")
     'a\\ufffdb\\u27e8U+202E\\u27e9c'
     """
@@ -30,8 +28,6 @@ def visible(text: str) -> str:
 def escape(text: str) -> str:
     """Text for markup: visible, and none of it is a tag, an entity or the end of an attribute.
 
-    Examples
-    --------
     >>> escape("a<b\\u202e")
     'a&lt;b⟨U+202E⟩'
     """

@@ -103,8 +103,6 @@ def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Desig
 def read_changes(changes: Sequence[str]) -> Tree:
     """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
 
-    Examples
-    --------
     >>> read_changes(["limits.voltage=24 V", "gear.worm.ratio=40", "friction.law=tanh"])
     {'limits.voltage': '24 V', 'gear.worm.ratio': 40, 'friction.law': 'tanh'}
     """

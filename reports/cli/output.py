@@ -73,8 +73,6 @@ def print_line(text: str) -> None:
 def printable(text: str) -> str:
     """The text without control characters but line breaks and tabs, and without marks of direction.
 
-    Examples
-    --------
     >>> printable("a\\x1b[31mb\\u202e")
     'a?[31mb?'
     """
@@ -90,8 +88,6 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int
 
     Nothing is shown where standard error is no terminal, so that logs stay clean.
 
-    Examples
-    --------
     >>> with progress("counting") as report:
     ...     report(1, 1)
     """

@@ -88,8 +88,6 @@ def believed(sections: Sequence[doc.Section]) -> str:
 def power_above(value: float) -> str:
     """The power of ten that a value does not pass.
 
-    Examples
-    --------
     >>> power_above(2.3e-9), power_above(1e-9)
     ('10⁻⁸', '10⁻⁹')
     """
@@ -123,8 +121,6 @@ def _lost(item: doc.VerdictItem) -> bool:
 def move_words(design: Design, move: Move) -> str:
     """Say a move in the unit in which the design file has the gain.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> move_words(load_design("ilr33-amber"), Move("control.velocity.integral_time", 0.015, 0.0286))
     'control.velocity.integral_time 15 ms to 28.6 ms mends it'

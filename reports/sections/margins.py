@@ -179,8 +179,6 @@ def _elsewhere(result: Margins) -> str:
 def place_words(place: str) -> str:
     """An operating point within a sentence.
 
-    Examples
-    --------
     >>> place_words("motor driven by the load"), place_words("in the gap of the play"), place_words("")
     ('with the motor driven by the load', 'in the gap of the play', 'sliding')
     """
