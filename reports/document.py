@@ -204,7 +204,6 @@ def fact(label: str, value: Any, unit: str = "", *, format: str = "text", better
 
 
 def shown_fact(item: Mapping[str, Any]) -> str:
-    """Write the value of a fact."""
     return show(item["value"], item.get("format", "text"))
 
 

@@ -43,8 +43,6 @@ class Mark(TypedDict):
 
 
 class State(TypedDict):
-    """A word with a state that is known."""
-
     text: str
     status: Status
 
@@ -71,8 +69,6 @@ GOES_ON = ("", "at")
 
 
 class Column(TypedDict):
-    """A column of a table; see `reports.document.column`."""
-
     key: str
     label: str
     unit: str

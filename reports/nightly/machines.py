@@ -96,7 +96,7 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
         case("is built", "error", design.why, design.result.status, design.result.message.partition("\n")[2])
         return
     case("is built")
-    worse = design.regressions
+    worse = design.baseline.regressions
     lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
     text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
     message = f"{len(worse)} figure(s) worse than the baseline"

@@ -205,9 +205,3 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
         [] if result.step is None else [loop_section.step(LOOPS[name], result, None, name=name, small=True)]
     )
     return [bode, *step]
-
-
-def unchecked() -> doc.Finding:
-    """Give the finding of a report that no simulation stands behind."""
-    text = "No simulation stands behind this report: friction, limits and large commands are not checked."
-    return doc.Finding(severity="warn", text=text, where="provenance")

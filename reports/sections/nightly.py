@@ -15,7 +15,7 @@ def section(night: Overview) -> doc.Section:
     for design in (one for one in night.designs if one.state != "pass"):
         why = design.why or design.result.worst_id or "; ".join(design.meta.get("words", ()))
         if design.state == "regression":
-            worst = design.regressions
+            worst = design.baseline.regressions
             why = f"{len(worst)} figures worse than the baseline, {worst[0].figure}"
         rows.append((STATES[design.state][1], one_line(design.name, 60), one_line(why, 300)))
     columns = [doc.column("state", "State"), doc.column("name", "Design"), doc.column("why", "Why")]
