@@ -23,6 +23,7 @@ from actuator_lti.files.tree import Tree
 from reports.certain import certain
 from reports.charts.chart import Chart
 from reports.charts.data import chart_data
+from reports.charts.svg import refuse_undrawable
 from reports.document_schema import (
     SCHEMA,
     VERSION,
@@ -43,7 +44,6 @@ from reports.document_schema import (
     VerdictItem,
     validate,
 )  # fmt: skip
-from reports.drawing import refuse_undrawable
 from reports.numbers import prose, show
 from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible

@@ -19,8 +19,9 @@ from markupsafe import Markup
 
 from actuator_lti.files.atomic import write_together
 from actuator_lti.files.tree import Tree
+from actuator_lti.types import Progress
+from reports.charts.svg import draw_all
 from reports.document import dumps, figures, loads
-from reports.drawing import Progress, draw_all
 from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
 from reports.scripts import asset, bundled

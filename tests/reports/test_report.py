@@ -21,8 +21,8 @@ from reports.build import design_report
 from reports.certain import certain
 from reports.charts.chart import Chart, Curve, Panel
 from reports.charts.data import chart_of
+from reports.charts.svg import draw_svg
 from reports.cli.main import main
-from reports.drawing import draw_svg
 from reports.html import page
 from reports.numbers import show
 from reports.provenance import build_time
