@@ -76,7 +76,8 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
     parts = {"requirements": Tally()} if report else {}
     parts |= counted(block for part in sections for block in walk(part))
     whole = sum(parts.values(), Tally())
-    silent = [part for part in sections if report and part["status"] == "fail" and not own(part).not_met]
+    unsaid = [part for part in sections if report and "verdict" not in part]
+    silent = [part for part in unsaid if part["status"] == "fail" and not own(part).not_met]
     failed = [part["title"] for part in silent if part["id"] != "answer"]  # which gathers what they say
     if not failed and not whole.not_met:
         failed = [part["title"] for part in silent]
