@@ -13,8 +13,7 @@ from analyses.correlation.compare import SignalComparison
 from analyses.records.open_record import open_records
 from analyses.records.record import named_apart
 
-BESIDE = ("speed", "velocity", "current", "force")
-"""Signals that stand beside the motion, in the first sentence too."""
+BESIDE = ("speed", "velocity", "current", "force")  # beside the motion, in the first sentence too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,11 +35,6 @@ class SignalSummary:
     relative_error: float
     share_of_motion: float
     worst: str
-
-
-def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
-    """The figures of every signal over all records, in the order in which the signals first occur."""
-    return {name: _of_signal(name, results) for result in results for name in result.signals}
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
@@ -80,15 +74,6 @@ def moves_alike(result: CorrelationResult) -> bool:
     return all(signal.share_of_motion <= 1.0 for signal in told)
 
 
-def agrees(results: Sequence[CorrelationResult], error_limit: float) -> bool:
-    """Whether no record contradicts itself or the design, and each signal is within a share of its motion."""
-    if any(finding.passed is False for result in results for finding in result.findings):
-        return False
-    signals = [signal for result in results for signal in result.signals.values()]
-    within = all(signal.share_of_motion <= error_limit for signal in signals)
-    return within and all(moves_alike(result) for result in results)
-
-
 @dataclass(frozen=True)
 class Correlation:
     """A model against records."""
@@ -104,8 +89,8 @@ class Correlation:
 
     @property
     def summary(self) -> dict[str, SignalSummary]:
-        """The figures of every signal over all records."""
-        return summarise(self.records)
+        """The figures of every signal over all records, in the order in which the signals first occur."""
+        return {name: _of_signal(name, self.records) for one in self.records for name in one.signals}
 
     @property
     def worst(self) -> str:
@@ -114,8 +99,12 @@ class Correlation:
 
     @property
     def passed(self) -> bool:
-        """Whether no record contradicts itself or the design, and no error is above the limit."""
-        return agrees(self.records, self.limit)
+        """Whether no record contradicts itself or the design, and each signal is within the limit."""
+        if any(finding.passed is False for one in self.records for finding in one.findings):
+            return False
+        signals = [signal for one in self.records for signal in one.signals.values()]
+        within = all(signal.share_of_motion <= self.limit for signal in signals)
+        return within and all(moves_alike(one) for one in self.records)
 
 
 def correlate(design: Design, asked: Asked, *, progress: Progress = None) -> Correlation:

@@ -12,8 +12,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
 
-LEAST_OWN_SHARE = 0.03
-"""A column of which less than this is its own, beside those before it, is not separated from them."""
+LEAST_OWN_SHARE = 0.03  # a column with less of its own beside those before it is not separated from them
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,6 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.driving import command_of
-from analyses.estimation.arrays import lasting
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.estimation.parameters import Parameter, parameter
@@ -19,7 +18,7 @@ from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
 from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
-from analyses.records.record import Record
+from analyses.records.record import Record, lasting
 
 LEAST_RUN = 3  # samples in a row at the largest or smallest value of all: a flat top
 ROUNDS = 8

@@ -33,8 +33,7 @@ from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
 
 MISFIT_LIMIT = 3.0
-MISFIT_DOUBTED = 1.5
-"""Above this other starts are tried: a valley may be the wrong one."""
+MISFIT_DOUBTED = 1.5  # above this other starts are tried: a valley may be the wrong one
 COMMANDS = ("reference", "speed_reference", "current_reference", "voltage_reference", "current")
 
 

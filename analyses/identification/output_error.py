@@ -25,8 +25,7 @@ STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
 AT_END = 1e-9  # part of the start within which a value is at the end of what its key allows
-LEAST_STEPPED = 0.1
-"""Part of the start below which a value's own size is no measure of its step: it may go to zero."""
+LEAST_STEPPED = 0.1  # of the start: below, a value, which may go to zero, is no measure of its step
 LEAST_LOAD = 1e-6  # part of its start that is left of an inertia behind a coupling
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")

@@ -27,8 +27,7 @@ SHAPES = {
     "triangle": ((1.0, 1.0), (3.0, -1.0 / 9.0), (5.0, 1.0 / 25.0)),
 }
 """Harmonics of a segment and their sizes; the speed passes zero quickly, so that no drive sticks there."""
-USED = 0.8
-"""Share of full deflection, speed and current that a motion takes: the drive may differ from its design."""
+USED = 0.8  # of deflection, speed and current: the drive may differ from its design
 DRAWS = 8
 MOST_SEGMENTS = 60
 

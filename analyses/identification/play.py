@@ -20,8 +20,7 @@ CONTACT = 0.25  # rows whose torque is above this share of its largest (95 % poi
 LEAST_ROWS = 50
 BEYOND = 0.9
 ROUNDS = 8
-GUARD = 1.5
-"""Periods of the cut-off that are left out on both sides of a loss of contact: the filter smears over it."""
+GUARD = 1.5  # periods of the cut-off left out on both sides of a loss of contact: the filter smears over it
 
 
 @dataclass(frozen=True, kw_only=True)

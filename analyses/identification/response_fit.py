@@ -19,18 +19,14 @@ from analyses.identification.response_search import ROUNDS, Point, Search
 from analyses.records.consistency import SURE
 
 NOT_TOLD = "not determined, the design's value kept"
-RESOLVED = 1e-5
-"""Share of a slope that is its own: below it two values do the same."""
+RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the same
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0
 """Factor: a value is not told where as much more, or of an inertia or stiffness less, explains as well."""
-ROUGH = 1e-3
-"""Part of what is left that another step of a rough fit has to be expected to save."""
-FAR = 10.0
-"""Levels by which a point to begin with may be off; another is tried nearer."""
-CLOSE = 0.01
-"""Part of its level that an end of an interval is found to."""
+ROUGH = 1e-3  # part of what is left that another step of a rough fit has to be expected to save
+FAR = 10.0  # levels by which a point to begin with may be off; another is tried nearer
+CLOSE = 0.01  # part of its level that an end of an interval is found to
 
 
 class _Lower(Exception):

@@ -6,9 +6,9 @@ import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.estimation.arrays import longest
 from analyses.estimation.means import correlated_means
 from analyses.records.campaign_import import ImportedRun
+from analyses.records.record import longest
 
 
 @dataclass(frozen=True, kw_only=True)

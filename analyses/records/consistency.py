@@ -17,8 +17,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.record import Record
 
-RATE_TOLERANCE = 0.02
-"""Disagreement of speed and rate above which no design is made; below it, it widens the intervals."""
+RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (

@@ -14,10 +14,8 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.arrays import longest
 
-RESAMPLE_TOLERANCE = 0.05
-"""Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
+RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling accepted without being told to
 
 
 @dataclass(kw_only=True)
@@ -195,3 +193,28 @@ def prepared(record: Record) -> Record:
 def period_of(record: Record) -> float:
     """The period, rounded to a whole number of ns past the rounding of the record's times."""
     return float(round(float(np.mean(np.diff(record.time_s))) * 1e9) * 1e-9)
+
+
+def stretches(marked: Mask) -> list[tuple[int, int]]:
+    """Where marked rows follow each other: the first, and the one after the last.
+
+    Examples
+    --------
+    >>> stretches(np.array([True, False, False, True, True]))
+    [(0, 1), (3, 5)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(np.int8), [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def longest(marked: Mask) -> tuple[int, int]:
+    """The longest such stretch, the first of equal ones; an empty one where nothing is marked."""
+    return max(stretches(marked), key=lambda one: one[1] - one[0], default=(0, 0))
+
+
+def lasting(marked: Mask, least: int) -> Mask:
+    """Marked rows, but for those of stretches shorter than ``least``."""
+    out = np.zeros(len(marked), dtype=bool)
+    for start, stop in stretches(marked):
+        out[start:stop] = stop - start >= least
+    return out

@@ -8,7 +8,6 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from own_laws import period_s
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 from test_own_law import refused
@@ -19,7 +18,7 @@ from actuator_lti.design.law import Law
 from actuator_lti.files.mat5 import read_mat5
 
 BASE = load_design("ilr33-amber-multirate")
-T = period_s(BASE, "velocity")
+T = BASE.controller.period_of("velocity")
 A, B, C, D = (
     np.array(one) for one in ([[0.5, 0.1], [0, 0.9]], [[1e-3, 0], [0, 1e-4]], [[1, 0.5]], [[0.1, 0]])
 )
@@ -159,7 +158,7 @@ def test_a_product_of_transfer_functions_is_a_law(form: Any) -> None:
 
 def test_sampling_keeps_what_a_long_filter_leaves() -> None:
     """Six lags of 30 rad/s: 1e-12 of the gain at rest is left far above them, and it is right."""
-    s, T_p = control.tf("s"), period_s(BASE, "position")
+    s, T_p = control.tf("s"), BASE.controller.period_of("position")
     K = np.prod([1 / (s / (30.0 + 10 * k) + 1) for k in range(6)])
     law = BASE.with_law("position", K, ["error"], method="tustin").controller.position.law
     p = 1j * np.geomspace(1.0, 3000.0, 30)
