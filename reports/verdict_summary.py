@@ -148,11 +148,12 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
     >>> verdict_lines({"parts": {"requirements": {}}})
     [('the design states no requirements', 'info')]
     """
-    lines: list[tuple[str, Role]] = [
-        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
-    ]
+    lines: list[tuple[str, Role]] = []
     for what, counts in verdict["parts"].items():
         count = Tally(**counts)
         words = count.words(WORDS.get(what, what))
         lines.append((words if count.total else f"the design states {words}", count.role))
-    return sorted(lines, key=lambda line: ROLES.index(line[1]))
+    sections: list[tuple[str, Role]] = [
+        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
+    ]
+    return sorted([*lines, *sections], key=lambda line: ROLES.index(line[1]))
