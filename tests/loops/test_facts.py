@@ -5,10 +5,9 @@ from math import inf
 
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, ctms_position, emps, source_drive, without
+from loop_designs import amber, controlled, ctms_position, drive_d, drive_e, emps, source_drive, without
 from recursion import run
 from test_stacked import DRIVES, scattered
-from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import model

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from loop_designs import amber, controlled, ctms_position, emps, faster, response
+from loop_designs import amber, controlled, ctms_position, drive_d, drive_e, emps, faster, response
 from scipy.integrate import solve_ivp
 from test_stacked import FILTERS, everything
-from two_mass import drive_d, drive_e
 
 from actuator_lti import assemble_loops, delay_budget
 from actuator_lti.design.model import Design, Filter, Limits, PositionLoop
