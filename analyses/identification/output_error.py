@@ -34,17 +34,13 @@ MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
 
 @dataclass(frozen=True, kw_only=True)
 class OutputErrorResult(Fit):
-    """Refined values by dotted key, and the relative error before and after.
+    """Refined values by dotted key; their errors respect the correlation in time of what is left."""
 
-    These errors are those of the drive signal: norm of the difference over norm of the measured. The standard
-    errors respect the correlation in time of what is left. ``at_bound`` are those that ended at the least or
-    largest value of their key: the records want another, and no error of theirs holds.
-    """
-
-    error_before: float
+    error_before: float  # of the drive signal: norm of the difference over norm of the measured
     error_after: float
     iterations: int
     design: Design
+    # what ended at the least or largest value of its key: the records want another, no error of it holds
     at_bound: tuple[str, ...] = ()
 
 

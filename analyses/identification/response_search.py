@@ -51,23 +51,22 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """Coordinates of the first ``count`` values, which are looked for, and of others that are kept.
+    """Coordinates of values that are looked for, and of others that are kept.
 
-    ``origin + turn y``, y the exponential of a coordinate where it is a logarithm (``logs``): that of an
+    The values are ``origin + turn y``, y the exponential of a coordinate where it is a logarithm: that of an
     inertia or a stiffness over the design's. What is kept has independent deviations of the design's own
-    error, which weigh as measured. ``box`` holds the coordinates, ``ends`` the values, each of shape (2, p).
-    ``unit``: deviation of what is left of the response.
+    error, which weigh as measured.
     """
 
     residual: Callable[[Values], Floats]
     names: tuple[str, ...]
-    count: int
+    count: int  # of those that are looked for, the first
     logs: NDArray[np.bool_]
     origin: Floats
     turn: Floats
-    box: Floats
-    ends: Floats
-    unit: float
+    box: Floats  # of the coordinates, shape (2, p)
+    ends: Floats  # of the values
+    unit: float  # deviation of what is left of the response
 
     @classmethod
     def of(

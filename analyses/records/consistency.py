@@ -48,15 +48,12 @@ FOLLOWED = (
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what, whether it agrees (None: not determined), and in words.
-
-    ``unproven``: what is not determined leaves it open whether the record agrees.
-    """
+    """One thing that was looked at."""
 
     subject: str
-    passed: bool | None
+    passed: bool | None  # whether it agrees; None: not determined
     text: str
-    unproven: bool = field(default=False, repr=False)
+    unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
@@ -131,16 +128,12 @@ def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class RateRatio:
-    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves.
+    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves."""
 
-    ``place`` is the position's signal, ``found`` the ratio, ``alike`` the cosine; ``low`` and ``high`` hold
-    it with noise in either (Frisch's bounds: regressed each on the other, with the error of each).
-    """
-
-    place: str
-    found: float
-    alike: float
-    low: float
+    place: str  # the position's signal
+    found: float  # the ratio
+    alike: float  # the cosine
+    low: float  # Frisch's bounds: each regressed on the other, with the error of each
     high: float
     rate: Floats
     moves: Mask
