@@ -299,6 +299,12 @@ def section(
     return made if verdict is None else {**made, "verdict": verdict.value}
 
 
+def severity(verdict: Verdict) -> Severity:
+    """How grave a verdict is; what is met is no more than information."""
+    role = verdict.role()
+    return "info" if role == "pass" else role
+
+
 def document(
     *,
     title: str,

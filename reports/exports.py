@@ -14,8 +14,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.files.atomic import write_bytes, write_together
 from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import PLATFORMS, c_export, controller_export, fmu_bytes, refuse_unknown
-from nonlinear.runs.watch import told_if_slow
 from reports.cli.options import folder_for_results, refuse_existing
+from reports.cli.output import told_if_slow
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
 from reports.html import environment, page
 from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models

@@ -34,8 +34,7 @@ KEYS = (
     "control.computing_delay",
 )
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
-LEVEL = 1e-3
-"""Probability with which noise of the stated size alone fails a response."""
+LEVEL = 1e-3  # probability with which noise of the stated size alone fails a response
 
 
 @dataclass(frozen=True, kw_only=True)
