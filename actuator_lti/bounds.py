@@ -27,21 +27,9 @@ class Bound:
         return f"at most {_readable(self.most, self.unit)}"
 
     def check(self, value: float, where: str | None = None, *, name: str = "") -> None:
-        """Refuse more than the bound.
+        """Refuse more than the bound, and what is not a number.
 
-        Parameters
-        ----------
-        value : float
-            What is asked for; not a number is refused, too.
-        where : str, optional
-            The file.
-        name : str, optional
-            The option or key in this place, where it is not the usual one.
-
-        Raises
-        ------
-        InputError
-            One line: option or key, what was asked for, what is allowed.
+        ``where``: the file; ``name``: the option or key in this place, where it is not the usual one.
 
         Examples
         --------

@@ -15,12 +15,7 @@ LONGEST = 1000  # characters of a refusal; what stands in a file may be longer
 class InputError(ValueError):
     """Bad input: one line that names the place, the key, the value and what is allowed.
 
-    Parameters
-    ----------
-    message : str
-        What is wrong and what is allowed, in one line.
-    where : str, optional
-        The file (and line) or the argument that holds it; put in front of the message.
+    ``where``: the file (and line) or the argument that holds it; put in front of the message.
 
     Examples
     --------

@@ -75,15 +75,12 @@ class Command:
     def later(self, start_s: float) -> Command:
         """A tabulated command that begins at ``start_s``, and is zero before.
 
+        Raises `InputError`: for a start before zero or not finite, or a command that has a start of its own.
+
         Examples
         --------
         >>> sampled([0.0, 0.001, 0.002], [1.0, 2.0, 3.0]).later(0.001).values(1e-3, 4).tolist()
         [0.0, 1.0, 2.0, 3.0]
-
-        Raises
-        ------
-        InputError
-            For a start before zero or not finite, or a command that has a start of its own.
         """
         _finite(self.kind, start_s=start_s)
         if start_s < 0.0:
@@ -288,10 +285,7 @@ def multisine(
     periodic in it; all are turned together so that it begins at zero, rising. It is sent once: after
     ``duration_s`` the command is 0.
 
-    Raises
-    ------
-    InputError
-        For a frequency of less than one period in the duration, or two that fall together.
+    Raises `InputError`: for a frequency of less than one period in the duration, or two that fall together.
     """
     _finite("multisine", amplitude_rad=amplitude_rad)
     _positive("multisine", duration_s=duration_s, period_s=period_s)
@@ -353,15 +347,12 @@ def _first_rise(frequency_hz: Floats, phases: Floats, duration_s: float) -> floa
 def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event log") -> Command:
     """A log of changes: each value holds from its time until the next; times may be uneven.
 
+    Raises `InputError`: as `sampled`, but for holes.
+
     Examples
     --------
     >>> events([0.0, 0.002, 0.0021], [1.0, 2.0, 3.0]).values(1e-3, 4).tolist()
     [1.0, 1.0, 2.0, 3.0]
-
-    Raises
-    ------
-    InputError
-        As `sampled`, but for holes.
     """
     times, values = _checked(time_s, angle_rad, where)
     return _table("recorded", times - times[0], values, held=True)
@@ -370,11 +361,8 @@ def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event 
 def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "record") -> Command:
     """Recorded command: angles at times, linear between them, the last held.
 
-    Raises
-    ------
-    InputError
-        If times or angles are not finite, do not rise, or have a hole: a gap longer than 1.5 times the
-        median interval.
+    Raises `InputError`: if times or angles are not finite, do not rise, or have a hole: a gap longer than 1.5
+    times the median interval.
     """
     times, values = _checked(time_s, angle_rad, where)
     _without_holes(times, where)

@@ -31,15 +31,8 @@ def _all_finite(command: float, load_Nm: float, torque_Nm: float) -> bool:
 class Drive:
     """A drive with its whole state in one array of floats.
 
-    Parameters
-    ----------
-    design : Design, or its name or path
-    initial : State, optional
-        Default: everything at rest at zero.
-    load_Nm : float
-        Constant load torque, beside slope and gravity of the design.
-    friction_on, limits_on : bool
-        As in `nonlinear.simulate`.
+    ``initial``: by default everything at rest at zero; ``load_Nm``: constant load torque, beside slope and
+    gravity of the design; ``friction_on``, ``limits_on`` as in `nonlinear.simulate`.
 
     Examples
     --------
@@ -75,21 +68,11 @@ class Drive:
     def step(self, command: float, load_Nm: float = 0.0, torque_Nm: float = 0.0) -> None:
         """One tick of controller and plant.
 
-        Parameters
-        ----------
-        command : float
-            Of the outermost stage: rad or rad/s at the output shaft, A or V.
-        load_Nm : float
-            Load torque added to the constant one, held over the tick.
-        torque_Nm : float
-            Extra torque at the motor shaft.
+        ``command``: of the outermost stage, rad or rad/s at the output shaft, A or V; ``load_Nm``: added to
+        the constant one, held over the tick; ``torque_Nm``: extra, at the motor shaft.
 
-        Raises
-        ------
-        InputError
-            For a command, load or torque that is no finite number.
-        NumericalError
-            If the drive has failed: too many events in a tick, or a state without bound.
+        Raises `InputError`: for a command, load or torque that is no finite number. Raises `NumericalError`:
+        if the drive has failed: too many events in a tick, or a state without bound.
         """
         if not _all_finite(command, load_Nm, torque_Nm):
             for name, value in (("command", command), ("load_Nm", load_Nm), ("torque_Nm", torque_Nm)):

@@ -91,10 +91,7 @@ def fill(signal: Floats, table: Floats, period_s: float, out: Floats) -> None:
 def build() -> tuple[Path, ...]:
     """Compile what is not there yet: this library, those of many designs' figures and of margins.
 
-    Raises
-    ------
-    InputError
-        Without a C compiler, or where the package cannot be written.
+    Raises `InputError`: without a C compiler, or where the package cannot be written.
     """
     from actuator_lti.axis.library import LIBRARY as axis
     from actuator_lti.batch.library import LIBRARY as figures

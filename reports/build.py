@@ -60,33 +60,15 @@ def report(
 ) -> Document:
     """Compute the whole report of a design, as the command of the same name does.
 
-    Parameters
-    ----------
-    design : Design, str or path
-    out : path, optional
-        Folder of ``report.html`` and ``report.json``; nothing is written where it is left out.
-    validation : bool
-        Check every linear prediction by simulation, too.
-    also : sequence of str
-        Further sections, of `reports.analyses.FURTHER`.
-    added : sequence of section
-        Sections of other documents, put before the further ones.
-    response, response_of, averages : optional
-        A measured response, laid over the model: as `analyses.margins.run.measured_over` has it.
-    source : str, optional
-        See `design_report`; the file's text where ``design`` is a name or a path.
-    step : callable, optional
-        Gives a context, and in it a function for (done, all), for each step named to it.
+    What comes back is the document of `reports.document`, plain JSON. ``out``: folder of ``report.html`` and
+    ``report.json``; nothing is written where it is left out. ``validation``: check every linear prediction by
+    simulation, too. ``also``: further sections, of `reports.analyses.FURTHER`; ``added``: sections of other
+    documents, put before these. ``response``, ``response_of``, ``averages``: a measured response, laid over
+    the model, as `analyses.margins.run.measured_over` has it. ``source``: see `design_report`; the text of
+    the file where ``design`` is a name or a path. ``step``: gives a context, and in it a function for (done,
+    all), for each step named to it.
 
-    Returns
-    -------
-    dict
-        The document of `reports.document`: plain JSON.
-
-    Raises
-    ------
-    InputError
-        For a design, section or folder that cannot be taken.
+    Raises `InputError`: for a design, section or folder that cannot be taken.
 
     Examples
     --------
@@ -124,11 +106,8 @@ def design_report(
     before them; their verdicts count. ``source``: the text that the design was read from; the page changes
     that, not one written anew.
 
-    Raises
-    ------
-    InputError
-        From the computations. Whatever else fails leaves out its part only: a notice stands in its place, and
-        `analyses.isolation.drain` gives it.
+    Raises `InputError`: from the computations. Whatever else fails leaves out its part only: a notice stands
+    in its place, and `analyses.isolation.drain` gives it.
     """
     origin, head = provenance(design_hash(design)), design_head(design)
     with isolated() as missing:
@@ -147,7 +126,7 @@ def design_report(
         *loops[1:],
         *(part for part in validation if part not in first),
         parameters.section(design, warnings_of(design)),
-        parameters.provenance(head, origin, () if first else (answer.unchecked(),)),
+        parameters.provenance(head, origin, checked=bool(first)),
     ]
     doc.waived(sections, design)
     with isolated() as unanswered:
@@ -184,10 +163,7 @@ def _mend(point: WeakPoint | None, survey: LoopSurvey | None, bounds: Corners | 
 def further_sections(design: Design, names: Sequence[str]) -> list[doc.Section]:
     """Make the sections of `FURTHER` that are named; one that the drive cannot have says why.
 
-    Raises
-    ------
-    InputError
-        For a name that is none.
+    Raises `InputError`: for a name that is none.
     """
     for name in names:
         if name not in FURTHER:

@@ -41,20 +41,12 @@ _NO_GAIN = "DC gain is 0: no -3 dB bandwidth (the response is zero at zero frequ
 def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/sqrt(2)") -> Bandwidth:
     """Bandwidths of a closed-loop response (give T itself, not the open loop).
 
-    Parameters
-    ----------
-    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
-        T, one input, one output; continuous or sampled. Measured data: each figure comes with its range.
-    delay_s : float, optional
-        Exact delay in series with T, s: it leaves the -3 dB bandwidth and takes phase.
-    level : {"1/sqrt(2)", "-3 dB"}
-        What "-3 dB" is: 1/sqrt(2) of the value at zero frequency (default), or 10^(-3/20) of it.
+    One input, one output; continuous, sampled or a `DelaySystem`. Of measured data each figure comes with
+    its range. ``delay_s``: exact delay in series with T: it leaves the -3 dB bandwidth and takes phase.
+    ``level``: "-3 dB" is 1/sqrt(2) of the value at zero frequency, or 10^(-3/20) of it.
 
-    Raises
-    ------
-    InputError
-        T is zero or infinite at zero frequency: there is nothing to measure the fall from. A direct
-        feed-through with a delay that is no plain shift of T: one in a loop or beside another path.
+    Raises `InputError`: T is zero or infinite at zero frequency: there is nothing to measure the fall from. A
+    direct feed-through with a delay that is no plain shift of T: one in a loop or beside another path.
 
     Examples
     --------
@@ -136,14 +128,9 @@ def _bandwidth(
 
 
 def peaks(system: Any, delay_s: float = 0.0) -> Peaks:
-    """Peaks of S and T of the loop ``system`` (the open loop L) under negative unit feedback.
+    """Peaks of S and T of the open loop L, one input, one output, under negative unit feedback.
 
-    Parameters
-    ----------
-    system : StateSpace, TransferFunction or DelaySystem
-        L, one input, one output.
-    delay_s : float, optional
-        Exact delay in series with L, s.
+    ``delay_s``: exact delay in series with L.
     """
     delay_s = delay_number(delay_s)
     if is_measured(system):

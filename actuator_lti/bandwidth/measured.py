@@ -16,6 +16,7 @@ from actuator_lti.margins.measured.margins import (
     refuse_coarse,
     single_passages,
 )
+from actuator_lti.margins.single import frequency_text
 from actuator_lti.systems.measured_response import MeasuredResponse, at_once, measured_response
 from actuator_lti.types import Complex, Real
 
@@ -37,10 +38,8 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     T at zero frequency is the point measured there; without one the lowest point, which may lie off it by as
     much as the gain changes over the first octave (a third of that for the first term in w^2).
 
-    Raises
-    ------
-    InputError
-        Data as `stability_margins` refuses them, or a phase at the lowest point that leaves the sign open.
+    Raises `InputError`: data as `stability_margins` refuses them, or a phase at the lowest point that leaves
+    the sign open.
     """
     response = measured_response(data)
     omega, T, radius = measured_points(response, None)
@@ -84,14 +83,14 @@ def _at_rest(response: MeasuredResponse, omega: Real, T: Complex, result: Bounds
     off = abs(math.remainder(float(np.angle(T[0])), math.pi)) + float(result.phase.up[0])
     if off > 0.25 * math.pi:
         raise InputError(
-            f"measured data: at the lowest point, {omega[0]:.6g} rad/s, the phase of T is "
+            f"measured data: at the lowest point, {frequency_text(omega[0])}, the phase of T is "
             f"{np.degrees(np.angle(T[0])):.1f} deg; T at zero frequency is not known: measure lower"
         )
     middle = result.log_gain.middle
     octave = min(int(np.searchsorted(omega, 2.0 * omega[0])), omega.size - 1)
     bend = abs(float(middle[octave] - middle[0]))
     note = (
-        f"T(0) is taken from the lowest point, {omega[0]:.6g} rad/s, to "
+        f"T(0) is taken from the lowest point, {frequency_text(omega[0])}, to "
         f"{_db(-down - bend):+.3f} and {_db(up + bend):+.3f} dB"
     )
     return _Rest(float(middle[0]), down + bend, up + bend, math.copysign(1.0, T[0].real), note)

@@ -21,11 +21,12 @@ _TAKES = re.compile(r', which takes "([^"]*)"( too)?')
 _AT_MOTOR = re.compile(
     r"(motor|friction|limits)\.|control\.(velocity|position)\.gain|instruments\.angle_noise"
 )
-_TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?)\s*")
+_TICKS = re.compile(r"\s*([0-9.]+)\s*(?:ticks?|samples?|cycles?|periods?|Ts)\s*")
 BARE = re.compile(r"\s*[0-9.]+\s*\Z")
 _ROOT_OF_WATTS = re.compile(r" */ *(?:sqrt *\( *W *\)|√ *\(? *W\)?|W *(?:\^ *\(?(?:0?\.5|1/2)\)?|½))")
 Takes = Callable[[str, str], bool]
 _COUNT = re.compile(r"\b(?:counts?|cnts?|cts|inc|increments?)\b")
+_PER_COUNT = re.compile(rf"\s*(?:/|\bper\b)\s*{_COUNT.pattern}\s*\Z")
 
 
 def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree, frame: Frame, takes: Takes) -> str:
@@ -67,8 +68,9 @@ def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str
         here = f", here {ticks}" if ticks else ""
         return f"; write the ticks of control.period{here}" if _period_s(text) > 0.0 else ""
     if field.key == "counts_per_rev":
-        whole = "metre" if frame.motor_axis == "linear" else "revolution"
-        return _over_step(text, field.section, frame).replace("here", f"a {whole} over it is")
+        whole = "metre" if frame.per_metre(field.section) else "revolution"
+        over = _over_step(text, field.section, frame).replace("here", f"a {whole} over it is")
+        return over or ("; those of a metre" if whole == "metre" else "")
     if field.path == "motor.torque_constant" and _ROOT_OF_WATTS.search(f"{text}"):
         return f"; it is {_motor_constant(text, tree, frame)}"
     if (ticks_said := _TICKS.fullmatch(f"{text}")) and (
@@ -101,11 +103,11 @@ def _per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
 
 def _over_step(text: Any, section: str, frame: Frame) -> str:
     """A revolution, or a metre of a linear axis, over the step of an encoder."""
-    screw = frame.travel_m_rad if section == "encoder" else None
-    linear = frame.structure.axis == "linear"
-    turns = {"m": 2.0 * pi * screw if screw else 1.0} if linear else {}
-    turns |= {"rad": 2.0 * pi} if screw or not linear else {}
-    over = next((turn / step for unit, turn in turns.items() if (step := _si(text, unit)) > 0.0), 0.0)
+    turns = {"m": 1.0} if frame.per_metre(section) else {"rad": 2.0 * pi}
+    if frame.travel_m_rad is not None and section == "encoder":
+        turns["m"] = 2.0 * pi * frame.travel_m_rad
+    step = _PER_COUNT.sub("", text) if isinstance(text, str) else text
+    over = next((turn / size for unit, turn in turns.items() if (size := _si(step, unit)) > 0.0), 0.0)
     return f"; here {over:.10g} counts" if over else ""
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_lti.design.field import BIG
 from actuator_lti.design.law import balance
+from actuator_lti.design.mistakes import nearest
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown, shown_path
@@ -16,6 +17,7 @@ from actuator_lti.files.tree import Tree
 
 PARTS = ("A", "B", "C", "D")
 _PERIODS = ("period", "Ts", "dt")
+_KEYS = (*PARTS, "L", "gain", "inputs", *_PERIODS)
 _WHAT = "file of one law: A, B, C, D, Ts and where needed L, as .mat up to version 7 or .json"
 
 
@@ -23,7 +25,8 @@ def read_law(path: Path) -> Tree:
     """What a file has of a law's table, with ``period``; an InputError says what is wrong with it.
 
     MATLAB: ``[A,B,C,D,Ts] = ssdata(K); save('k.mat','A','B','C','D','Ts')``, or a structure of these fields;
-    L, gain and inputs may stand with them.
+    L, gain and inputs may stand with them, nothing else in a structure or JSON; other variables of a
+    workspace are passed over.
     """
     where, data = shown_path(path), read_bytes(path, _WHAT)
 
@@ -41,7 +44,10 @@ def read_law(path: Path) -> Tree:
     if len(laws) != 1:
         several = f"several laws: {', '.join(name.rstrip('.') for name in laws)}"
         raise refused(f"holds {shown(several)[1:-1] if laws else 'no A, B, C and D'}; ")
-    (held,) = laws.values()
+    ((name, held),) = laws.items()
+    workspace = path.suffix == ".mat" and not name.endswith(".")  # whose other variables are no part of it
+    if unknown := [key for key in held if key not in _KEYS and not workspace]:
+        raise refused(f"{', '.join(map(shown, unknown[:12]))}: unknown key{nearest(unknown[0], _KEYS)}; ")
     periods = {name: _number(name, held[name]) for name in _PERIODS if name in held}
     if len({*periods.values()}) != 1:
         ends = " and ".join(periods) + " that differ" if periods else "no Ts, the period that it was made for"

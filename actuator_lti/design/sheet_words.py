@@ -19,6 +19,11 @@ _FACT = "not needed; it may stand as a [[fact]]"
 _FRICTION = "friction friction_force friction_torque frictional_torque"
 _LINES = "lines lines_per_revolution counts_per_turn"
 _PULSES = "cpr cpt ppr ppt pulses pulses_per_revolution pulses_per_rev"
+_COUNTED = {
+    "counts": "counts_per_rev",
+    f"{_LINES} sin_cos_periods": 'counts_per_rev, in counts, four of each line, which takes "1024 lines" too',
+    _PULSES: "counts_per_rev, in counts, of some makers four of each line",
+}
 _INTEGRAL = "integral_time = gain/integral gain; of one in Hz 1/(2 pi f)"
 _SPEED = "nominal_speed rated_speed max_speed"
 _WORDS: dict[str, dict[str, str]] = {
@@ -122,14 +127,17 @@ _WORDS: dict[str, dict[str, str]] = {
     },
     "temperature": {"winding_max max_winding_temperature maximum_winding_temperature": "winding_limit"},
     "encoder": {
-        "counts": "counts_per_rev",
-        f"{_LINES} sin_cos_periods": "counts_per_rev, in counts, four of each line, "
-        'which takes "1024 lines" too',
+        **_COUNTED,
         "resolution bits step_angle": 'counts_per_rev, 4096 or "17 bit"; one revolution over a step in angle '
         "(linear axis without a screw: one metre over a step)",
-        _PULSES: "counts_per_rev, in counts, of some makers four of each line",
         "type interface accuracy poles pole_pairs": _FACT,
         "hall_sensors": "counts_per_rev, 6 for each pole pair",
+    },
+    "output_encoder": {
+        **_COUNTED,
+        "resolution bits step_angle": 'counts_per_rev, 4096 or "17 bit"; one revolution of the output over a '
+        "step in angle (linear axis: one metre over a step)",
+        "type interface accuracy poles pole_pairs": _FACT,
     },
     "limits": {
         f"supply {_VOLTAGE} dc_bus": "voltage",

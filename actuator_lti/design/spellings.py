@@ -8,7 +8,7 @@ from actuator_lti.files.reading import shown
 _NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*(.*)\Z", re.DOTALL)
 _NOT_FINITE = re.compile(r"\s*[+-]?(?:nan|inf(?:inity)?)\b", re.IGNORECASE)
 _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
-_MILLIONS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:,[0-9]{3}){2,}(?![0-9,])")
+_MILLIONS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:(?:,[0-9]{3}){2,}(?![0-9,])|,[0-9]{3}\.)")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
 _SIGNS = str.maketrans(
     {"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"', "−": "-", "–": "-"}

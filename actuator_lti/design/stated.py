@@ -18,7 +18,8 @@ _OF_SHEET = re.compile(rf"{CONVENTION.pattern}|(?<=A)[ _]?\(?(dc)\b\)?", re.IGNO
 _DIRECT = re.compile(r"(?<=A)[ _]?dc\b", re.IGNORECASE)
 _MAINS = re.compile(r"(?<=V)[ _]?\(?(?:ac|rms|eff)\b\)?|(?<=V) ?~", re.IGNORECASE)
 _RANGE = re.compile(r"(?<=[0-9]) *(?:[-–]|to) *(?=[0-9])")
-_PER_TURN = re.compile(r"\s*/\s*(?:rev|turn|U|r)\.?\s*\Z")  # a lead in mm/rev, an encoder of counts/rev
+# A lead in mm/rev, an encoder of counts/rev.
+_PER_TURN = re.compile(r"\s*(?:/|\bper\b)\s*(?:rev(?:olution)?|turn|U|r)\.?\s*\Z")
 _PER_TRAVEL = re.compile(r"/ *\(?[kcmnuµ]?m\b")  # of a linear encoder
 _AMPERE, _SIZED = re.compile(r"\bA\b"), re.compile(r"\b[AV]\b")
 _OF_AMPERE: dict[str, MotorConstants] = {"rms": "rms-line", "eff": "rms-line", "dc": "dc"}
@@ -43,6 +44,11 @@ class Frame:
         """The kind of axis of the motor's own values: rotary before a screw."""
         return self.structure.axis if self.travel_m_rad is None else "rotary"
 
+    def per_metre(self, section: str) -> bool:
+        """Whether the counts of an encoder are those of a metre, not of a revolution."""
+        behind_screw = section == "encoder" and self.travel_m_rad is not None
+        return self.structure.axis == "linear" and not behind_screw
+
     def quantity(self, text: Any, field: Field) -> float:
         """The SI value of a text; behind a screw also from the units of a rotary axis.
 
@@ -52,7 +58,8 @@ class Frame:
         """
         unit, power = field.unit(self.structure), field.travel_power()
         if isinstance(text, str):
-            text = _PER_TURN.sub("", text) if field.key in ("lead", "counts_per_rev") else text
+            turn = field.key == "counts_per_rev" and not self.per_metre(field.section)
+            text = _PER_TURN.sub("", text) if turn or field.key == "lead" else text
             if field.path == "limits.voltage" and _MAINS.search(text):
                 _refuse_mains(_MAINS.sub("", text))
             sheet = field.section == "motor" and self.constants != "dc"
@@ -66,8 +73,8 @@ class Frame:
             factors = {rotary: self.travel_m_rad**power, unit: 1.0}
         counted = field.key == "counts_per_rev" and self.structure.axis == "linear"
         if counted and _PER_TRAVEL.search(f"{text}"):
-            own = field.section == "encoder" and self.travel_m_rad
-            factors = {"count/m": 2.0 * pi * own if own else 1.0}  # of a lead, or of a metre
+            whole_m = 1.0 if self.per_metre(field.section) else 2.0 * pi * (self.travel_m_rad or 0.0)
+            factors = {"count/m": whole_m}  # of a metre, or of a lead
             counts = parse_quantity(text, "count/m") * factors["count/m"]
             return float(round(counts)) if abs(counts - round(counts)) <= 1e-9 * counts else counts
         refused: list[InputError] = []

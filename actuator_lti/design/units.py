@@ -38,7 +38,7 @@ _BASE = {
 _DERIVED = {
     "percent": ("0.01", "1"),
     "ppm": ("0.000001", "1"),
-    "g gram": ("0.001", "kg"),
+    "g gram gm": ("0.001", "kg"),
     "in inch": ("0.0254", "m"),
     "ft foot": ("0.3048", "m"),
     "lb lbm pound": ("0.45359237", "kg"),
@@ -52,6 +52,7 @@ _DERIVED = {
     "ozf ounce_force": ("0.27801385095378125", "N"),
     "kgf kp kilogram_force": ("9.80665", "N"),
     "gf gram_force": ("0.00980665", "N"),
+    "dyn dyne": ("0.00001", "N"),
     "J joule": ("1", "N*m"),
     "Nm newton_meter": ("1", "N*m"),
     "Ncm": ("0.01", "N*m"),
@@ -93,7 +94,7 @@ _ASIDE = {
     "g": "is no unit; 1 g of a fall is 9.80665 m/s^2",
     "line_line": "is no unit; leave it out: R and L are so, or of a phase, half, as motor.constants says",
     **dict.fromkeys(
-        ("tick", "ticks", "sample", "samples", "cycle", "cycles", "period", "periods"),
+        ("tick", "ticks", "sample", "samples", "cycle", "cycles", "period", "periods", "ts"),
         "is no unit; every takes ticks of control.period without one, a time is so many of that period",
     ),
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
@@ -103,6 +104,8 @@ _ASIDE = {
 }
 _WORD = 4  # letters from which a name may stand in the plural: "volts", but "As" is no unit
 _PLURALS = ("sec", "min", "rev", "amp", "ohm", "Ohm", "mil", "lb")
+_NO_PREFIX = ("kg", "kilogram", "gm")  # "kgm" is no mass
+_NEVER_MEGA = ("rad", "s", "m", "in")  # "Grad" are degrees, "Ts" periods, "Mm", "Gm", "Min" mm, g, min
 _COUNTS: Dimension = (("[count]", 1),)
 _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of a revolution per minute
 
@@ -110,7 +113,7 @@ _AMPERE = re.compile(r"\bA\b")
 MOST_FACTORS = 40
 _INNER = re.compile(r"\(([^()]*)\)")
 _FACTOR = re.compile(r"\s*([*/]?)\s*(_[0-9]+|[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
-_WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)(?=[* ]c?m\b)")
+_WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)m?(?=[* ]c?m\b)")
 # Read as meant only where the unit wanted is no other: V/rad/s, %/degC.
 _MEANT = (
     (_WEIGHTS, r"\1\2f"),
@@ -181,9 +184,9 @@ def _named(name: str, units: Units) -> Exact:
         plural = one != name
         for prefix, power in (("", 0), *_PREFIXES.items()):
             unit = one[len(prefix) :]
-            if not one.startswith(prefix) or unit not in units or (power and unit in ("kg", "kilogram")):
+            if not one.startswith(prefix) or unit not in units:
                 continue
-            if power > 3 and unit == "rad":  # "Grad" are degrees
+            if (power and unit in _NO_PREFIX) or (power > 3 and unit in _NEVER_MEGA):
                 continue
             if plural and not (len(unit) >= _WORD or unit in _PLURALS):
                 continue

@@ -286,7 +286,8 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
     for name, amplitude in onset.each_rad.items():
         there = np.isfinite(amplitude)
         if np.any(there):
-            panel.loglog(hertz[there], factor * amplitude[there], label=f"{name} limit")
+            label = name if name == "cogging" else f"{name} limit"
+            panel.loglog(hertz[there], factor * amplitude[there], label=label)
     panel.legend(title="first reached, linear loop")
     return panel
 

@@ -150,10 +150,7 @@ def centre_rad_s(item: Filter) -> Any:
 def biquad(item: Filter, period_s: Any) -> Block:
     """A filter of the velocity loop (model.md section 7), by Tustin's rule prewarped at its own frequency.
 
-    Raises
-    ------
-    InputError
-        For a frequency at or above pi/T.
+    Raises `InputError`: for a frequency at or above pi/T.
     """
     if item.kind == "biquad":
         return _given(item, period_s)

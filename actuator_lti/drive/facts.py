@@ -220,10 +220,7 @@ def capability(design: Design, load_Nm: float = 0.0) -> Capability:
     Worse is the slower direction, then the weaker, then the one that needs more current. On a back-drivable
     path the moment is against the motion.
 
-    Raises
-    ------
-    InputError
-        If the load is not finite.
+    Raises `InputError`: if the load is not finite.
     """
     if not math.isfinite(load_Nm):
         raise InputError(f"load_Nm = {load_Nm}: must be finite")

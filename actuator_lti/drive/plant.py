@@ -73,10 +73,8 @@ def _stack(values: Iterable[Any]) -> tuple[int, ...]:
 def motor_plant(design: Design, at: Operating | None = None) -> Plant:
     """State space of equations (1), (2), (14), and of section 6 with a coupling.
 
-    Raises
-    ------
-    InputError
-        For an operating point that the design does not have, or a locked rotor without a current.
+    Raises `InputError`: for an operating point that the design does not have, or a locked rotor without a
+    current.
 
     Examples
     --------

@@ -162,10 +162,7 @@ class Drive:
 def wire(design: Design, operating: Operating | None = None) -> Drive:
     """Wire a design up at an operating point; with the rotor locked only the current loop remains.
 
-    Raises
-    ------
-    InputError
-        For stages that do not fit, or an operating point that the design does not have.
+    Raises `InputError`: for stages that do not fit, or an operating point that the design does not have.
     """
     at = (operating or Operating()).checked(design)
     control = design.controller

@@ -29,6 +29,7 @@ from actuator_lti.systems.measured_response import GAUSSIAN, MeasuredResponse
 from actuator_lti.types import Floats
 
 Loop = Literal["L", "T", "S"]
+UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
 NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
 """Of a row that is left out and counted."""
 
@@ -149,18 +150,9 @@ def _table(text: str) -> tuple[dict[str, Floats], bool]:
         if wrong := [word for word in row if word.lower() not in NO_VALUE and np.isnan(_number(word, cut))]:
             raise InputError(f"line {line}: {shown(wrong[0])} is no number; allowed: numbers, or nothing")
     values = np.array([[_number(word, cut) for word in row] for row in rows]).reshape(-1, width)
-    names = head or [
-        "f_hz",
-        "gain_db",
-        "phase_deg",
-        "coherence",
-        *(f"column {k}" for k in range(5, width + 1)),
-    ]
-    names = [
-        f"{name} ({k})" if name and name in names[: k - 1] else name
-        for k, name in enumerate(names[:width], 1)
-    ]
-    return dict(zip(names, values.T, strict=True)), head is not None
+    names = (head or [*UNTITLED, *(f"column {k}" for k in range(5, width + 1))])[:width]
+    apart = [f"{name} ({k})" if name and name in names[: k - 1] else name for k, name in enumerate(names, 1)]
+    return dict(zip(apart, values.T, strict=True)), head is not None
 
 
 def _number(word: str, cut: str | None) -> float:
@@ -193,7 +185,7 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         raise InputError("a coherence outside 0 to 1")
     if not np.isfinite(z).all() or (z == 0.0).any():
         raise InputError("a value that is 0 or beyond the range of floats")
-    refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, z, good)
+    refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
     deviation, radius, noise = noise_of(table, units, averages)
     return RecordedResponse(
         f[order], z[order], deviation[order], coherence[order], name, count - int(good.sum()),

@@ -37,6 +37,8 @@ _UNITS: dict[str, tuple[re.Pattern[str], dict[str, str]]] = {
     "size": (re.compile(r"mag|gain|abs|amp|db\b", re.I), {"db": "dB", r"abs|ratio|lin|\b1\b|[/]": "ratio"}),
 }
 SI = {"": 1.0, "kHz": 1e3, "Hz": 1.0, "rad/s": 0.5 / np.pi, "deg": np.pi / 180.0, "rad": 1.0, "%": 0.01}
+# Of a name: its unit, and what is no letter.
+_FREQUENCY_UNIT = re.compile(r"k?hz|rad([_/ ]*(per)?[_/ ]*s(ec)?)?|[\W_\d]")
 _WORDS = {"size": "magnitude", "real": "real part", "imaginary": "imaginary part"}
 _ORDER = ("frequency", "size", "phase", "real", "imaginary")
 _DEVIATIONS = ("deviation", "deviation beside it")
@@ -91,14 +93,16 @@ def complex_values(table: Mapping[str, Floats], units: Mapping[str, str]) -> NDA
     return cast("NDArray[np.complex128]", made)
 
 
-def refuse_contradiction(beside: Mapping[str, Floats], z: NDArray[np.complex128], good: Mask) -> None:
-    """Refuse a response that columns beside those which are read tell otherwise."""
+def refuse_contradiction(
+    beside: Mapping[str, Floats], f: Floats, z: NDArray[np.complex128], good: Mask
+) -> None:
+    """Refuse a response z at frequencies f, in Hz, that columns beside it tell otherwise."""
     for name, values in beside.items():
         role = next((role for role, (like, _) in _UNITS.items() if like.search(name)), "")
         if (
             _ERROR.search(name)
             or values.size != good.size
-            or (off := _off(role, name, values[good], z)) is None
+            or (off := _off(role, name, values[good], f, z)) is None
         ):
             continue
         off = np.abs(off[np.isfinite(off)])
@@ -107,8 +111,10 @@ def refuse_contradiction(beside: Mapping[str, Floats], z: NDArray[np.complex128]
             raise InputError(f"{shown(name)} contradicts the {which} that is read; allowed: one of them")
 
 
-def _off(role: str, name: str, values: Floats, z: NDArray[np.complex128]) -> Floats | None:
-    """How far off z a column is, over the size; ``None`` where it does not say that it is the same."""
+def _off(role: str, name: str, values: Floats, f: Floats, z: NDArray[np.complex128]) -> Floats | None:
+    """How far off a column is, over the size; ``None`` where it does not say that it is the same."""
+    if role == "frequency":
+        return _off_frequency(name, values, f)
     if role in ("real", "imaginary"):
         return (values - (z.real if role == "real" else z.imag)) / np.abs(z)
     if role not in ("size", "phase") or not (unit := _said(role, name)):
@@ -116,6 +122,15 @@ def _off(role: str, name: str, values: Floats, z: NDArray[np.complex128]) -> Flo
     if role == "size":
         return _size(values, unit) / np.abs(z) - 1.0
     return cast("Floats", np.angle(np.exp(1j * SI[unit] * values) / z))
+
+
+def _off_frequency(name: str, values: Floats, f: Floats) -> Floats | None:
+    """The same of a frequency, which is in Hz or rad/s where its name does not say so."""
+    if _FREQUENCY_UNIT.sub("", name.lower()) not in ("f", "freq", "frequency", "omega", "w"):
+        return None
+    unit = _said("frequency", name)
+    off = [values * SI[one] / f - 1.0 for one in ([unit] if unit else ["Hz", "rad/s"])]
+    return min(off, key=lambda one: float(np.median(np.abs(one))))
 
 
 def noise_of(
@@ -126,7 +141,7 @@ def noise_of(
         raise InputError("averages: allowed with a column of coherence")
     if "deviation" in table:
         deviation = _deviation(table, units)
-        return deviation, GAUSSIAN * deviation, "noise as given"
+        return deviation, GAUSSIAN * deviation, "given as a standard deviation"
     coherence = table.get("coherence", np.full(table["frequency"].size, np.nan))
     n = np.broadcast_to(table.get("averages", np.nan) if averages is None else averages, coherence.shape)
     if (n < 2.0).any():

@@ -61,18 +61,12 @@ def step_figures(system: Any) -> StepFigures:
     samples. A system with inner delays is walked along its first delays, and is then the free motion of its
     exact poles. All figures are relative to the final value, however small it is beside what comes before.
 
-    Parameters
-    ----------
-    system : StateSpace, TransferFunction or DelaySystem
-        One input, one output; a closed loop.
+    ``system``: a closed loop, one input, one output: StateSpace, TransferFunction or DelaySystem.
 
-    Raises
-    ------
-    InputError
-        The system is not stable, its final value is zero, or it is measured data; or a direct feed-through
-        with a delay that is no plain shift: one in a loop or beside another path.
-    NumericalError
-        The final value is lost in the rounding of the entries, or when it settles cannot be told.
+    Raises `InputError`: the system is not stable, its final value is zero, or it is measured data; or a
+    direct feed-through with a delay that is no plain shift: one in a loop or beside another path. Raises
+    `NumericalError`: the final value is lost in the rounding of the entries, or when it settles cannot be
+    told.
 
     Examples
     --------

@@ -63,7 +63,7 @@ class MeasuredResponse:
         omega, L, dt = _read(data)
         sigma = _per_point(standard_deviation, L.size, "standard_deviation", math.inf)
         radius = sigma * math.sqrt(-math.log(1.0 - _checked(confidence)))
-        return cls(omega, L, radius, dt, "noise as given")
+        return cls(omega, L, radius, dt, "given as a standard deviation")
 
     @classmethod
     def from_coherence(

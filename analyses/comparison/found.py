@@ -29,6 +29,7 @@ from actuator_lti.files.reading import decode, read_bytes
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from analyses.linear.loop_figures import LoopFigures
+from analyses.linear.loop_survey import with_cogging
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict
@@ -91,10 +92,10 @@ class LargeSignal:
         figures: dict[str, float | None] = {}
         for frequency in self.frequencies_hz:
             try:
-                amplitude = float(onset(loops, [2 * pi * frequency]).amplitude_rad[0])
+                border = with_cogging(loops, onset(loops, [2 * pi * frequency]))
             except InputError:
                 continue  # beyond Nyquist of the position loop
-            figures[f"large.onset@{frequency:g}"] = amplitude * shown
+            figures[f"large.onset@{frequency:g}"] = float(border.amplitude_rad[0]) * shown
         for load in self.loads_Nm:
             step = StepCheck(self.deflection_rad, self.duration_s, load)
             columns = step_columns(step, Population(design, {}, 1))

@@ -39,15 +39,12 @@ LEAST_FOR_A_SPLINE = 9
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
-    """What a record commands: the signal, the stage it goes into, values as the simulator takes them.
-
-    ``design`` is the drive from that stage on: a record of a current command has no speed loop acting.
-    """
+    """What a record commands."""
 
     signal: str
-    stage: str
-    values: Floats
-    design: Design
+    stage: str  # it goes into
+    values: Floats  # as the simulator takes them
+    design: Design  # the drive from that stage on: under a current command no speed loop acts
     notes: tuple[str, ...] = ()
 
 

@@ -13,18 +13,12 @@ from analyses.correlation.compare import SignalComparison
 from analyses.records.open_record import open_records
 from analyses.records.record import named_apart
 
-BESIDE = ("speed", "velocity", "current", "force")
-"""Signals that stand beside the motion, in the first sentence too."""
+BESIDE = ("speed", "velocity", "current", "force")  # beside the motion, in the first sentence too
 
 
 @dataclass(frozen=True, kw_only=True)
 class SignalSummary:
-    """One signal over all records that hold it.
-
-    ``mean_error`` and ``rms_error`` are over all samples together, ``max_error`` the largest of all,
-    ``relative_error`` the norm of all differences over the norm of all that was measured, ``share_of_motion``
-    over that of each record's about its mean. ``worst`` is the record with the largest of these.
-    """
+    """One signal over all records that hold it, all samples together."""
 
     name: str
     unit: str
@@ -33,14 +27,9 @@ class SignalSummary:
     mean_error: float
     rms_error: float
     max_error: float
-    relative_error: float
-    share_of_motion: float
-    worst: str
-
-
-def summarise(results: Sequence[CorrelationResult]) -> dict[str, SignalSummary]:
-    """The figures of every signal over all records, in the order in which the signals first occur."""
-    return {name: _of_signal(name, results) for result in results for name in result.signals}
+    relative_error: float  # norm of all differences over the norm of all that was measured
+    share_of_motion: float  # over that of each record's about its mean
+    worst: str  # the record with the largest of these
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:
@@ -80,15 +69,6 @@ def moves_alike(result: CorrelationResult) -> bool:
     return all(signal.share_of_motion <= 1.0 for signal in told)
 
 
-def agrees(results: Sequence[CorrelationResult], error_limit: float) -> bool:
-    """Whether no record contradicts itself or the design, and each signal is within a share of its motion."""
-    if any(finding.passed is False for result in results for finding in result.findings):
-        return False
-    signals = [signal for result in results for signal in result.signals.values()]
-    within = all(signal.share_of_motion <= error_limit for signal in signals)
-    return within and all(moves_alike(result) for result in results)
-
-
 @dataclass(frozen=True)
 class Correlation:
     """A model against records."""
@@ -104,8 +84,8 @@ class Correlation:
 
     @property
     def summary(self) -> dict[str, SignalSummary]:
-        """The figures of every signal over all records."""
-        return summarise(self.records)
+        """The figures of every signal over all records, in the order in which the signals first occur."""
+        return {name: _of_signal(name, self.records) for one in self.records for name in one.signals}
 
     @property
     def worst(self) -> str:
@@ -114,8 +94,12 @@ class Correlation:
 
     @property
     def passed(self) -> bool:
-        """Whether no record contradicts itself or the design, and no error is above the limit."""
-        return agrees(self.records, self.limit)
+        """Whether no record contradicts itself or the design, and each signal is within the limit."""
+        if any(finding.passed is False for one in self.records for finding in one.findings):
+            return False
+        signals = [signal for one in self.records for signal in one.signals.values()]
+        within = all(signal.share_of_motion <= self.limit for signal in signals)
+        return within and all(moves_alike(one) for one in self.records)
 
 
 def correlate(design: Design, asked: Asked, *, progress: Progress = None) -> Correlation:

@@ -12,19 +12,15 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
 
-LEAST_OWN_SHARE = 0.03
-"""A column of which less than this is its own, beside those before it, is not separated from them."""
+LEAST_OWN_SHARE = 0.03  # a column with less of its own beside those before it is not separated from them
 
 
 @dataclass(frozen=True, kw_only=True)
 class NotTold:
-    """A parameter that the rows do not tell, and which others it cannot be told from.
-
-    ``moves``: its column is about the sum of these factors times those of the others.
-    """
+    """A parameter that the rows do not tell, and which others it cannot be told from."""
 
     name: str
-    moves: Mapping[str, float] = field(default_factory=dict)
+    moves: Mapping[str, float] = field(default_factory=dict)  # its column is about theirs times these factors
 
     def __str__(self) -> str:
         others = " and ".join(self.moves)

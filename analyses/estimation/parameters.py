@@ -18,8 +18,7 @@ class Parameter:
     unit: str
     key: str = ""
     linear: str = ""
-    scale: float = 1.0
-    """Of the value in SI, to the unit in which it is shown."""
+    scale: float = 1.0  # of the value in SI, to the unit in which it is shown
 
 
 UNSTATED = 0.05  # relative standard deviation of a number of a design that states no tolerance

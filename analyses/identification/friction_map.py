@@ -16,8 +16,7 @@ from analyses.records.record import Record
 MOST_BREAKS = 4
 GRID = 24
 LEAST_SHARE = 0.005
-CLEARLY_BETTER = 6.0
-"""A law is taken where its criterion is lower by this much (strong evidence; Kass and Raftery 1995)."""
+CLEARLY_BETTER = 6.0  # of the criterion, for a law to be taken (strong evidence; Kass and Raftery 1995)
 
 
 def fit_map(

@@ -34,8 +34,7 @@ KEYS = (
     "control.computing_delay",
 )
 CONSTANT_KEYS = {parameter(name).key for name in CONSTANTS}
-LEVEL = 1e-3
-"""Probability with which noise of the stated size alone fails a response."""
+LEVEL = 1e-3  # probability with which noise of the stated size alone fails a response
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,32 +61,18 @@ def identify_response(
 ) -> ResponseResult:
     """Fit a design to a measured frequency response of one of its loops.
 
-    Parameters
-    ----------
-    design : Design
-        Its loops, sampled and exact, are the model; other values than those of `KEYS` are kept. What the
-        response does not determine (a standard error above the design's value, and above a quarter of what
-        it is off; of a stiffness, or of one of several inertias, no end of its interval within a factor of
-        30) is kept.
-    source : path or control.FrequencyResponseData
-        See `actuator_lti.files.response.read_response`.
-    loop : str, optional
-        A stage (``"position"``) or a break point (``"w_ref"``); the outermost stage by default.
-    of : {"L", "T", "S", "closed"}
-        Open loop, L/(1 + L), 1/(1 + L), or from the command to the output with all that is fed forward.
-    fixed : mapping, optional
-        Keys held at a value.
-    limit : float
-        Largest relative error of the design's response, root mean square over the frequencies.
+    The design's loops, sampled and exact, are the model; other values than those of `KEYS` are kept, and what
+    the response does not determine: a standard error above the design's value, and above a quarter of what it
+    is off; of a stiffness, or of one of several inertias, no end of its interval within a factor of 30.
 
-    averages : int, optional
-        Those behind the coherence, which then gives the deviations.
+    ``source``: as `actuator_lti.files.response.read_response` takes it. ``loop``: a stage (``"position"``) or
+    a break point (``"w_ref"``); the outermost stage by default. ``of``: open loop, L/(1 + L), 1/(1 + L), or
+    (closed) from the command to the output with all that is fed forward. ``fixed``: keys held at a value.
+    ``limit``: largest relative error of the design's response, root mean square over the frequencies.
+    ``averages``: those behind the coherence, which then gives the deviations.
 
-    Raises
-    ------
-    InputError
-        If the response cannot be read, the design has no such loop, nothing is determined, or there are no
-        more numbers than unknowns.
+    Raises `InputError`: if the response cannot be read, the design has no such loop, nothing is determined,
+    or there are no more numbers than unknowns.
     """
     measured = read_response(source, averages)
     start = with_values(design, dict(fixed or {}))

@@ -25,8 +25,7 @@ STEP = 1e-3
 TOLERANCE = 1e-6
 ITERATIONS = 24
 AT_END = 1e-9  # part of the start within which a value is at the end of what its key allows
-LEAST_STEPPED = 0.1
-"""Part of the start below which a value's own size is no measure of its step: it may go to zero."""
+LEAST_STEPPED = 0.1  # of the start: below, a value, which may go to zero, is no measure of its step
 LEAST_LOAD = 1e-6  # part of its start that is left of an inertia behind a coupling
 MOST_TICKS = 2_000_000
 DRIVE_SIGNALS = ("force", "current", "voltage")
@@ -35,17 +34,13 @@ MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
 
 @dataclass(frozen=True, kw_only=True)
 class OutputErrorResult(Fit):
-    """Refined values by dotted key, and the relative error before and after.
+    """Refined values by dotted key; their errors respect the correlation in time of what is left."""
 
-    These errors are those of the drive signal: norm of the difference over norm of the measured. The standard
-    errors respect the correlation in time of what is left. ``at_bound`` are those that ended at the least or
-    largest value of their key: the records want another, and no error of theirs holds.
-    """
-
-    error_before: float
+    error_before: float  # of the drive signal: norm of the difference over norm of the measured
     error_after: float
     iterations: int
     design: Design
+    # what ended at the least or largest value of its key: the records want another, no error of it holds
     at_bound: tuple[str, ...] = ()
 
 

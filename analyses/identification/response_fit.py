@@ -19,18 +19,14 @@ from analyses.identification.response_search import ROUNDS, Point, Search
 from analyses.records.consistency import SURE
 
 NOT_TOLD = "not determined, the design's value kept"
-RESOLVED = 1e-5
-"""Share of a slope that is its own: below it two values do the same."""
+RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the same
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0
 """Factor: a value is not told where as much more, or of an inertia or stiffness less, explains as well."""
-ROUGH = 1e-3
-"""Part of what is left that another step of a rough fit has to be expected to save."""
-FAR = 10.0
-"""Levels by which a point to begin with may be off; another is tried nearer."""
-CLOSE = 0.01
-"""Part of its level that an end of an interval is found to."""
+ROUGH = 1e-3  # part of what is left that another step of a rough fit has to be expected to save
+FAR = 10.0  # levels by which a point to begin with may be off; another is tried nearer
+CLOSE = 0.01  # part of its level that an end of an interval is found to
 
 
 class _Lower(Exception):
@@ -39,19 +35,15 @@ class _Lower(Exception):
 
 @dataclass(frozen=True)
 class _Side:
-    """Points of a profile to one side of a fit: a coordinate held off by some distance, the others fitted.
-
-    ``straight``: coordinates over that distance, of a straight response. ``most``: how far is looked; where
-    the deviation is below its ``level`` there, the end of the interval is ``bound``.
-    """
+    """Points of a profile to one side of a fit: a coordinate held off by some distance, the others fitted."""
 
     search: Search
     best: Point
     k: int
     level: float
-    straight: Floats
-    most: float
-    bound: float
+    straight: Floats  # coordinates over that distance, of a straight response
+    most: float  # how far is looked
+    bound: float  # the end of the interval where the deviation is below its level there
 
     def fitted(self, begin: Point, at: float) -> tuple[Floats, float]:
         """The others fitted again, and the deviation over its level; at the farthest only which is more."""
@@ -117,21 +109,17 @@ def _along(path: Sequence[tuple[float, Floats]], at: float) -> Floats:
 class ResponseFit(Fit):
     """Values by key with which a loop's response is the measured one.
 
-    ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
     Errors are widened by a misfit above 1; without deviations they are those of the residual, with Student's
-    factor at its degrees of freedom. ``ends`` are 95 % intervals by profiles, shape (p, 2), with the error of
-    what is kept; 1.96 standard errors reach their farther end. ``also`` are other values, beyond these, that
-    explain the response as well. ``covariance``: at what is kept; ``joint``: with the error of that.
-    ``slopes`` of what is left (``rest``, in its deviations), over the values.
+    factor at its degrees of freedom. 1.96 standard errors reach the farther end of an interval.
     """
 
-    misfit: float | None
+    misfit: float | None  # root of the mean squared residual over its deviation; None: none was measured
     at_bound: tuple[str, ...]
-    also: Mapping[str, float]
-    ends: Floats = field(repr=False)
-    joint: Floats = field(repr=False)
-    rest: Floats = field(repr=False)
-    slopes: Floats = field(repr=False)
+    also: Mapping[str, float]  # other values, beyond the intervals, that explain the response as well
+    ends: Floats = field(repr=False)  # 95 % intervals by profiles, (p, 2), with the error of what is kept
+    joint: Floats = field(repr=False)  # covariance with that error; ``covariance``: at what is kept
+    rest: Floats = field(repr=False)  # what is left, in its deviations
+    slopes: Floats = field(repr=False)  # of that, over the values
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of one value, longer to the side where the response tells it less."""

@@ -21,8 +21,7 @@ from actuator_lti.systems.sampling import split_delay
 from actuator_lti.types import Complexes, Floats
 from analyses.identification.asked import Of
 
-Values = Mapping[str, Floats]
-"""Values in SI by key, each of shape (K,): K designs."""
+Values = Mapping[str, Floats]  # values in SI by key, each of shape (K,): K designs
 
 
 @dataclass(frozen=True, kw_only=True)

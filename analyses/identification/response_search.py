@@ -18,22 +18,14 @@ from analyses.identification.output_error import LEAST_STEPPED, box_of
 from analyses.identification.response_model import Values
 from analyses.studies.sampling import correlation_of
 
-NEVER_ZERO = "motor.rotor_inertia", "load.inertia", "coupling.stiffness"
-"""Above 0: their logarithms are looked for."""
-STEP = 1e-5
-"""Share of a value for its differences: those of a sharp resonance curve at 1e-3 already."""
-FURTHEST = 1e6
-"""Factor of the design's inertia or stiffness at which a search ends."""
-MOST_TICKS = 100.0
-"""Of computing delay: a design has no more."""
-FINE, CRAWL = 1e-6, 1e-4
-"""Parts of what is left that a step has to be expected to save, and to save, for another to follow."""
-ROUNDS = 100
-"""Steps of a fit."""
-MOST_DAMPED = 1e10
-"""Of a step: one that is damped more is none."""
-BEND = 0.1
-"""Part of a step after which the bend of the response along it is looked at."""
+NEVER_ZERO = "motor.rotor_inertia", "load.inertia", "coupling.stiffness"  # by their logarithms
+STEP = 1e-5  # share of a value for its differences: those of a sharp resonance curve at 1e-3 already
+FURTHEST = 1e6  # factor of the design's inertia or stiffness at which a search ends
+MOST_TICKS = 100.0  # of computing delay: a design has no more
+FINE, CRAWL = 1e-6, 1e-4  # of what is left: what a step has to promise to save, and to save, for another
+ROUNDS = 100  # steps of a fit
+MOST_DAMPED = 1e10  # of a step: one that is damped more is none
+BEND = 0.1  # part of a step after which the bend of the response along it is looked at
 
 
 @dataclass(frozen=True)
@@ -59,23 +51,22 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """Coordinates of the first ``count`` values, which are looked for, and of others that are kept.
+    """Coordinates of values that are looked for, and of others that are kept.
 
-    ``origin + turn y``, y the exponential of a coordinate where it is a logarithm (``logs``): that of an
+    The values are ``origin + turn y``, y the exponential of a coordinate where it is a logarithm: that of an
     inertia or a stiffness over the design's. What is kept has independent deviations of the design's own
-    error, which weigh as measured. ``box`` holds the coordinates, ``ends`` the values, each of shape (2, p).
-    ``unit``: deviation of what is left of the response.
+    error, which weigh as measured.
     """
 
     residual: Callable[[Values], Floats]
     names: tuple[str, ...]
-    count: int
+    count: int  # of those that are looked for, the first
     logs: NDArray[np.bool_]
     origin: Floats
     turn: Floats
-    box: Floats
-    ends: Floats
-    unit: float
+    box: Floats  # of the coordinates, shape (2, p)
+    ends: Floats  # of the values
+    unit: float  # deviation of what is left of the response
 
     @classmethod
     def of(

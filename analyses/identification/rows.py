@@ -10,14 +10,13 @@ from scipy.ndimage import minimum_filter1d
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.arrays import lasting
 from analyses.estimation.parameters import default_value
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated
-from analyses.records.record import Record, period_of, prepared
+from analyses.records.record import Record, lasting, period_of, prepared
 
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
@@ -148,9 +147,8 @@ def record_rows(
         drive = drive + known / design.total_ratio
     if sides is not None:
         known = known - design.ratio_behind_coupling * sides.torque
-        ratio = (
-            design.ratio_to_coupling
-        )  # what the load side takes but for its inertia at the motor's own pace
+        ratio = design.ratio_to_coupling
+        # what the load side takes but for its inertia at the motor's own pace
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
         told, used = f"{told}, {sides.told}", {**sides.used, **used}

@@ -62,7 +62,7 @@ CAUSE_RULE = (
     "The limit named is the one that acts at most ticks of the last window. Where none acts: stiction if "
     f"the drive rests at {100 * STICK_FRACTION:.0f} % of the ticks or more. "
     f"Where the fundamental is off the linear one by more than {FRICTION_DB:g} dB or {FRICTION_DEG:g}°: "
-    "dry friction if it is not so without dry friction, else play, gravity or counts. "
+    "dry friction if it is not so without dry friction, else play, gravity, cogging or counts. "
     "Else none: the linear model holds."
 )
 

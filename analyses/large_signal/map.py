@@ -28,6 +28,7 @@ from analyses.large_signal.tones import (
     tones,
     work_ticks,
 )
+from analyses.linear.loop_survey import with_cogging
 
 if TYPE_CHECKING:
     import pandas
@@ -127,7 +128,7 @@ def amplitude_map(
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None
     levels = amplitudes(design, counts[0], threshold or None)
     start = linear_steady_state(loops, omega)
-    border, slow = onset(loops, omega), slow_protection(design, loops)
+    border, slow = with_cogging(loops, onset(loops, omega)), slow_protection(design, loops)
     which = np.tile(np.arange(len(omega)), len(levels))
     amplitude, linear = np.repeat(levels, len(omega)), start.output[which]
     begin = np.minimum(amplitude, BELOW_ONSET * border.amplitude_rad[which])

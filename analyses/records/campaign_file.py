@@ -59,18 +59,14 @@ Method = Literal["correlation", "event", "given"]
 
 @dataclass(frozen=True, kw_only=True)
 class Instruments:
-    """Bounds of the systematic errors, constant over a campaign, uniform within.
-
-    ``torque_accuracy`` is a share of ``torque_full_scale_Nm`` and bounds the error at zero and at full scale,
-    each on its own, with a straight line between. ``torque_constant`` bounds the relative error of kM
-    (0: taken as known).
-    """
+    """Bounds of the systematic errors, constant over a campaign, uniform within."""
 
     torque_full_scale_Nm: Annotated[float, "N*m"] = 10.0
+    # of full scale: at zero and there, each on its own, with a straight line between
     torque_accuracy: Annotated[float, ""] = 0.0
     current_gain: Annotated[float, ""] = 0.0
     current_offset_A: Annotated[float, "A"] = 0.0
-    torque_constant: Annotated[float, ""] = 0.0
+    torque_constant: Annotated[float, ""] = 0.0  # relative error of kM; 0: taken as known
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():

@@ -17,8 +17,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.record import Record
 
-RATE_TOLERANCE = 0.02
-"""Disagreement of speed and rate above which no design is made; below it, it widens the intervals."""
+RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (
@@ -49,15 +48,12 @@ FOLLOWED = (
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what, whether it agrees (None: not determined), and in words.
-
-    ``unproven``: what is not determined leaves it open whether the record agrees.
-    """
+    """One thing that was looked at."""
 
     subject: str
-    passed: bool | None
+    passed: bool | None  # whether it agrees; None: not determined
     text: str
-    unproven: bool = field(default=False, repr=False)
+    unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
@@ -132,16 +128,12 @@ def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class RateRatio:
-    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves.
+    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves."""
 
-    ``place`` is the position's signal, ``found`` the ratio, ``alike`` the cosine; ``low`` and ``high`` hold
-    it with noise in either (Frisch's bounds: regressed each on the other, with the error of each).
-    """
-
-    place: str
-    found: float
-    alike: float
-    low: float
+    place: str  # the position's signal
+    found: float  # the ratio
+    alike: float  # the cosine
+    low: float  # Frisch's bounds: each regressed on the other, with the error of each
     high: float
     rate: Floats
     moves: Mask

@@ -139,9 +139,8 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
         named = {key: names_in(content, one.shape[1]) for key, one in content.arrays.items() if one.ndim == 2}
         wide = [key for key, names in named.items() if names and min(content.arrays[key].shape) > 1]
         layouts = iter([CsvFormat(), *(CsvFormat(matrix=key, names=named[key]) for key in wide)])
-        while spec is None and (
-            layout := next(layouts, None)
-        ):  # vectors by name, then each matrix with names
+        # vectors by name, then each matrix with names
+        while spec is None and (layout := next(layouts, None)):
             spec, why = spec_of_names(tuple(columns_of(content, layout, path)), layout)
     elif suffix in TABLES:
         spec, why = spec_of_names(tuple(TABLES[suffix](path)[0]))

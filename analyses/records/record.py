@@ -14,19 +14,13 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.arrays import longest
 
-RESAMPLE_TOLERANCE = 0.05
-"""Largest error of a resampled signal that is accepted without being told to, as a share of its range."""
+RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling accepted without being told to
 
 
 @dataclass(kw_only=True)
 class RowCounts:
-    """Lines and rows of a file; once it is read ``rows_in == rows_out + sum(dropped.values())``.
-
-    ``first_dropped`` names for each reason the first place where it happened; ``columns`` are those of the
-    file, ``first_stamp`` that which its times count from.
-    """
+    """Lines and rows of a file; once it is read ``rows_in == rows_out + sum(dropped.values())``."""
 
     lines: int = 0
     comments: int = 0
@@ -35,9 +29,9 @@ class RowCounts:
     rows_in: int = 0
     rows_out: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
-    first_dropped: dict[str, str] = field(default_factory=dict)
-    columns: tuple[str, ...] = field(default=(), repr=False)
-    first_stamp: datetime | None = field(default=None, repr=False)
+    first_dropped: dict[str, str] = field(default_factory=dict)  # where each reason was met first
+    columns: tuple[str, ...] = field(default=(), repr=False)  # of the file
+    first_stamp: datetime | None = field(default=None, repr=False)  # that its times count from
 
     def drop(self, reason: str, where: str, count: int = 1) -> None:
         """Count rows that are left out, and where the first of them was."""
@@ -52,15 +46,12 @@ class RowCounts:
 
 @dataclass(frozen=True, kw_only=True)
 class InputColumn:
-    """One column of a file: the signal that it became (empty: none), the unit that was read, and a note.
-
-    The note tells why a column was left out, or what was done to it beside the conversion of its unit.
-    """
+    """One column of a file."""
 
     column: str
-    signal: str = ""
-    unit: str = ""
-    note: str = ""
+    signal: str = ""  # that it became; empty: none
+    unit: str = ""  # that was read
+    note: str = ""  # why it was left out, or what was done to it beside the conversion of its unit
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,3 +186,28 @@ def prepared(record: Record) -> Record:
 def period_of(record: Record) -> float:
     """The period, rounded to a whole number of ns past the rounding of the record's times."""
     return float(round(float(np.mean(np.diff(record.time_s))) * 1e9) * 1e-9)
+
+
+def stretches(marked: Mask) -> list[tuple[int, int]]:
+    """Where marked rows follow each other: the first, and the one after the last.
+
+    Examples
+    --------
+    >>> stretches(np.array([True, False, False, True, True]))
+    [(0, 1), (3, 5)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], marked.astype(np.int8), [0]]))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def longest(marked: Mask) -> tuple[int, int]:
+    """The longest such stretch, the first of equal ones; an empty one where nothing is marked."""
+    return max(stretches(marked), key=lambda one: one[1] - one[0], default=(0, 0))
+
+
+def lasting(marked: Mask, least: int) -> Mask:
+    """Marked rows, but for those of stretches shorter than ``least``."""
+    out = np.zeros(len(marked), dtype=bool)
+    for start, stop in stretches(marked):
+        out[start:stop] = stop - start >= least
+    return out

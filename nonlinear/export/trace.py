@@ -163,12 +163,8 @@ class Traced:
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """One numeric key of a design as a parameter.
+    """One numeric key of a design as a parameter, in SI; ``whole``: a count.
 
-    ``path``: dotted path.
-    ``value``, ``low``, ``high``: SI.
-    ``unit``: SI unit; ``"1"``: none.
-    ``whole``: a count.
     ``fixed``: only before the run begins, because the state's shape or clock depends on it.
     """
 

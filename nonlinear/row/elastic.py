@@ -17,10 +17,7 @@ def put_drive_train(design: Design, row: Floats, *, friction_on: bool = True) ->
     ``friction_on = False`` leaves out dry friction and offset of the load, and the whole friction map; the
     viscous friction stays, so that the plant in contact is linear.
 
-    Raises
-    ------
-    InputError
-        For the tanh law, a breakaway ratio below 1, or too many points of a friction map.
+    Raises `InputError`: for the tanh law, a breakaway ratio below 1, or too many points of a friction map.
     """
     if not is_elastic(design):
         return

@@ -33,10 +33,8 @@ def tustin(b: Polynomial, a: Polynomial, w0: Any, period_s: Any) -> Section:
 def section(item: Filter, period_s: Any, where: str = "") -> Section:
     """The section of one filter of the velocity loop at its period.
 
-    Raises
-    ------
-    InputError
-        For a missing value, a frequency at or above pi/T, or a biquad that does not fit or is unstable.
+    Raises `InputError`: for a missing value, a frequency at or above pi/T, or a biquad that does not fit or
+    is unstable.
 
     Examples
     --------

@@ -57,28 +57,14 @@ def design_rows(
 ) -> Floats:
     """Parameters of the plant, the controllers and the limits of a design, at rest, without command or load.
 
-    Parameters
-    ----------
-    design : Design
-        One design, or one stacked over ``count``: with arrays of shape (count,) for some of its numbers
-        (`actuator_lti.design.access.stacked`); which stages there are is the same in all.
-    friction_on : bool
-        ``False`` leaves out the dry friction (C0, CM) and the offset torque; viscous friction stays, so that
-        the drive without limits is a linear loop.
-    limits_on : bool
-        ``False`` takes speed, acceleration, peak current and voltage as unlimited.
-    kind : type
-        ``object`` keeps values that are no floats as they are; `nonlinear.export` follows a design's keys so.
+    Shape (count, layout.SIZE), SI, motor side; the places are the names of ``nonlinear._kernels.layout``. One
+    design, or one stacked over ``count``: with arrays of shape (count,) for some of its numbers
+    (`actuator_lti.design.access.stacked`); which stages there are is the same in all. ``friction_on = False``
+    leaves out the dry friction (C0, CM) and the offset torque; viscous friction stays, so that the drive
+    without limits is a linear loop. ``limits_on = False`` takes speed, acceleration, peak current and voltage
+    as unlimited. ``kind``: ``object`` keeps values that are no floats; `nonlinear.export` follows keys so.
 
-    Returns
-    -------
-    ndarray, shape (count, layout.SIZE)
-        SI, motor side; the places are the names of ``nonlinear._kernels.layout``.
-
-    Raises
-    ------
-    InputError
-        If the stages of the design do not fit together.
+    Raises `InputError`: if the stages of the design do not fit together.
     """
     rows: Floats = np.zeros((count, at.SIZE), dtype=kind)
     row = rows.T  # a place of it is a column

@@ -209,7 +209,7 @@ def _load(row: Floats, history: Floats) -> Floats | None:
     return history[-1] if row[at.VARYING_LOAD].any() else np.broadcast_to(row[at.LOAD], history.shape[1])
 
 
-def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, LimitUse]:
+def limit_uses(row: Floats, out: Floats, axis: Axis) -> dict[str, LimitUse]:
     """How long each limiter of the drive acted."""
     uses = {}
     for k, (name, limiter) in enumerate(LIMITERS.items()):
@@ -218,23 +218,19 @@ def limit_uses(row: Floats, out: Floats, axis: Axis = "rotary") -> dict[str, Lim
             limit, unit = float(row[at.VOLTAGE_LIMIT]), "V"
         if not (row[SWITCHES[name]] if name in SWITCHES else limiter.always or limit < inf):
             continue
-        first = out[at.OUT_LIMIT_FIRST + k]
-        uses[name] = LimitUse(
-            limit=limit,
-            unit=unit,
-            fraction=float(out[at.OUT_LIMIT_TICKS + k] / max(out[at.OUT_TICKS], 1.0)),
-            first_time_s=None if first < 0 else float(first * row[at.PERIOD]),
-        )
+        first, share = out[at.OUT_LIMIT_FIRST + k], out[at.OUT_LIMIT_TICKS + k] / max(out[at.OUT_TICKS], 1.0)
+        time_s = None if first < 0 else float(first * row[at.PERIOD])
+        uses[name] = LimitUse(limit=limit, unit=unit, fraction=float(share), first_time_s=time_s)
     return uses
 
 
 def final_state(row: Floats, s: Floats) -> State:
     """State after the last tick, of the numbers that a run leaves of it."""
-    angle, speed = (
-        (float(s[at.S_OUTPUT]), float(s[at.S_OUTPUT_SPEED])) if row[at.ELASTIC_DRIVE] else (None, None)
-    )
-    numbers: dict[str, Any] = {name: float(s[place]) for name, (_, place) in STATE_PLACES.items()}
-    return State(output_angle_rad=angle, output_speed_rad_s=speed, **numbers)
+    places = {name: place for name, (_, place) in STATE_PLACES.items()}
+    if row[at.ELASTIC_DRIVE]:
+        places |= {"output_angle_rad": at.S_OUTPUT, "output_speed_rad_s": at.S_OUTPUT_SPEED}
+    numbers: dict[str, Any] = {name: float(s[place]) for name, place in places.items()}
+    return State(**numbers)
 
 
 def energy_of(row: Floats, s: Floats, twist_rad: float) -> Energy:

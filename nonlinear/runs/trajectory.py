@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -35,23 +35,15 @@ COMMANDED: dict[Stage, str] = {
 }
 """The column of the command, by the stage that takes it."""
 COMMAND_UNITS: dict[tuple[Axis, Stage], tuple[str, float]] = {
-    ("rotary", "position"): ("deg", 180.0 / np.pi),
-    ("linear", "position"): ("mm", 1e3),
-    ("rotary", "velocity"): ("deg/s", 180.0 / np.pi),
-    ("linear", "velocity"): ("mm/s", 1e3),
-    ("rotary", "current"): ("A", 1.0),
-    ("linear", "current"): ("A", 1.0),
-    ("rotary", "voltage"): ("V", 1.0),
-    ("linear", "voltage"): ("V", 1.0),
-}
+    ("rotary", "position"): ("deg", 180.0 / np.pi), ("linear", "position"): ("mm", 1e3),
+    ("rotary", "velocity"): ("deg/s", 180.0 / np.pi), ("linear", "velocity"): ("mm/s", 1e3),
+    ("rotary", "current"): ("A", 1.0), ("linear", "current"): ("A", 1.0),
+    ("rotary", "voltage"): ("V", 1.0), ("linear", "voltage"): ("V", 1.0),
+}  # fmt: skip
 """The unit in which a command is given and shown, and what one SI unit is in it."""
 Status = Literal["ok", "too many events", "not finite", "cancelled"]
-STATUS: dict[int, Status] = {
-    at.OK: "ok",
-    at.TOO_MANY_EVENTS: "too many events",
-    at.NOT_FINITE: "not finite",
-    at.CANCELLED: "cancelled",
-}
+_CODES = (at.OK, at.TOO_MANY_EVENTS, at.NOT_FINITE, at.CANCELLED)
+STATUS: dict[int, Status] = dict(zip(_CODES, get_args(Status), strict=True))
 ADVICE: dict[Status, str] = {
     "ok": "",
     "too many events": "the speed crosses zero too often in one tick: check the friction and the tick, or "

@@ -98,17 +98,10 @@ class Rest:
 def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     """Follow a drive from its present state until it is known what it ends in.
 
-    Parameters
-    ----------
-    running : Running
-        Of a run (``run.running``) or of `nonlinear.Rows.running`; it is not changed.
-    most_work : int
-        Bound on the work, in ticks and integration steps within them; it ends with the part that passes it.
-
-    Returns
-    -------
-    Rest or None
-        ``None`` where command, load or supply still change of themselves. Noise is left out: it is no cycle.
+    ``running`` is that of a run (``run.running``) or of `nonlinear.Rows.running`, and is not changed.
+    ``most_work`` bounds the work, in ticks and integration steps within them; it ends with the part that
+    passes it. None where command, load or supply still change of themselves. Noise is left out: it is no
+    cycle.
 
     Examples
     --------
@@ -123,10 +116,7 @@ def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
 def first_motion_s(running: Running) -> float:
     """Time after which the motor first moves from where it is; inf: never, as far as the work goes.
 
-    Raises
-    ------
-    InputError
-        Where command, load or supply still change of themselves.
+    Raises `InputError`: where command, load or supply still change of themselves.
     """
     drive = running.held()
     if drive is None:

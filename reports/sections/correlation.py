@@ -1,18 +1,10 @@
 """The model against records: figures of likeness, and pictures of both with the difference."""
 
-from collections.abc import Sequence
+from dataclasses import replace
 
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
-from analyses.correlation.run import (
-    BESIDE,
-    Correlation,
-    SignalSummary,
-    agrees,
-    moves_alike,
-    summarise,
-    worst_of,
-)
+from analyses.correlation.run import BESIDE, Correlation, SignalSummary, moves_alike, worst_of
 from analyses.records.naming import MEANINGS
 from reports import document as doc
 from reports.charts import style
@@ -27,7 +19,8 @@ def _named(signal: str) -> str:
     return NAMES.get(signal, signal)
 
 
-def _of_record(result: CorrelationResult, number: int, error_limit: float) -> doc.Section:
+def _of_record(alone: Correlation, number: int) -> doc.Section:
+    (result,) = alone.records
     active = [(name, 100.0 * share) for name, share in result.limits.items() if share > 0.0]
     limits = ", ".join(f"{name} {share:.1f} % of the time" for name, share in active) or "none"
     intro = f"Model {result.design} with the command of {result.record}; {result.counts}."
@@ -40,13 +33,14 @@ def _of_record(result: CorrelationResult, number: int, error_limit: float) -> do
     ]
     return doc.section(
         f"correlation-{number}", f"Model against {result.record}", blocks,
-        result=words([result], error_limit), intro=f"{intro} Limits reached: {limits}.",
-        status="pass" if agrees([result], error_limit) else "fail",
+        result=words(alone), intro=f"{intro} Limits reached: {limits}.",
+        status="pass" if alone.passed else "fail",
     )  # fmt: skip
 
 
-def words(results: Sequence[CorrelationResult], error_limit: float) -> str:
+def words(whole: Correlation) -> str:
     """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
+    results, limit = whole.records, whole.limit
     wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
     parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
@@ -62,9 +56,9 @@ def words(results: Sequence[CorrelationResult], error_limit: float) -> str:
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
     far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
-    beyond = far.share_of_motion > error_limit
+    beyond = far.share_of_motion > limit
     side = "Above" if beyond else "Within"
-    parts.append(f"{side} the limit of {100.0 * error_limit:g} %: {_named(far.name).lower()} {_share(far)}.")
+    parts.append(f"{side} the limit of {100.0 * limit:g} %: {_named(far.name).lower()} {_share(far)}.")
     if not (wrong or beyond or apart):
         parts.append("No record contradicts itself or the design.")
     return " ".join(parts)
@@ -74,9 +68,10 @@ def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
 
 
-def _summary(results: Sequence[CorrelationResult], error_limit: float) -> doc.Section:
+def _summary(whole: Correlation) -> doc.Section:
+    results = whole.records
     rows: list[tuple[str, SignalComparison | SignalSummary]] = []
-    for name, one in summarise(results).items():
+    for name, one in whole.summary.items():
         rows += [(result.record, result[name]) for result in results if name in result.signals]
         rows.append((f"all {one.records}; worst: {one.worst}", one))
     columns = [
@@ -95,11 +90,9 @@ def _summary(results: Sequence[CorrelationResult], error_limit: float) -> doc.Se
     result, signal = worst_of(results)
     figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."
-    status: doc.Status = "pass" if agrees(results, error_limit) else "fail"
-    return doc.section(
-        "correlation", "All records", [table, figure],
-        result=words(results, error_limit), intro=intro, status=status,
-    )  # fmt: skip
+    status: doc.Status = "pass" if whole.passed else "fail"
+    parts = [table, figure]
+    return doc.section("correlation", "All records", parts, result=words(whole), intro=intro, status=status)
 
 
 def comparison_table(result: CorrelationResult) -> doc.Block:
@@ -141,5 +134,5 @@ def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
 
 
 def section(result: Correlation) -> list[doc.Section]:
-    made = [_of_record(one, k, result.limit) for k, one in enumerate(result.records, 1)]
-    return [_summary(result.records, result.limit), *made] if len(made) > 1 else made
+    made = [_of_record(replace(result, records=(one,)), k) for k, one in enumerate(result.records, 1)]
+    return [_summary(result), *made] if len(made) > 1 else made

@@ -133,13 +133,14 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
     return float(low * (high / low) ** part)
 
 
-PALETTE = (style.BLUE, style.ORANGE, style.GREEN, style.RED, style.SKY, style.INK, style.MUTED)
+_LAST = (style.RED, style.SKY, style.INK, style.MUTED, style.BROWN, style.PURPLE)
+PALETTE = (style.BLUE, style.ORANGE, style.GREEN, *_LAST)
 LINES = {name: k for k, name in enumerate((*LIMITERS, "cogging"))}
 COLOURS = {"friction": style.BROWN, "stiction": style.PURPLE, "other": style.MUTED}
-COLOURS |= {name: PALETTE[k % len(PALETTE)] for name, k in LINES.items()}
+COLOURS |= {name: PALETTE[k] for name, k in LINES.items()}
 COGGING = "cogging (the motor turned by a tenth of its period)"
 WORDS = {"friction": "dry friction", "stiction": "stiction", "none": "linear"}
-WORDS |= {"other": "play, gravity or counts"} | {name: one.words for name, one in LIMITERS.items()}
+WORDS |= {"other": "play, gravity, cogging or counts"} | {name: one.words for name, one in LIMITERS.items()}
 GLYPHS: dict[str, style.Style] = {
     "triangle": {"marker": "^", "size": 5.0},
     "parabola": {"marker": "o", "size": 4.8, "hollow": True},
@@ -148,6 +149,7 @@ GLYPHS: dict[str, style.Style] = {
     "no motion": {"marker": "x", "size": 4.8},
     "not steady": {"marker": "2", "size": 6.0},
 }
+NAMED = 0.015  # of the map: a region with its cause in it
 EVERY = 2  # a glyph in every second column
 
 
@@ -174,7 +176,7 @@ def map_chart(result: LargeSignals, out: Unit) -> style.Chart:
     full = scale * result.design.validation.full_deflection_rad
     panel.rule_y(full, "full\ndeflection", dash=4, width=0.8)
     for k, name in enumerate(CAUSES):
-        if (mask := shown.cause == k).sum() >= 8:
+        if (mask := shown.cause == k).mean() > NAMED:
             row, column = _deepest(mask)
             panel.note(WORDS.get(name, name), (x[column], y[row]), bold=True, over=True)
     return made

@@ -1,15 +1,14 @@
 """Mistakes of all kinds are told in one run: what cannot be read hides no relation that does not need it."""
 
 import copy
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from control import tf
+from test_fuzz import leaves
 
 from actuator_lti import assemble_loops, sweep
 from actuator_lti.design import design_tree, load_design
-from actuator_lti.design.fields import FIELDS, template_of
 from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.writing import _override
 from actuator_lti.errors import InputError, Mistakes
@@ -58,20 +57,6 @@ RELATIONS: list[tuple[dict[str, Any], str, set[str]]] = [
 ]  # fmt: skip
 
 
-def _leaves(tree: Any, path: str = "") -> Iterator[tuple[str, Any, str]]:
-    """Each key of a tree that is a number with a unit or a word of a few: path, its table, its key there."""
-    for key, value in tree.items():
-        here = f"{path}.{key}".lstrip(".")
-        if isinstance(value, list) and all(isinstance(item, dict) for item in value):
-            for number, item in enumerate(value, 1):
-                yield from _leaves(item, f"{here}.{item.get('name', number)}")
-        elif (field := FIELDS.get(template_of(here))) is not None:
-            if field.kind in ("quantity", "integer", "choice", "flag") and here != "design.axis":
-                yield here, tree, key
-        elif isinstance(value, dict):
-            yield from _leaves(value, here)
-
-
 def _told(tree: Any) -> set[str]:
     with pytest.raises(InputError) as caught:
         design_from_tree(tree, "my.toml")
@@ -92,9 +77,9 @@ def contradicted() -> Any:
 
 @pytest.mark.parametrize("manner", ["unreadable", "misspelled"])
 def test_what_is_not_read_hides_what_needs_it_and_nothing_else(contradicted: Any, manner: str) -> None:
-    for path, *_ in _leaves(contradicted):
+    for path, *_ in leaves(contradicted):
         tree = copy.deepcopy(contradicted)
-        _, table, key = next(leaf for leaf in _leaves(tree) if leaf[0] == path)
+        _, table, key = next(leaf for leaf in leaves(tree) if leaf[0] == path)
         wrong = key if manner == "unreadable" else f"{key}{key[-1]}"
         table[wrong] = table.pop(key) if manner == "misspelled" else [{}]
         others = {relation for _, relation, needs in RELATIONS if path not in needs}

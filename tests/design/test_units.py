@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti.design import read_design_text
 from actuator_lti.design.units import parse_quantity, parse_unit
-from actuator_lti.errors import InputError
+from tests.refusals import mistakes, refused
 
 OZ, LB, INCH, G = 0.45359237 / 16, 0.45359237, 0.0254, 9.80665
 NO_BREAK = "12\u202f345\u202f678 s"
@@ -26,6 +26,11 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("kg*m^2", 1.18e-4, ("1.18 kg-m² ×10⁻⁴", "1.18 kgm2 10-4")),
     ("kg*m^2", 3e-5, ("3×10^-5 kg m²", "3 x 10⁻⁵ kg m2", "300 kgm2*1e-7")),
     ("kg*m^2", 5e-6, ("5.0 E-6 kg.m2",)),
+    ("kg*m^2", 9e-7, ("9 gm-cm^2", "9 gm·cm²", "9 gm cm2")),
+    ("kg", 0.42, ("420 gm",)),
+    ("N*m", 5e-5 * G, ("5 gm-cm", "5 g-cm", "5 gf-cm")),
+    ("N", 4e-4, ("40 dyne", "40 dyn")),
+    ("N*m", 5e-3, ("5e4 dyne-cm",)),
     ("kg", 3.0, ("3 kilograms",)),
     ("kg", 150 * LB, ("150 lbm",)),
     ("m", 4 * 25.4e-6, ("4 mils",)),
@@ -167,6 +172,10 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("1,000 rpm", "rad/s", 'write "1000 rpm" or "1.000 rpm"'),
         ("2,621,440 counts", "1", 'write "2621440 counts"'),
         ("100-120 V", "V", "a range; write one number"),
+        ("1.5 Ts", "s", "a time is so many of that period"),
+        ("3 Ms", "s", 'nearest known: "ms"'),
+        ("3 Mm", "m", 'nearest known: "mm"'),
+        ("1,234.5 rpm", "rad/s", 'write "1234.5 rpm";'),
         ("2 ticks", "s", "of control.period"),
         ("1 period", "s", "of control.period"),
         ("(20 ± 1) kgcm²", "kg*m^2", 'write "20 kgcm²"; "± 1 kgcm²" is one for tolerance = "5 %"'),
@@ -188,13 +197,11 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("3 V" + "*V" * 40, "V", "not a unit"),
         ("3 " + "(V)" * 30, "V", "wrong dimension"),  # at once, not in 2^30 steps
         *[(text, "V*s/rad", "unit") for text in ("1 mkg", "1 kkg", "3 ^2", "3 )V", "3 (V", "3 *V", "3 ()")],
-        *[(f"1 {'*'.join([unit] * 5)}", "m", "range of floats") for unit in ("Tm^6", "pm^6")],
+        *[(f"1 {'*'.join([unit] * 5)}", "m", "range of floats") for unit in ("TV^6", "pm^6")],
     ],
 )
 def test_what_is_no_quantity_is_refused_with_the_unit_wanted(text: object, unit: str, says: str) -> None:
-    with pytest.raises(InputError, match="allowed: ") as caught:
-        parse_quantity(text, unit)
-    assert says in str(caught.value)
+    refused(parse_quantity, text, unit, words=("allowed: ", says))
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -290,10 +297,9 @@ def test_a_lead_may_be_per_revolution_and_a_wrong_one_is_one_mistake() -> None:
     per_turn = read_design_text(TEXT.replace(lead, 'lead = "10 mm/rev"'))
     assert per_turn.inertia_kgm2 == read_design_text(TEXT).inertia_kgm2
     for wrong in ('lead = "10 rad"', 'lead = "0 mm"', "pitch = 3"):
-        with pytest.raises(InputError) as refused:
-            read_design_text(TEXT.replace(lead, wrong))
-        assert "screw." in str(refused.value)
-        assert "wrong dimension" not in str(refused.value).replace('screw.lead = "10 rad": wrong dim', "")
+        said = mistakes(TEXT.replace(lead, wrong))
+        assert "screw." in said
+        assert "wrong dimension" not in said.replace('screw.lead = "10 rad": wrong dim', "")
 
 
 @pytest.mark.parametrize(
@@ -306,5 +312,4 @@ def test_a_lead_may_be_per_revolution_and_a_wrong_one_is_one_mistake() -> None:
     ],
 )
 def test_refused(old: str, new: str, words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        read_design_text(TEXT.replace(old, new, 1))
+    assert words in mistakes(TEXT.replace(old, new, 1))

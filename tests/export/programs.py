@@ -1,9 +1,11 @@
-"""Compilers and hosts that tests of exports run."""
+"""Compilers, hosts and statements that tests of exports run."""
 
 import json
+import math
+import re
 import shutil
 import subprocess
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,3 +38,27 @@ def in_node(script: str, folder: Path, **given: Any) -> Any:
 def in_json(row: Iterable[float]) -> list[float | str]:
     """Numbers as JSON has them: infinity is a text."""
     return [float(x) if np.isfinite(x) else str(x).replace("inf", "Infinity") for x in row]
+
+
+_KNOWN: dict[str, Any] = {
+    **vars(math), "INFINITY": math.inf, "NAN": math.nan, "fabs": abs, "pow": pow,
+    "where": lambda condition, yes, no: yes if condition else no,
+}  # fmt: skip
+
+
+def executed(lines: Sequence[str], keys: Sequence[float]) -> dict[int, float] | None:
+    """What statements in C, from keys to a row, store by its place; None where a condition ends them."""
+    stored: dict[int, float] = {}
+    scope = {**_KNOWN, "k": keys}
+    for line in lines:
+        text = line.replace("&&", "and").replace("||", "or")
+        if made := re.fullmatch(r"const double (v\d+) = (.*);", text):
+            scope[made[1]] = eval(made[2], scope)
+        elif kept := re.fullmatch(r"p\[(\d+)\] = (.*);", text):
+            stored[int(kept[1])] = float(eval(kept[2], scope))
+        else:
+            condition = re.fullmatch(r"if \((!?)\((.*)\)\) \{ return 0; \}", text)
+            assert condition is not None, line
+            if bool(eval(condition[2], scope)) is (condition[1] == ""):
+                return None
+    return stored

@@ -1,6 +1,9 @@
-"""What an export refuses: one line, status 2, nothing half-written."""
+"""What an export refuses: one line, status 2, nothing half-written; and the line while one waits for it."""
 
+import io
 import re
+import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,6 +14,7 @@ import actuator_lti.compiled.compiler as build
 from actuator_lti import load_design
 from actuator_lti.design.loader import design_text
 from nonlinear.export import c_export
+from reports.cli import output as waiting
 
 NOISY = design_text("ilr33-amber") + '[instruments]\ncurrent_noise = "0.1 A"\n'
 FILES = {"c emps --no-check": "main.c", "linear emps": "a.json", "fmu emps": "d.fmu"}
@@ -89,3 +93,33 @@ def test_no_name_ends_a_comment_or_turns_the_code_round() -> None:
         assert "evil" in texts[name]
         assert "evil" not in code
         assert "*/" not in code
+
+
+class Stream(io.StringIO):
+    """Standard error of a terminal or of a log; says when something was written."""
+
+    def __init__(self, terminal: bool) -> None:
+        super().__init__()
+        self.terminal, self.written = terminal, threading.Event()
+
+    def isatty(self) -> bool:
+        return self.terminal
+
+    def flush(self) -> None:
+        super().flush()
+        if self.getvalue():
+            self.written.set()
+
+
+@pytest.mark.parametrize(
+    ("terminal", "after_s", "said"), [(True, 0.0, "the kettle boils\n"), (True, 1e3, ""), (False, 0.0, "")]
+)
+def test_a_wait_is_told_once_on_a_terminal(terminal: bool, after_s: float, said: str, monkeypatch) -> None:
+    stream = Stream(terminal)
+    monkeypatch.setattr(sys, "stderr", stream)
+    monkeypatch.setattr(waiting, "_told", set())
+    for wait_s in (10.0 if said else 0.0, 0.2):
+        stream.written.clear()
+        with waiting.told_if_slow("the kettle boils", after_s):
+            assert stream.written.wait(wait_s) is (wait_s > 1.0)
+    assert stream.getvalue() == said

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from executed import executed
 from fmu_host import fmpy, hosted, needs_compiler, written
+from programs import executed
 
 from actuator_lti.compiled.compiler import compile_files, zig_command
 from actuator_lti.design import Design, load_design, parameter_value, paths_of, with_values

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from executed import executed
+from programs import executed
 from scipy.io import loadmat
 
 from actuator_lti import assemble_loops, load_design, stability_margins

@@ -9,6 +9,7 @@ from actuator_lti import assemble_loops, load_design
 from actuator_lti.design.law import LAW_INPUTS, LAW_WORDS, Law
 from actuator_lti.design.model import Command, Design, Encoder, Instruments, Limits, OutputEncoder
 from actuator_lti.loops.tick import compose
+from nonlinear import Rows, Trajectory
 from tests.changed import changed
 
 SIZES = {"command": 1.0, "error": 1.0, "speed": 1e-3, "angle": 0.1, "current": 1e-2, "output_angle": 0.1,
@@ -17,13 +18,9 @@ STAGES = ("current", "velocity", "position")
 BASES = ("ilr33-amber-multirate", "joint", "emps", "ilr33-amber")
 
 
-def period_s(design: Design, stage: str) -> float:
-    return design.controller.period_s * getattr(getattr(design.controller, stage), "every", 1)
-
-
 def as_law(design: Design, stage: str, **settings: Any) -> Design:
     """The drive with the PI of a stage (its position P) written as a law of one's own on the error."""
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    loop, T = getattr(design.controller, stage), design.controller.period_of(stage)
     gain = loop.gain_V_A if stage == "current" else loop.gain
     if loop.integral_time_s is None:
         return design.with_law(stage, ([], [], [], [[gain]], T), ["error"], **settings)
@@ -41,6 +38,14 @@ def linear(design: Design) -> Design:
     parts |= {"coupling": design.coupling and {"play_rad": 0.0}}
     parts |= {"controller": {"position": design.controller.position and {"friction_feedforward": 0.0}}}
     return changed(design, command=Command(), instruments=Instruments(), **parts)
+
+
+def stepped(design: Design, ticks: int, size: float, **settings: Any) -> Trajectory:
+    """A run of the drive under a step of its command."""
+    rows = Rows.of(design, **settings)
+    rows["ticks"] = ticks
+    rows.step("command", size)
+    return rows.trajectory()
 
 
 def radius(design: Design) -> float:
@@ -76,7 +81,7 @@ def random_law(
     scale = np.array([SIZES[name] for name in inputs]) * (loop.gain_V_A if stage == "current" else loop.gain)
     settings = {"L": 0.1 * rng.standard_normal(n) if n else (), "gain": rng.uniform(0.5, 2.0)}
     for _ in range(60):
-        made = (A, B * size * scale, C, D * size * scale, period_s(design, stage))
+        made = (A, B * size * scale, C, D * size * scale, design.controller.period_of(stage))
         result = design.with_law(stage, made, inputs, **settings)
         if not stable or radius(result) < 1.0 + 1e-6:
             return result
@@ -92,7 +97,7 @@ def drawn(case: int, stable: bool = False) -> tuple[Design, str] | None:
     if getattr(design.controller, stage) is None:
         return None
     if rng.random() < 0.5 and design.controller.velocity is not None:
-        tracking = Encoder(speed="tracking", bandwidth_rad_s=0.3 / period_s(design, "velocity"))
+        tracking = Encoder(speed="tracking", bandwidth_rad_s=0.3 / design.controller.period_of("velocity"))
         counted = Encoder(speed="difference", difference_samples=3)
         design = replace(design, encoder=(tracking, counted)[int(rng.integers(2))])
     return random_law(rng, design, stage, stable=stable, words=LAW_WORDS), stage

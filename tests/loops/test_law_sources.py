@@ -8,7 +8,6 @@ import control
 import numpy as np
 import pytest
 import scipy.signal
-from own_laws import period_s
 from scipy.io import savemat
 from scipy.sparse import csc_matrix
 from test_own_law import refused
@@ -19,7 +18,7 @@ from actuator_lti.design.law import Law
 from actuator_lti.files.mat5 import read_mat5
 
 BASE = load_design("ilr33-amber-multirate")
-T = period_s(BASE, "velocity")
+T = BASE.controller.period_of("velocity")
 A, B, C, D = (
     np.array(one) for one in ([[0.5, 0.1], [0, 0.9]], [[1e-3, 0], [0, 1e-4]], [[1, 0.5]], [[0.1, 0]])
 )
@@ -58,6 +57,15 @@ NAMES = f"inputs = {INPUTS}"
 )
 def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) -> None:
     assert read(tmp_path, held, beside).controller == WANTED
+
+
+def test_an_unknown_key_is_named_where_a_law_is_all_that_is_held(tmp_path: Path) -> None:
+    one = {key: np.asarray(value).tolist() for key, value in PARTS.items()}
+    for held in (json.dumps({**one, "gains": 2}), json.dumps({"K": {**one, "gains": 2}})):
+        said = refused(read, tmp_path, held, NAMES)
+        assert 'k.json": "gains": unknown key (nearest known: "gain"); allowed: a file of one law' in said
+    assert '"l", "state"' in refused(read, tmp_path, {"K": PARTS | {"l": L, "state": 1.0}}, NAMES)
+    assert read(tmp_path, PARTS | {"L": L, "plant": 2.0}, NAMES).controller == WANTED  # of a workspace
 
 
 def test_its_gain_is_taken(tmp_path: Path) -> None:
@@ -150,7 +158,7 @@ def test_a_product_of_transfer_functions_is_a_law(form: Any) -> None:
 
 def test_sampling_keeps_what_a_long_filter_leaves() -> None:
     """Six lags of 30 rad/s: 1e-12 of the gain at rest is left far above them, and it is right."""
-    s, T_p = control.tf("s"), period_s(BASE, "position")
+    s, T_p = control.tf("s"), BASE.controller.period_of("position")
     K = np.prod([1 / (s / (30.0 + 10 * k) + 1) for k in range(6)])
     law = BASE.with_law("position", K, ["error"], method="tustin").controller.position.law
     p = 1j * np.geomspace(1.0, 3000.0, 30)

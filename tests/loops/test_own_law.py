@@ -12,7 +12,7 @@ import pytest
 import scipy.signal
 import tomli_w
 from loop_designs import controlled
-from own_laws import PlainLaw, as_law, drawn, linear, period_s
+from own_laws import PlainLaw, as_law, drawn, linear, stepped
 from scipy.io import savemat
 
 from actuator_lti import InputError, assemble_loops, load_design, stability_margins
@@ -99,7 +99,7 @@ def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
 def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
     """The same margins from a loop that is cut elsewhere, in every form, and the same run to rounding."""
     design = replace(load_design("ilr33-amber"), encoder=Encoder())  # a law takes counted angles
-    loop, T = getattr(design.controller, stage), period_s(design, stage)
+    loop, T = getattr(design.controller, stage), design.controller.period_of(stage)
     gain = loop.gain_V_A if stage == "current" else loop.gain
     rate = None if loop.integral_time_s is None else gain / loop.integral_time_s
     same = ([], [], [], [[gain]]) if rate is None else ([[0.0]], [[rate]], [[1.0]], [[gain]])
@@ -114,12 +114,7 @@ def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
     for one, two in zip(*(stability_margins(getattr(assemble_loops(each), stage).open_loop).gain_margins
                           for each in (mine, design)), strict=True):  # fmt: skip
         assert one.ratio == pytest.approx(two.ratio, rel=1e-9)
-    runs = []
-    for each in (mine, design):
-        rows = Rows.of(each, limits_on=False)
-        rows["ticks"] = 2000
-        rows.step("command", 0.01)
-        runs.append(rows.trajectory().output_angle_rad)
+    runs = [stepped(each, 2000, 0.01, limits_on=False).output_angle_rad for each in (mine, design)]
     np.testing.assert_allclose(runs[0], runs[1], rtol=0, atol=1e-9 * 0.01)
 
 
@@ -153,7 +148,7 @@ def test_what_a_law_sees_and_how_it_is_limited() -> None:
     for stage, size in (("current", 0.1), ("velocity", 0.1), ("position", 1.0)):
         rng = np.random.default_rng(7)
         A, B, C, D = (rng.standard_normal(shape) for shape in ((3, 3), (3, 7), (1, 3), (1, 7)))
-        T = period_s(base, stage)
+        T = base.controller.period_of(stage)
         system, L = (0.4 * A, B, size * C, size * D, T), [0.3, -0.1, 0.2]
         design = base.with_law(stage, system, inputs, L=L, gain=0.7)
         control_, drive = design.controller, Drive(design)
@@ -196,7 +191,7 @@ def _with_file(design: Design, name: str, folder: Path) -> None:
 
 def test_every_source_gives_the_same_law(tmp_path: Path) -> None:
     base = load_design("ilr33-amber-multirate")
-    T = period_s(base, "velocity")
+    T = base.controller.period_of("velocity")
     A, B, C, D = [[0.5, 0.1], [0.0, 0.9]], [[1e-3, 0.0], [2e-3, 1e-4]], [[1.0, 0.5]], [[0.1, -1e-3]]
     inputs = ["error", "speed"]
     want = base.with_law("velocity", (A, B, C, D, T), inputs)
@@ -300,7 +295,10 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
         words = f'.frequency = "{bad} rad/s": must be finite; allowed: a number with a unit like rad/s'
         assert words in refused(lambda: base.add_filter("velocity", **{**notch, "frequency": bad}))  # noqa: B023
     assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
-    assert "without encoder.filter_time" in refused(twice.with_values, {"encoder.filter_time": "1 ms"})
+    beside = "encoder.filter_time = 0.001 s: not allowed beside control.velocity.law, which may have it"
+    assert refused(twice.with_values, {"encoder.filter_time": "1 ms"}).endswith(beside)
+    speed = base.with_law("velocity", ([[0.5]], [[1.0, 0.0]], [[1.0]], [[1.0, 0.0]], T), ["error", "speed"])
+    assert "without encoder.filter_time" in refused(speed.with_values, {"encoder.filter_time": "1 ms"})
     force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)
     assert "without a coupling" in made(unit, ["twist"])
     assert "no current" in refused(force.with_law, "position", slow, ["current"])

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from loop_designs import controlled
-from own_laws import as_law, linear, period_s
+from own_laws import as_law, linear, stepped
 from scipy.linalg import solve_discrete_are
 from scipy.signal import place_poles
 
@@ -19,7 +19,6 @@ from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
 from analyses.tuning.start import rule_gains
-from nonlinear import Rows
 from reports.live.model import live_model
 
 
@@ -43,7 +42,7 @@ def test_lqg_velocity_controller() -> None:
     """Separation: the closed drive has the poles of the regulator and of the observer, by scipy's Riccati."""
     base = replace(linear(load_design("ilr33-amber")), requirements=(), encoder=Encoder())
     base = controlled(base, position=None)
-    system, T = plant(base, command="i_ref"), period_s(base, "velocity")
+    system, T = plant(base, command="i_ref"), base.controller.period_of("velocity")
     seen = [k for k, name in enumerate(system.state_labels) if name != "th"]
     A, B = system.A[np.ix_(seen, seen)], system.B[seen, :1]
     C, n = system.C[system.output_labels.index("speed")][None, seen], len(A)
@@ -58,10 +57,7 @@ def test_lqg_velocity_controller() -> None:
     assert stability_margins(assemble_loops(mine).velocity.open_loop).stable
     # the observer knows what the limit left of its output: a step far into the current limit does not wind up
     limited = replace(mine, limits=replace(load_design("ilr33-amber").limits, speed_rad_s=np.inf))
-    rows = Rows.of(limited)
-    rows["ticks"] = 2500
-    rows.step("command", 600.0 / base.total_ratio)
-    run = rows.trajectory()
+    run = stepped(limited, 2500, 600.0 / base.total_ratio)
     assert run.limits["current"].fraction > 0.01
     assert abs(run.motor_speed_rad_s[-1] / 600.0 - 1.0) < 1e-6
     assert run.motor_speed_rad_s.max() < 1.05 * 600.0
@@ -89,10 +85,8 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     law = ([[-gains["u1"]]], [D], [[-gains["u1"]]], [D], T)  # x is the voltage of the last tick
     mine = base.with_law("position", law, inputs, L=[1.0])
     same_poles(poles(mine), wanted, 1e-7)
-    rows = Rows.of(mine, limits_on=False)
-    rows["ticks"] = int(0.3 / T)
-    rows.step("command", 0.1)
-    assert abs(rows.trajectory().output_angle_rad[-1] - 0.1) < 1e-7
+    run = stepped(mine, int(0.3 / T), 0.1, limits_on=False)
+    assert abs(run.output_angle_rad[-1] - 0.1) < 1e-7
     loop, z = assemble_loops(mine).position, np.exp(1j * np.geomspace(1e-3, 3.0, 50))
     bare = np.where(np.arange(6) == 5, 0.0, K)  # its own output it remembers: no loop is cut
     theirs = np.array([(bare @ np.linalg.solve(one * np.eye(6) - A, B)).item() for one in z])
@@ -102,12 +96,8 @@ def test_state_feedback_from_motor_and_load_of_a_joint() -> None:
     D = -np.array([gains["i"], gains["w"], gains["th"], gains["W"] * N_r, gains["twist"], -gains["th"]])
     law = ([[-gains["u1"]]], [D], [[-gains["u1"]]], [D], T)
     same_poles(poles(base.with_law("position", law, inputs)), wanted, 1e-7)
-    other = Rows.of(base.with_law("position", law, inputs, L=[1.0]), limits_on=False)
-    other["ticks"] = rows["ticks"]
-    other.step("command", 0.1)
-    np.testing.assert_allclose(
-        other.trajectory().output_angle_rad, rows.trajectory().output_angle_rad, atol=1e-12, rtol=0
-    )
+    other = stepped(base.with_law("position", law, inputs, L=[1.0]), int(0.3 / T), 0.1, limits_on=False)
+    np.testing.assert_allclose(other.output_angle_rad, run.output_angle_rad, atol=1e-12, rtol=0)
 
 
 STAGES = ("current", "velocity", "position")
@@ -118,7 +108,7 @@ def lead(stage: str) -> Design:
     design = load_design("ilr33-amber")
     if stage != "position":
         return as_law(design, stage, L=[0.5])
-    gain, T = design.controller.position.gain, period_s(design, stage)
+    gain, T = design.controller.position.gain, design.controller.period_of(stage)
     return design.with_law(stage, ([[0.5]], [[1.0]], [[-0.25 * gain]], [[1.5 * gain]], T), ["error"])
 
 
@@ -133,7 +123,7 @@ def test_every_prediction_is_met(stage: str) -> None:
 def test_a_law_on_a_counted_output_meets_its_predictions() -> None:
     """With the twist among its signals; what a law does with counts is tested with its limits."""
     base = load_design("joint")
-    gain, T = base.controller.position.gain, period_s(base, "position")
+    gain, T = base.controller.position.gain, base.controller.period_of("position")
     law = ([[0.5]], [[0.1 * gain, 0.2]], [[0.5]], [[0.9 * gain, -3.0]], T)
     rows = validate(base.with_law("position", law, ["error", "twist"])).rows
     assert not [row for row in rows if row.verdict != "met"]
@@ -178,7 +168,7 @@ def test_many_designs_have_the_gain_of_the_law() -> None:
 def test_a_law_without_its_command_leaves_no_loop_around_it() -> None:
     """Fed with the speed alone: the loops outside have no state, and their figures are withheld."""
     design = load_design("ilr33-amber")
-    damped = design.with_law("current", ([], [], [], [[0.02]], period_s(design, "current")), ["speed"])
+    damped = design.with_law("current", ([], [], [], [[0.02]], design.controller.period_s), ["speed"])
     many = linear_figures(Population(damped, {}, 2))
     assert [bool(many.withheld(loop).all()) for loop in STAGES] == [False, True, True]
 
@@ -186,7 +176,7 @@ def test_a_law_without_its_command_leaves_no_loop_around_it() -> None:
 def test_torque_at_rest() -> None:
     """Of a static law the product of the gains; a law that integrates has no end of it."""
     base = controlled(load_design("ilr33-amber"), velocity={"integral_time_s": None})
-    gain, T = base.controller.velocity.gain, period_s(base, "velocity")
+    gain, T = base.controller.velocity.gain, base.controller.period_of("velocity")
     static = base.with_law("velocity", ([[0.5]], [[0.5]], [[0.4 * gain]], [[0.6 * gain]], T), ["error"])
     assert torque_gain_Nm_rad(static) == pytest.approx(torque_gain_Nm_rad(base), rel=1e-12)
     assert torque_gain_Nm_rad(lead("velocity")) == np.inf

@@ -5,10 +5,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from loop_designs import controlled
-from two_mass import drive_d, drive_e
+from loop_designs import controlled, drive_d, drive_e
 
-from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
+from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
@@ -111,33 +110,11 @@ def test_slope_and_describing_function_of_a_friction_map() -> None:
     assert result == pytest.approx(expected, rel=1e-12)
 
 
-SLOW = """
-[design]
-name = "slow"
-[motor]
-rotor_inertia = "1e-3 kg*m^2"
-resistance = "0.6 ohm"
-inductance = "5 mH"
-torque_constant = "0.75 N*m/A"
-back_emf_constant = "0.75 V*s/rad"
-[[gear]]
-name = "g"
-ratio = 1.0
-[load]
-inertia = "1e-4 kg*m^2"
-path = "back-drivable"
-[friction]
-law = "coulomb"
-[encoder]
-speed = "ideal"
-[limits]
-voltage = "24 V"
-[control]
-period = "1 ms"
-computing_delay = "0 s"
-[control.position]
-gain = "1e-5 V/rad"
-"""
+SLOW = {  # the textbook motor, heavy, on almost no gain
+    "motor.rotor_inertia": 1e-3, "motor.resistance": 0.6, "motor.inductance": 5e-3, "load.inertia": 1e-4,
+    "motor.torque_constant": 0.75, "motor.back_emf_constant": 0.75, "friction.viscous": 0.0,
+    "control.position.gain": 1e-5,
+}  # fmt: skip
 AMBER = load_design("ilr33-amber").with_values({"friction.breakaway_ratio": 1.3})
 
 
@@ -186,10 +163,9 @@ def test_static_stiffness_by_hand() -> None:
 
 def test_a_drive_that_creeps_for_hours_has_a_stiffness_and_one_without_position_loop_none() -> None:
     """P on voltage: Kp kM N^2/R, here with a time constant kE kM/R over that of a day."""
-    slow = read_design_text(SLOW)
+    slow = load_design("ctms-motor-position").with_values(SLOW)
     assert drive_figure(slow, "static_stiffness") == pytest.approx(1e-5 * 0.75 / 0.6, rel=1e-6)
-    velocity = SLOW.replace("[control.position]", "[control.velocity]").replace("1e-5 V/", "1e-2 V*s/")
-    free = read_design_text(velocity)
+    free = controlled(slow, position=None, velocity=model.VelocityLoop(gain=1e-2))
     assert drive_figure(free, "static_stiffness") == 0.0
 
 

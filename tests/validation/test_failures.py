@@ -15,10 +15,10 @@ from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _followed_most_hz, cases_of
 from analyses.failures.run import MOST_TICKS, _hold, _settling_s
 from nonlinear import commands, simulate
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections.failures import section, summary
 from tests.changed import changed
-from tests.loops.two_mass import drive_d
+from tests.loops.loop_designs import drive_d
 
 AMBER = load_design("ilr33-amber")
 SLOW = "its output does not get half-way to the stop in 5 s"

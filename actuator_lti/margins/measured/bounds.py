@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_lti.margins.single import between_text
 from actuator_lti.systems.measured_response import at_once
 from actuator_lti.types import Complex, Mask, Real
 
@@ -76,7 +77,7 @@ class Bounds:
     def too_coarse(self, omega: Real) -> str:
         """Where the first of the unresolved intervals lies."""
         k = int(self.unresolved.argmax())
-        return f"too coarse for the damping between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s"
+        return f"too coarse for the damping {between_text(omega[k], omega[k + 1])}"
 
 
 def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:

@@ -14,7 +14,14 @@ from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds, distance_ranges
 from actuator_lti.margins.results import StabilityMargins
-from actuator_lti.margins.single import Agreement, DiskMargin, GainMargin, PhaseMargin
+from actuator_lti.margins.single import (
+    Agreement,
+    DiskMargin,
+    GainMargin,
+    PhaseMargin,
+    between_text,
+    frequency_text,
+)
 from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
 from actuator_lti.types import Complex, Real
 
@@ -111,8 +118,8 @@ def refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
     ratio = L[k + 1] / L[k]
     raise InputError(
         f"measured data are too coarse: {np.count_nonzero(result.unresolved)} of {result.unresolved.size} "
-        f"intervals turn by more than 60 deg or 10 dB, the first between {omega[k]:.6g} and "
-        f"{omega[k + 1]:.6g} rad/s ({np.degrees(np.angle(ratio)):+.1f} deg, "
+        "intervals turn by more than 60 deg or 10 dB, the first "
+        f"{between_text(omega[k], omega[k + 1])} ({np.degrees(np.angle(ratio)):+.1f} deg, "
         f"{20.0 * math.log10(abs(ratio)):+.1f} dB); measure more points"
     )
 
@@ -261,12 +268,12 @@ def _hidden(omega: Real, result: Bounds) -> list[str]:
         if abs(deg) > 140.0:
             what = "a resonance or an antiresonance"
         notes.append(
-            f"between {omega[k]:.6g} and {omega[k + 1]:.6g} rad/s the phase turns by {deg:+.0f} deg: {what} "
-            "lies between these points; the gain there is not known, crossings are not excluded"
+            f"{between_text(omega[k], omega[k + 1])} the phase turns by {deg:+.0f} deg: {what} lies "
+            "between these points; the gain there is not known, crossings are not excluded"
         )
     if places.size > _TOLD:
         notes.append(
-            f"the same in {places.size - _TOLD} more intervals, up to {omega[places[-1] + 1]:.6g} rad/s"
+            f"the same in {places.size - _TOLD} more intervals, up to {frequency_text(omega[places[-1] + 1])}"
         )
     return notes
 
@@ -276,7 +283,8 @@ def _lost(omega: Real, result: Bounds) -> list[str]:
         return []
     first, count = omega[result.lost.argmax()], np.count_nonzero(result.lost)
     return [
-        f"{count} values are smaller than their noise, the first at {first:.6g} rad/s: no gain margin there"
+        f"{count} values are smaller than their noise, the first at {frequency_text(first)}: "
+        "no gain margin there"
     ]
 
 
