@@ -130,8 +130,6 @@ def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
 def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
     """Say a document's verdict in words, a line for each kind.
 
-    Examples
-    --------
     >>> verdict_words({"parts": {"requirements": {"met": 11, "not_met": 1, "not_proven": 0, "waived": 0}}})
     ['11 of 12 requirements met, 1 not met']
     """
@@ -141,8 +139,6 @@ def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
 def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
     """Say a document's verdict in words, each with its colour: what decides it first.
 
-    Examples
-    --------
     >>> verdict_lines({"parts": {}, "failed_sections": ["Missing parts"]})
     [('failed: Missing parts', 'fail')]
     >>> verdict_lines({"parts": {"requirements": {}}})

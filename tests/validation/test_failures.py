@@ -14,7 +14,7 @@ from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _followed_most_hz, cases_of
 from nonlinear import commands, simulate
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections.failures import section, summary
 from tests.changed import changed
 from tests.loops.loop_designs import drive_d
