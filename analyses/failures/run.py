@@ -98,7 +98,10 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
 def _hold(rig: Rig, start: float, wait: int, most: int) -> None:
     """Hold a start until the output stays, over ``wait`` ticks, within `SETTLED` of what it moved in all."""
     for _ in range(0, most, wait):
-        seen = [rig.step(start) and rig.output_rad for _ in range(wait)]
+        seen = list[float]()
+        for _ in range(wait):
+            rig.step(start)
+            seen.append(rig.output_rad)
         if np.ptp(seen) <= SETTLED * abs(seen[-1]):
             return
 
