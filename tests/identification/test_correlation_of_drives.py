@@ -87,6 +87,21 @@ def test_a_record_meets_the_drive_that_made_it(kind: str, tmp_path) -> None:
     assert design is not SLOPED or correlate_record(BASE, record)["current"].relative_error > 0.05
 
 
+@pytest.mark.parametrize("gaps", [(1,), (2,), (1, 1), (1, 2)])
+@pytest.mark.parametrize("phase", [0, 3])
+def test_steps_a_row_or_two_apart_are_those_of_the_drive(gaps: tuple[int, ...], phase: int, tmp_path) -> None:
+    """Rows of five ticks, steps at the row or two ticks before one."""
+    tick, rows = BASE.controller.period_s, 5
+    value, at = np.zeros(2001), np.cumsum((100, *gaps)) * rows + phase
+    for each in at:
+        value[each:] += 0.002
+    run = simulate(BASE, commands.sampled(np.arange(2001) * tick, value), 2000 * tick)
+    columns = {"time_s": run.time_s, **{name: getattr(run, key) for name, key in ROTARY.items()}}
+    table = {name: one[::rows] for name, one in (columns | {"reference [rad]": run.reference_rad}).items()}
+    found = correlate_record(BASE, open_record(write(tmp_path / "r.csv", table, fmt="%.17g")))
+    assert max(signal.relative_error for signal in found.signals.values()) < 1e-9
+
+
 @pytest.mark.parametrize(
     ("column", "key", "stage"),
     [

@@ -21,7 +21,7 @@ from analyses.stiffness import (
     stiffness_at_rest,
     stiffness_curves,
 )
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed
 from tests.loops.loop_designs import drive_d, drive_e
