@@ -2,7 +2,7 @@
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import AS_PREDICTED, LimitCycles
-from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
+from analyses.motion.settling import FROM_THE_LARGEST, Settling, acting, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import Unit, fine_unit, load_unit
 
@@ -72,7 +72,7 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
     def end(one: Settling) -> str:
         stands = one.rest.verdict == "still moving" and not one.swing_rad
         words = "stands still, not known for how long" if stands else one.rest.verdict
-        return words + ", a limit acting" * bool(one.rest.limited)
+        return words + acting(one.rest)
 
     size = fine.column()
     columns = [
