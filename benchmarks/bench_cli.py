@@ -62,8 +62,8 @@ def drawing_rows(quick: bool = False) -> Iterable[Row]:
     """Measure the processor time of the figures and of the page of one report, validation included."""
     from actuator_lti import load_design
     from reports.build import design_report, validation_sections
+    from reports.charts.svg import draw_all
     from reports.document import dumps, figures, loads
-    from reports.drawing import draw_all
     from reports.html import page
 
     design = load_design("ilr33-amber")

@@ -12,6 +12,7 @@ from importlib import import_module
 from inspect import cleandoc
 from typing import TYPE_CHECKING, Any
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.tree import Tree
 from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
@@ -99,8 +100,18 @@ class Analysis:
         return made if isinstance(made, list) else [made]
 
     def of_report(self, design: Design) -> list[Section]:
-        """The sections of a report of a design, as asked for by default."""
-        return self.sections(self.run(design, *self.asked(design, {})))
+        """The sections of a report of a design, as asked for by default; the first has the verdict."""
+        result = self.run(design, *self.asked(design, {}))
+        first, *more = self.sections(result)
+        verdict = self.verdict(result)
+        return [first if verdict is None else {**first, "verdict": verdict.value}, *more]
+
+    @staticmethod
+    def verdict(result: Any) -> Verdict | None:
+        """What decides the exit status; None where nothing is judged."""
+        passed = getattr(result, "passed", None)
+        passed = passed or getattr(result, "verdict", passed)
+        return None if passed is None else Verdict.of(passed)
 
     def shows(self, name: str, otherwise: Callable[..., Any] | None = None) -> Any:
         """A function of the section's module.

@@ -19,8 +19,6 @@ from reports.document import plain
 def as_json(value: Any) -> Any:
     """Turn a result into what JSON knows; NaN and infinity become ``None``.
 
-    Examples
-    --------
     >>> as_json(1j), as_json(np.array([1.0, np.inf]))
     ({'size': 1.0, 'phase_deg': 90.0}, [1.0, None])
     """

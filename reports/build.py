@@ -126,7 +126,7 @@ def design_report(
         *loops[1:],
         *(part for part in validation if part not in first),
         parameters.section(design, warnings_of(design)),
-        parameters.provenance(head, origin, () if first else (answer.unchecked(),)),
+        parameters.provenance(head, origin, checked=bool(first)),
     ]
     doc.waived(sections, design)
     with isolated() as unanswered:

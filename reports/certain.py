@@ -24,8 +24,6 @@ def certain(value: Any, name: str = "") -> Any:
 
     ``name``: keys (and unit of the column) that it stands under, which tell differences and places of maxima.
 
-    Examples
-    --------
     >>> certain({"a": 0.1 + 0.2, "resonance_hz": 21.297262360815797, "curve": [1.0, 2.2e-16]})
     {'a': 0.3, 'resonance_hz': 21.297, 'curve': [1.0, 0.0]}
     >>> certain([3, True, None, "x", 1.7e-13]), certain({"phase_deg": 4.9201075519e-07})

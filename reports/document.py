@@ -23,6 +23,7 @@ from actuator_lti.files.tree import Tree
 from reports.certain import certain
 from reports.charts.chart import Chart
 from reports.charts.data import chart_data
+from reports.charts.svg import refuse_undrawable
 from reports.document_schema import (
     SCHEMA,
     VERSION,
@@ -43,7 +44,6 @@ from reports.document_schema import (
     VerdictItem,
     validate,
 )  # fmt: skip
-from reports.drawing import refuse_undrawable
 from reports.numbers import prose, show
 from reports.verdict_summary import judged, verdict_of, walk
 from reports.visible import visible
@@ -65,8 +65,6 @@ def plain(value: Any) -> Any:
 
     A TypeError for anything else (a complex number, an object): say which part of it is meant.
 
-    Examples
-    --------
     >>> plain({"a": (1, float("nan")), "b": np.float64(2.0)})
     {'a': [1, None], 'b': 2.0}
     """
@@ -122,8 +120,6 @@ def of(
 
     ``scale`` turns a number into ``unit``; what is not there stays nothing. ``look``: as of `column`.
 
-    Examples
-    --------
     >>> _, read = of("real.imag", "y", "y", "mm", scale=1e3)
     >>> read(2.0 + 3.0j), read(None)
     (0.0, None)
@@ -152,8 +148,6 @@ def listing(
 
     ``more``: what a row says besides, as ``_scale`` (see `reports.document_schema`).
 
-    Examples
-    --------
     >>> listing("Parts", [2 + 3j], [of("imag", "y", "y", "mm", scale=1e3)])["rows"]
     [{'y': 3000.0}]
     """
@@ -195,8 +189,6 @@ def text(content: str) -> Block:
 def remark(words: str) -> Block:
     """Make a paragraph of what a computation had to say: a sentence.
 
-    Examples
-    --------
     >>> remark("the loop is cut")["text"], remark("w_ref: no loop.")["text"]
     ('The loop is cut.', 'w_ref: no loop.')
     """
@@ -212,7 +204,6 @@ def fact(label: str, value: Any, unit: str = "", *, format: str = "text", better
 
 
 def shown_fact(item: Mapping[str, Any]) -> str:
-    """Write the value of a fact."""
     return show(item["value"], item.get("format", "text"))
 
 
@@ -306,6 +297,12 @@ def section(
         "findings": [{**one, "text": prose(one["text"])} for one in (*first, *findings)],
     }
     return made if verdict is None else {**made, "verdict": verdict.value}
+
+
+def severity(verdict: Verdict) -> Severity:
+    """How grave a verdict is; what is met is no more than information."""
+    role = verdict.role()
+    return "info" if role == "pass" else role
 
 
 def document(

@@ -43,8 +43,6 @@ class Mark(TypedDict):
 
 
 class State(TypedDict):
-    """A word with a state that is known."""
-
     text: str
     status: Status
 
@@ -71,8 +69,6 @@ GOES_ON = ("", "at")
 
 
 class Column(TypedDict):
-    """A column of a table; see `reports.document.column`."""
-
     key: str
     label: str
     unit: str
@@ -118,20 +114,23 @@ class FactsBlock(TypedDict):
     items: list[FactItem]
 
 
-class VerdictItem(TypedDict):
-    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
-
-    ``gathers`` counts the checks that it stands for, where these are several.
-    """
-
+class _Asked(TypedDict):
     id: str
     label: str
     value: float | None
     limit: float | None
     comparison: str
     unit: str
-    distance: float | None
     verdict: Judged
+
+
+class VerdictItem(_Asked):
+    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
+
+    ``gathers`` counts the checks that it stands for, where these are several.
+    """
+
+    distance: float | None
     waiver: str
     source: str
     reason: str
@@ -190,16 +189,9 @@ class Weakest(TypedDict):
     move: NotRequired[str]
 
 
-class Bar(TypedDict):
+class Bar(_Asked):
     """A requirement on the first screen; ``band``: between which values its figure lies at the corners."""
 
-    id: str
-    label: str
-    value: float | None
-    limit: float | None
-    comparison: str
-    unit: str
-    verdict: Judged
     band: list[float] | None
 
 

@@ -13,12 +13,11 @@ from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
 from actuator_lti.files.atomic import write_bytes, write_together
 from analyses.linear.code_check import CodeCheck, check_code
-from analyses.validation.row import Row
 from nonlinear.export import PLATFORMS, c_export, controller_export, fmu_bytes, refuse_unknown
-from nonlinear.runs.watch import told_if_slow
 from reports.cli.options import folder_for_results, refuse_existing
+from reports.cli.output import told_if_slow
 from reports.export_requests import AskedC, AskedController, AskedFmu, AskedLinear
-from reports.html import page
+from reports.html import environment, page
 from reports.linear_models import FORMS, SUFFIXES, linear_models, written_models
 from reports.model_picture import model_png
 from reports.provenance import package_version
@@ -129,7 +128,6 @@ def licence_text() -> str:
         return "MIT"
 
 
-TITLE = "## Margins of the compiled code"
 GROUPS = (
     ("response", "(relative)", ("response",)),
     ("gain margin", "(factor)", ("gain_margin", "gain_margin_up", "gain_margin_down")),
@@ -143,24 +141,13 @@ def check_text(check: CodeCheck | None, *, single_precision: bool = False) -> st
 
     What is measured is the code in double precision, also where the files are in single.
     """
-    if check is None:
-        return f"{TITLE}\n\nNot measured at this export (`--no-check`).\n"
-    if check.reason:
-        return f"{TITLE}\n\nNot measured: {check.reason}.\n"
-    double = " Measured in double precision." if single_precision else ""
-    rows = "\n".join(_row(entry) for entry in check.entries)
-    return f"""{TITLE}
+    words = {"summary": summary, "loop_name": loop_name, "quantity_name": quantity_name, "digits": _digits}
+    template = environment().get_template("compiled_code.md.j2")
+    return template.render(check=check, single_precision=single_precision, **words)
 
-This code, compiled by `{check.compiler}`, took the simulator's place: its derivative over one base period
-(central differences), a small step of each loop, and runs 1 % inside and outside of each gain margin, on a
-constant speed. Beside it the linear loops.{double}
 
-{summary(check)}
-
-| loop | quantity | unit | linear | this code | error | allowed | |
-|---|---|---|---|---|---|---|---|
-{rows}
-"""
+def _digits(value: float | None) -> str:
+    return "" if value is None else f"{value:.6g}"
 
 
 def summary(check: CodeCheck) -> str:
@@ -172,10 +159,3 @@ def summary(check: CodeCheck) -> str:
     ends = f"; largest difference: {', '.join(words)}" if words else ""
     met = f"{len(check.entries) - len(check.failed)} of {len(check.entries)}"
     return f"{met} predictions of the linear loops are met by the compiled code{ends}."
-
-
-def _row(row: Row) -> str:
-    words = [loop_name(row.loop), quantity_name(row), row.unit]
-    numbers = ["" if value is None else f"{value:.6g}" for value in (row.predicted, row.found)]
-    numbers += [f"{row.error:.1e}", f"{row.allowed:.2g}"]
-    return "| " + " | ".join([*words, *numbers, str(row.verdict)]) + " |"

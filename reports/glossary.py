@@ -58,8 +58,6 @@ def glossary() -> dict[str, str]:
 def meaning(heading: str) -> str:
     """The line of a term as a table heads its column; empty where there is none.
 
-    Examples
-    --------
     >>> meaning("Disk margin").partition(",")[0]
     'gain and phase that may change together'
     """

@@ -19,8 +19,9 @@ from markupsafe import Markup
 
 from actuator_lti.files.atomic import write_together
 from actuator_lti.files.tree import Tree
+from actuator_lti.types import Progress
+from reports.charts.svg import draw_all
 from reports.document import dumps, figures, loads
-from reports.drawing import Progress, draw_all
 from reports.glossary import meaning
 from reports.numbers import MISSING, show, significant
 from reports.scripts import asset, bundled
@@ -48,12 +49,9 @@ def page(made: Mapping[str, Any], *, progress: Progress = None, beside: str = ""
     ``beside``: the file with its figures.
     """
     drawings = draw_all(figures(made), progress)
-
-    def drawn(block: Mapping[str, Any]) -> Markup:
-        return Markup(drawings[id(block)])
-
     kicker = KICKERS.get(made.get("kind", "report"), "Report")
-    return render("report.html", doc=made, drawn=drawn, kicker=kicker, beside=beside, **_live(made))
+    about = {"doc": made, "kicker": kicker, "beside": beside, **_live(made)}
+    return render("report.html", drawn=lambda block: Markup(drawings[id(block)]), **about)
 
 
 def _live(made: Mapping[str, Any]) -> Tree:

@@ -13,8 +13,6 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 def show(value: Any, format: str = "text") -> str:
     """Write a table's value in the column's format (see `reports.document.column`).
 
-    Examples
-    --------
     >>> show(2737.31, "sig:3"), show(0.0000612, "sig:3"), show(-3.04, "fix:1"), show(6.0), show(None)
     ('2737', '6.12×10⁻⁵', '−3.0', '6', '–')
     """
@@ -46,8 +44,6 @@ def fixed(value: float, decimals: int) -> str:
 def gain_margin(decibel: float, decimals: int) -> str:
     """Write a gain margin in dB; one below 0 dB is that down to which the gain may fall.
 
-    Examples
-    --------
     >>> gain_margin(9.54, 1), gain_margin(-3.64, 1)
     ('9.5', 'down to −3.6')
     """
@@ -78,8 +74,6 @@ def or_none(value: float | None, digits: int = 4) -> str:
 def seconds(value: float) -> str:
     """Write a duration with the unit that suits it.
 
-    Examples
-    --------
     >>> seconds(0.01234), seconds(3.2e-4), seconds(0.4705), show(470.5, "ms:3")
     ('12.3 ms', '320 µs', '470 ms', '470')
     """
@@ -97,8 +91,6 @@ def time_unit(span_s: float) -> tuple[float, str]:
 def row_time_unit(values_s: Iterable[float | None]) -> tuple[float, str]:
     """Choose the unit of a row of times, with the factor from seconds: ms, or s where one of them is long.
 
-    Examples
-    --------
     >>> row_time_unit([0.023, None]), row_time_unit([0.023, 23.0])
     ((1000.0, 'ms'), (1.0, 's'))
     """
@@ -109,8 +101,6 @@ def row_time_unit(values_s: Iterable[float | None]) -> tuple[float, str]:
 def plain_decade(value: float) -> str:
     """Write a tick such as 0.1, 10, 1k.
 
-    Examples
-    --------
     >>> plain_decade(0.01), plain_decade(100.0), plain_decade(2e4), plain_decade(1e-6)
     ('0.01', '100', '20k', '10⁻⁶')
     """
@@ -126,8 +116,6 @@ def plain_decade(value: float) -> str:
 def hertz(value: float) -> str:
     """Write a frequency with its unit.
 
-    Examples
-    --------
     >>> hertz(88.457), hertz(1909.4)
     ('88.5 Hz', '1.91 kHz')
     """
@@ -145,8 +133,6 @@ _MINUS = re.compile(r"(?<![\w)\]=`'\"-])-(?=\d)")
 def prose(text: str) -> str:
     """Write the numbers of a sentence as its tables do: no exponent where none is needed, a true minus.
 
-    Examples
-    --------
     >>> prose("off by 1.29e+03 deg, allowed 1e-09; -3 dB on 2026-11-23")
     'off by 1290 deg, allowed 10⁻⁹; −3 dB on 2026-11-23'
     """

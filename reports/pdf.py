@@ -14,8 +14,8 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.tree import Tree
 from actuator_lti.start.extras import need
+from reports.charts.svg import draw_all
 from reports.document import column, figures, judged, section, shown_fact, table, walk
-from reports.drawing import draw_all
 from reports.html import KICKERS, show_signed
 from reports.numbers import show
 from reports.verdict_summary import role, verdict_lines, why
@@ -114,8 +114,6 @@ def printable(made: Mapping[str, Any]) -> Tree:
 def clean(value: object, limit: int = MAX_CELL) -> str:
     """Text that can be seen and can be broken into lines; longer than ``limit`` it is cut.
 
-    Examples
-    --------
     >>> clean("a\\u202eb"), clean(None), clean("abcdef", 4)
     ('a⟨U+202E⟩b', '', 'abc…')
     """

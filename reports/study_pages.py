@@ -51,8 +51,6 @@ _WORDS = {key: re.compile(before + _OTHER) for key, before in _WHERE.items()}
 def in_amperes(value: Any, design: Design | None, key: str = "") -> Any:
     """Plain data of a design's results with ``A dc`` for A, where its file has several amperes.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> in_amperes({"result": "A limit of 2 A, 3 A rms, kM 4 N/A", "unit": "A"}, load_design("ballscrew"))
     {'result': 'A limit of 2 A dc, 3 A rms, kM 4 N/A dc', 'unit': 'A dc'}

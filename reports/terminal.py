@@ -69,7 +69,7 @@ def print_section(section: Mapping[str, Any], passed: bool | Verdict | None, nam
     if passed is None:
         console().print(Text(printable(words)), soft_wrap=True)
     else:
-        open_ones = tally(judged(walk(section))).not_proven if passed is True else 0
+        open_ones = tally(judged(walk(section))).not_proven if Verdict.of(passed) is Verdict.MET else 0
         print_verdict(passed, words, f", {open_ones} not proven" if open_ones else "")
     if section["intro"]:
         console().print(Text(section["intro"], style="dim"))

@@ -76,7 +76,8 @@ def verdict_of(sections: Sequence[Mapping[str, Any]], kind: str) -> Overall:
     parts = {"requirements": Tally()} if report else {}
     parts |= counted(block for part in sections for block in walk(part))
     whole = sum(parts.values(), Tally())
-    silent = [part for part in sections if report and part["status"] == "fail" and not own(part).not_met]
+    unsaid = [part for part in sections if report and "verdict" not in part]
+    silent = [part for part in unsaid if part["status"] == "fail" and not own(part).not_met]
     failed = [part["title"] for part in silent if part["id"] != "answer"]  # which gathers what they say
     if not failed and not whole.not_met:
         failed = [part["title"] for part in silent]
@@ -129,8 +130,6 @@ def gathered(sections: Iterable[Mapping[str, Any]]) -> list[Finding]:
 def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
     """Say a document's verdict in words, a line for each kind.
 
-    Examples
-    --------
     >>> verdict_words({"parts": {"requirements": {"met": 11, "not_met": 1, "not_proven": 0, "waived": 0}}})
     ['11 of 12 requirements met, 1 not met']
     """
@@ -140,18 +139,17 @@ def verdict_words(verdict: Mapping[str, Any]) -> list[str]:
 def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
     """Say a document's verdict in words, each with its colour: what decides it first.
 
-    Examples
-    --------
     >>> verdict_lines({"parts": {}, "failed_sections": ["Missing parts"]})
     [('failed: Missing parts', 'fail')]
     >>> verdict_lines({"parts": {"requirements": {}}})
     [('the design states no requirements', 'info')]
     """
-    lines: list[tuple[str, Role]] = [
-        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
-    ]
+    lines: list[tuple[str, Role]] = []
     for what, counts in verdict["parts"].items():
         count = Tally(**counts)
         words = count.words(WORDS.get(what, what))
         lines.append((words if count.total else f"the design states {words}", count.role))
-    return sorted(lines, key=lambda line: ROLES.index(line[1]))
+    sections: list[tuple[str, Role]] = [
+        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
+    ]
+    return sorted([*lines, *sections], key=lambda line: ROLES.index(line[1]))

@@ -4,9 +4,7 @@ import html
 import re
 
 # tab and line break may stand
-_UNSEEN = re.compile(
-    "[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]"
-)  # beside tab and line break
+_UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\ud800-\udfff\ufdd0-\ufdef\ufffe\uffff]")
 DIRECTION = "\u061c\u200e\u200f\u202a-\u202e\u2066-\u2069"
 """Marks that turn the direction of reading (Unicode's Bidi_Control), as a range of a regular expression."""
 
@@ -18,8 +16,6 @@ def visible(text: str) -> str:
 
     Marks of direction let a name read otherwise than it is (``U+202E`` turns ``gpj.exe`` round).
 
-    Examples
-    --------
     >>> visible("a\\x00b\\u202ec")
     'a\\ufffdb\\u27e8U+202E\\u27e9c'
     """
@@ -32,8 +28,6 @@ def visible(text: str) -> str:
 def escape(text: str) -> str:
     """Text for markup: visible, and none of it is a tag, an entity or the end of an attribute.
 
-    Examples
-    --------
     >>> escape("a<b\\u202e")
     'a&lt;b⟨U+202E⟩'
     """

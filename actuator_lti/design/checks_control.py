@@ -195,9 +195,12 @@ def _own_inputs(design: Design, stage: str, law: Law) -> Iterator[Refusal]:
         yield path, "current", "not allowed with motor.source_gain, which has no current"
     if "twist" in law.inputs and design.coupling is None:
         yield path, "twist", "not allowed without a coupling"
-    filtered = design.encoder.filter_time_s > 0.0 or (velocity and velocity.filters_on("speed"))
-    if filtered and ("speed" in law.inputs or stage == "velocity"):
+    filter_time_s = design.encoder.filter_time_s
+    if "speed" in law.inputs and (filter_time_s > 0.0 or (velocity and velocity.filters_on("speed"))):
         yield path, "speed", "allowed: without encoder.filter_time and filters of the speed"
+    elif stage == "velocity" and filter_time_s > 0.0:
+        allowed = "not allowed beside control.velocity.law, which may have it"
+        yield "encoder.filter_time", f"{filter_time_s:g} s", allowed
 
 
 def _replaced(design: Design, stage: str) -> Iterator[Refusal]:

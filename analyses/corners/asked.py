@@ -20,7 +20,7 @@ class Asked:
     """Judge the linear loops at the corners of the drive: hot, cold, low supply, worst tolerances.
 
     Resistance and torque constant follow [temperature] of the design, or copper and NdFeB. The exit status
-    is 1 where a requirement is not met, or a loop not stable, at any corner.
+    is 1 where a requirement is not met or not proven, or a loop not stable, at any corner.
 
     Try: actuator-lti corners fin --hot 85 --cold -54 --supply 22
     """

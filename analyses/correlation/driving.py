@@ -35,20 +35,24 @@ COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
 IN_MOTION = 0.02
 FIRST_ROWS = 5
 LEAST_FOR_A_SPLINE = 9
+MOST_TOGETHER = 3  # jumps: five rows have four, and the slope that Akima's curve takes at the middle one
 
 
 @dataclass(frozen=True, kw_only=True)
 class Driven:
-    """What a record commands: the signal, the stage it goes into, values as the simulator takes them.
-
-    ``design`` is the drive from that stage on: a record of a current command has no speed loop acting.
-    """
+    """What a record commands."""
 
     signal: str
-    stage: str
-    values: Floats
-    design: Design
+    stage: str  # it goes into
+    values: Floats  # as the simulator takes them
+    design: Design  # the drive from that stage on: under a current command no speed loop acts
     notes: tuple[str, ...] = ()
+    together: int = 1  # jumps from row to row, between standstills, that are steps each and no curve
+
+    @property
+    def steps(self) -> Ints:
+        """The first row behind each step."""
+        return steps_at(self.values, self.together)
 
 
 def command_names(design: Design) -> dict[str, str]:
@@ -109,7 +113,7 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     period = driven.design.controller.period_s
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
-    later = steps_at(driven.values)
+    later = driven.steps
     starts, ends = [0, *later], [*later, len(time_s)]
     edges = np.searchsorted(ticks, time_s[starts] - [0.0, *early_s] - 1e-6 * period)
     edges[0] = 0
@@ -134,33 +138,38 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
     return np.asarray(curve(time_s, values)(inside), dtype=np.float64)
 
 
-def steps_at(values: Floats) -> Ints:
-    """The first row behind each jump of the values from standstill to standstill.
+def steps_at(values: Floats, together: int = 1) -> Ints:
+    """The first row behind each jump of the values, of at most so many ``together``, between standstills.
 
     Examples
     --------
-    >>> steps_at(np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])).tolist()
-    [2]
+    >>> values = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])
+    >>> steps_at(values).tolist(), steps_at(values, 2).tolist()
+    ([2], [2, 5, 6])
     """
     moves = np.diff(values) != 0.0
-    around = np.concatenate([[False], moves, [False]])
-    return np.flatnonzero(moves & ~around[:-2] & ~around[2:]) + 1
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]])))
+    count = ends[1::2] - ends[::2]
+    return np.flatnonzero(moves)[np.repeat(count, count) <= together] + 1
 
 
 def earlier_s(driven: Driven, time_s: Floats, measured: Floats, modelled: Floats) -> Floats:
     """By how much each step of the command came earlier than it was modelled, by a signal that answers it, s.
 
     From each step to the next one the answer moves with it, by its rate; a stretch of all the answers (the
-    gains, the inertia, the clock) stands beside them, so that it is not taken for a time.
+    gains, the inertia, the clock) stands beside them, so that it is not taken for a time. Steps in
+    neighbouring rows come as much earlier, by what answers all of them.
     """
-    rate, off, later = np.gradient(modelled, time_s), measured - modelled, steps_at(driven.values)
+    rate, off, steps = np.gradient(modelled, time_s), measured - modelled, driven.steps
+    first = np.flatnonzero(np.diff(steps, prepend=-1) > 1)
+    later = steps[first]
     table, rest = np.zeros((len(time_s), len(later) + 1)), np.zeros(len(time_s))
     for k, (start, end) in enumerate(zip(later, [*later[1:], len(time_s)], strict=True)):
         part, before = slice(start, end), start - 1
         table[part, k] = moved = rate[part] - rate[before]
         table[part, -1] = (time_s[part] - time_s[before]) * moved
         rest[part] = off[part] - off[before]
-    return scaled_lstsq(table, rest)[:-1]
+    return np.repeat(scaled_lstsq(table, rest)[:-1], np.diff(first, append=len(steps)))
 
 
 def supply_of(driven: Driven, record: Record, time_s: Floats, notes: list[str]) -> dict[str, Any]:

@@ -18,12 +18,7 @@ BESIDE = ("speed", "velocity", "current", "force")  # beside the motion, in the 
 
 @dataclass(frozen=True, kw_only=True)
 class SignalSummary:
-    """One signal over all records that hold it.
-
-    ``mean_error`` and ``rms_error`` are over all samples together, ``max_error`` the largest of all,
-    ``relative_error`` the norm of all differences over the norm of all that was measured, ``share_of_motion``
-    over that of each record's about its mean. ``worst`` is the record with the largest of these.
-    """
+    """One signal over all records that hold it, all samples together."""
 
     name: str
     unit: str
@@ -32,9 +27,9 @@ class SignalSummary:
     mean_error: float
     rms_error: float
     max_error: float
-    relative_error: float
-    share_of_motion: float
-    worst: str
+    relative_error: float  # norm of all differences over the norm of all that was measured
+    share_of_motion: float  # over that of each record's about its mean
+    worst: str  # the record with the largest of these
 
 
 def _of_signal(name: str, results: Sequence[CorrelationResult]) -> SignalSummary:

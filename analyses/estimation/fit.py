@@ -15,16 +15,13 @@ SAME = 1e-9  # part of a correlation below which values are one
 
 @dataclass(frozen=True, kw_only=True)
 class Fixed:
-    """A value (SI) that was not found, and why.
-
-    ``moves``: by how much each value that was found is too large where this one is too small by one;
-    ``std``: its standard deviation as the records tell it, beside its own tolerance.
-    """
+    """A value (SI) that was not found, and why."""
 
     value: float
     reason: str
+    # by how much each value that was found is too large where this one is too small by one
     moves: Mapping[str, float] = field(default_factory=dict)
-    std: float = 0.0
+    std: float = 0.0  # as the records tell it, beside its own tolerance
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,10 @@ LEAST_OWN_SHARE = 0.03  # a column with less of its own beside those before it i
 
 @dataclass(frozen=True, kw_only=True)
 class NotTold:
-    """A parameter that the rows do not tell, and which others it cannot be told from.
-
-    ``moves``: its column is about the sum of these factors times those of the others.
-    """
+    """A parameter that the rows do not tell, and which others it cannot be told from."""
 
     name: str
-    moves: Mapping[str, float] = field(default_factory=dict)
+    moves: Mapping[str, float] = field(default_factory=dict)  # its column is about theirs times these factors
 
     def __str__(self) -> str:
         others = " and ".join(self.moves)
@@ -78,11 +75,10 @@ def told_apart(
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
     """Ordinary least squares of ``y = w p``, of shapes (n, p) and (n,).
 
-    ``ends``: where each record ends, so that no block of rows reaches over two of them.
+    ``ends``: where each record ends, so that no block of rows reaches over two of them. The variance behind
+    ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
 
     Raises `InputError`: where there are no more rows than values.
-
-    The variance behind ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
     """
     if len(y) <= w.shape[1]:
         told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.signal import correlate
 
 from actuator_lti.types import Floats
 
@@ -13,16 +14,11 @@ MIN_BATCHES, MAX_BATCHES = 8, 64
 
 @dataclass(frozen=True, kw_only=True)
 class Means:
-    """Means of several signals over one stretch, shape (k,), and the covariance of these means, shape (k, k).
+    """Means of several signals over one stretch, and the covariance of these means."""
 
-    ``correlation_samples`` is the integrated autocorrelation time of each signal in samples (1: white): the
-    number of samples worth one independent one. The covariance is that of the means of stretches, each at
-    least five correlation times long where the record allows.
-    """
-
-    values: Floats
-    covariance: Floats
-    correlation_samples: Floats
+    values: Floats  # shape (k,)
+    covariance: Floats  # shape (k, k): of batches of five correlation times or more, where the record allows
+    correlation_samples: Floats  # integrated autocorrelation times (1: white): samples worth one independent
 
 
 def correlated_means(columns: Floats) -> Means:
@@ -65,7 +61,4 @@ def autocovariance(values: Floats, lags: int) -> Floats:
 
 def best_lag(a: Floats, b: Floats) -> int:
     """Steps by which b is to be moved later to fit a, by the normalised cross-correlation."""
-    size = next_fast_len(len(a) + len(b) - 1, real=True)
-    cross = irfft(rfft(a, size) * np.conj(rfft(b, size)), size)
-    lag = int(np.argmax(cross))
-    return lag if lag < len(a) else lag - size
+    return int(np.argmax(correlate(a, b, method="fft"))) - (len(b) - 1)

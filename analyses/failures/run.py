@@ -7,6 +7,7 @@ import numpy as np
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
+from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance
 from actuator_lti.types import Floats
 from analyses.failures.asked import Asked
@@ -78,12 +79,12 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
     if asked.watched_s / design.controller.period_s > MOST_TICKS:
         longest = MOST_TICKS * design.controller.period_s
         raise InputError(f"watched {asked.watched_s:g} s: at most {longest:g} s with this period")
-    wait = _settling_s(design, asked)
+    wait = ceil(_settling_s(design, asked) / design.controller.period_s)
     cases, left_out = cases_of(design, asked)
-    settled = {case.start_rad: Rig(design, asked.load_Nm) for case in cases}
+    before = {start: outcome(design, asked.load_Nm, start) for start in sorted({c.start_rad for c in cases})}
+    settled = {start: Rig(design, asked.load_Nm) for start in before}
     for start, rig in settled.items():
-        for _ in range(ceil(wait / design.controller.period_s)):
-            rig.step(start)
+        _hold(rig, start, wait, MOST_TICKS if before[start].rest.comes_to_rest else wait)
     made = list[FailureCase]()
     for case in cases:
         rig = settled[case.start_rad].copy()
@@ -91,19 +92,32 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
             made.append(_followed(rig, asked, case))
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
-    before = tuple(outcome(design, asked.load_Nm, start) for start in sorted(settled))
-    return Failures(design, asked, tuple(made), left_out, before)
+    return Failures(design, asked, tuple(made), left_out, tuple(before.values()))
+
+
+def _hold(rig: Rig, start: float, wait: int, most: int) -> None:
+    """Hold a start until the output stays, over ``wait`` ticks, within `SETTLED` of what it moved in all."""
+    for _ in range(0, most, wait):
+        seen = list[float]()
+        for _ in range(wait):
+            rig.step(start)
+            seen.append(rig.output_rad)
+        if np.ptp(seen) <= SETTLED * abs(seen[-1]):
+            return
 
 
 def _settling_s(design: Design, asked: Asked) -> float:
     """Time to reach half the stop and settle."""
-    slowest = float(compliance(design).slowest)
+    # A load torque that does not reach the motor shows none of the poles by which the command is followed
+    followed, period = assemble_loops(design).plain_response, design.controller.period_s
+    updates = [] if followed is None else np.abs(followed.poles()) ** (period / followed.dt)
+    slowest = max(float(compliance(design).slowest), *updates)
     if slowest > 1.0 + 1e-9:
         raise UnstableError("failures: the closed loop is not stable")
     rate = min(drive_figures(design).output_rate_rad_s, design.command.rate_rad_s)
     travel = 0.5 * asked.stop_rad / rate if rate > 0.0 else LONGEST_S
     ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0
-    return min(0.1 + travel + ticks * design.controller.period_s, LONGEST_S)
+    return min(0.1 + travel + ticks * period, MOST_TICKS * period)
 
 
 def _followed(rig: Rig, asked: Asked, case: Case) -> FailureCase:

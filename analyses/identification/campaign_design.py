@@ -19,18 +19,14 @@ STEP = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class MarginSpread:
-    """One margin of the design, its standard deviation from the friction's uncertainty, and its slopes.
-
-    ``slopes`` are per unit of C0, Cv and CM; ``std`` and ``floor_std`` (what remains however many runs are
-    made, because the instruments' shared errors remain) have the unit of the margin.
-    """
+    """One margin of the design, and what the friction's uncertainty makes of it."""
 
     label: str
     unit: str
     value: float
-    slopes: Floats
+    slopes: Floats  # per unit of C0, Cv and CM
     std: float
-    floor_std: float
+    floor_std: float  # what remains however many runs are made: the instruments' shared errors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,18 +41,13 @@ class SuggestedRun:
 
 @dataclass(frozen=True, kw_only=True)
 class CampaignSuggestion:
-    """Suggested runs in the order of their worth, and the margins that they serve.
-
-    ``remaining`` of the runs counts only what runs can reduce, the random part. ``shared_part`` is the share
-    of the margins' variance that comes from errors which all runs share; ``largest_shared`` names the largest
-    of these.
-    """
+    """Suggested runs in the order of their worth, and the margins that they serve."""
 
     criterion: str
     margins: tuple[MarginSpread, ...]
-    runs: tuple[SuggestedRun, ...]
-    shared_part: float
-    largest_shared: str | None
+    runs: tuple[SuggestedRun, ...]  # ``remaining`` counts only what runs can reduce, the random part
+    shared_part: float  # share of the margins' variance that comes from errors which all runs share
+    largest_shared: str | None  # of these
 
 
 def suggest_runs(

@@ -46,18 +46,14 @@ CAUSES: Mapping[str, Mapping[str, float]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class DesignValue:
-    """One number of the design beside what the records say; ``ratio`` is found over design's.
-
-    ``error`` is the standard error of that ratio, ``allowed`` the relative standard deviation of the design's
-    own number.
-    """
+    """One number of the design beside what the records say."""
 
     name: str
     design: float
     found: float
-    ratio: float
-    error: float
-    allowed: float
+    ratio: float  # found over design's
+    error: float  # standard error of that
+    allowed: float  # relative standard deviation of the design's own number
 
     @property
     def agrees(self) -> bool:
@@ -233,9 +229,8 @@ def with_given_constant(
     Where a voltage tells kE (among the values ``compared``) closely, the intervals hold by how much the
     design's is off from it, and the error of that.
     """
-    names = {constant_of(start, record) for record in records}
-    name = names.pop() if len(names) == 1 else None
-    if name is None:
+    name, *others = {constant_of(start, record) for record in records}
+    if name is None or others:
         return model
     shares = _shares(start, name, model, records)
     words = ""

@@ -40,17 +40,12 @@ class Lag:
 
 @dataclass(frozen=True)
 class Followed:
-    """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it.
+    """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it."""
 
-    Of the following error, recorded over simulated, and of what the position has too much of the motion;
-    behind a commanded speed (``stage`` is velocity) clock and scale are one. ``alike`` is the correlation of
-    the recorded motion with the simulated one.
-    """
-
-    stage: str
-    alike: float
-    clock: float
-    off: float = 0.0
+    stage: str  # that is commanded; behind a speed clock and scale are one
+    alike: float  # correlation of the recorded motion with the simulated one
+    clock: float  # of the following error, recorded over simulated
+    off: float = 0.0  # of what the position has too much of the motion
 
     @property
     def fails(self) -> bool:
@@ -60,14 +55,11 @@ class Followed:
 
 @dataclass(frozen=True, kw_only=True)
 class Diagnosed:
-    """The model of records that were put right, how they follow their commands, and what was found.
-
-    ``late_s`` is how much a drive signal was late, or how closely that is told, whichever is more.
-    """
+    """The model of records that were put right, how they follow their commands, and what was found."""
 
     model: JointModel
     records: tuple[Record, ...]
-    late_s: float
+    late_s: float  # how much a drive signal was late, or how closely that is told, whichever is more
     followed: Mapping[str, Followed]
     findings: Mapping[str, tuple[Finding, ...]]
 

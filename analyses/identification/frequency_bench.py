@@ -12,7 +12,7 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import parameter
-from analyses.identification import two_mass
+from analyses.identification import two_mass, verdict
 from analyses.identification.asked import held_by_name
 from analyses.identification.design_values import STEP, at_constant, constant_of, kept_constant
 from analyses.identification.play import Play, play_of
@@ -20,14 +20,7 @@ from analyses.identification.rows import drive_of
 from analyses.identification.sampled_current import held_voltage
 from analyses.identification.to_design import design_with_fit
 from analyses.identification.two_mass import Lines, TwoMass
-from analyses.identification.verdict import (
-    RESIDUAL_LIMIT,
-    Identified,
-    Item,
-    inputs_item,
-    kept_items,
-    simulated_item,
-)
+from analyses.identification.verdict import Identified, Item
 from analyses.records.consistency import Finding, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
@@ -107,12 +100,12 @@ def identify_frequency(
     play = None if play_record is None else play_of(design, play_record, fit)
     made = _made(design, fit, play, record.name)
     findings = {one.name: check_record(design, one) for one in (record, play_record) if one is not None}
-    items = [inputs_item(name, result) for name, result in findings.items()]
+    items = [verdict.inputs_item(name, result) for name, result in findings.items()]
     why = "play, friction or another resonance: excite on one flank, in motion"
     told = f"misfit {fit.misfit:.2f} of its noise, {MISFIT_LIMIT:g} allowed"
     label = f"The two-mass model explains the lines ({told})"
     items.append(Item.of("misfit", label, "" if fit.misfit <= MISFIT_LIMIT else why))
-    items += kept_items(fit, held)
+    items += verdict.kept_items(fit, held)
     if play is not None:
         dry = (design.load.friction or LoadFriction()).dry_torque_Nm
         told = f"the play is that at the design's load.friction.dry_torque, {dry:g} N m; more adds to it"
@@ -226,7 +219,7 @@ def _written_item(written: Design, lines: Lines, record: str, reaction: float) -
     measured, relative = two_mass.response(lines)
     weight = 1.0 / np.maximum(relative, 1e-3)
     error = float(np.linalg.norm(weight * (model / measured - 1.0)) / np.linalg.norm(weight))
-    return simulated_item(record, error, RESIDUAL_LIMIT, "response, line by line")
+    return verdict.simulated_item(record, error, verdict.RESIDUAL_LIMIT, "response, line by line")
 
 
 def _made(design: Design, fit: TwoMass, play: Play | None, record: str) -> Design:

@@ -27,19 +27,15 @@ NAMES: Mapping[FrictionForm, tuple[str, ...]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """The choices of the identification; the defaults are the published ones for EMPS.
-
-    ``skip_end_samples`` are left out at the end of a record that ends in motion: there the filter, which has
-    no further samples, bends the position. The published recipe keeps them, and differentiates over three
-    ``points``.
-    """
+    """The choices of the identification; the defaults are the published ones for EMPS."""
 
     cutoff_hz: float = 100.0
     filter_order: int = 4
     skip_samples: int = 49
     decimation: int = 10
+    # left out where a record ends in motion: there the filter, without further samples, bends the position
     skip_end_samples: int = 0
-    points: int = 3
+    points: int = 3  # over which it differentiates
 
     def motion(self, values: Floats, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
@@ -80,36 +76,29 @@ def linear_basis(speed: Floats, knots: Sequence[float]) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class Rows:
-    """Regressors ``w`` by ``names`` and drive ``y`` of one record after decimation, rows at rest left out.
-
-    ``sine`` and ``cosine`` of the output angle keep all rows, of which ``keep`` marks those used. ``speed``
-    and ``acceleration`` are the motor's, ``step_s`` the time from row to row; ``used`` tells what each signal
-    was used for.
-    """
+    """Regressors and drive of one record after decimation, rows at rest left out."""
 
     name: str
     rows_in: int
-    used: Mapping[str, str]
+    used: Mapping[str, str]  # what each signal was used for
     notes: tuple[str, ...]
-    names: tuple[str, ...] = field(repr=False)
+    names: tuple[str, ...] = field(repr=False)  # of the regressors
     w: Floats = field(repr=False)
-    y: Floats = field(repr=False)
-    sine: Floats = field(repr=False)
+    y: Floats = field(repr=False)  # the drive
+    sine: Floats = field(repr=False)  # of the output angle, as the cosine: of all rows
     cosine: Floats = field(repr=False)
-    speed: Floats = field(repr=False)
+    speed: Floats = field(repr=False)  # of the motor, as the acceleration
     acceleration: Floats = field(repr=False)
-    step_s: float = field(repr=False)
-    keep: Mask = field(repr=False)
+    step_s: float = field(repr=False)  # from row to row
+    keep: Mask = field(repr=False)  # which of all rows are used
     recipe: Recipe = field(repr=False)
 
     @property
     def rows_used(self) -> int:
-        """Rows of the regression."""
         return len(self.y)
 
     @property
     def rows_at_rest(self) -> int:
-        """Rows that were left out."""
         return int(np.count_nonzero(~self.keep))
 
     def shared(self, other: Rows) -> Mask:
@@ -131,18 +120,13 @@ class Rows:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordFit(Rows):
-    """One record's part of a joint model: its rows, ``w`` those of the fitted names.
-
-    ``friction`` is the drive less all but the friction. ``own_residual`` is that of the record fitted alone:
-    what is left of it has no scatter between records. ``noise`` is what the simulated record does not explain
-    of that, at the rows ``compared`` of those used.
-    """
+    """One record's part of a joint model: its rows, ``w`` those of the fitted names."""
 
     residual: Floats = field(repr=False)
-    own_residual: Floats = field(repr=False)
-    friction: Floats = field(repr=False)
-    noise: Floats = field(repr=False)
-    compared: Mask = field(repr=False)
+    own_residual: Floats = field(repr=False)  # of the record fitted alone: without scatter between records
+    friction: Floats = field(repr=False)  # the drive less all but the friction
+    noise: Floats = field(repr=False)  # what the simulated record does not explain of the own residual
+    compared: Mask = field(repr=False)  # at which of the rows used
 
     @property
     def relative_residual(self) -> float:
@@ -158,16 +142,14 @@ class RecordFit(Rows):
 
 @dataclass(frozen=True, kw_only=True)
 class LawChoice:
-    """One law: its break points (rad/s at the motor), parameters, residual, and Bayesian criterion.
-
-    ``criterion`` is ``n ln(mean square) + p ln n`` with n the number of rows worth one independent one, less
-    that of the plain law: below -6 the law is taken.
-    """
+    """One friction law that was tried."""
 
     name: str
-    breaks_rad_s: tuple[float, ...]
+    breaks_rad_s: tuple[float, ...]  # break points, at the motor
     parameters: int
     relative_residual: float
+    # Bayesian: ``n ln(mean square) + p ln n`` with n the number of rows worth one independent one, less that
+    # of the plain law; below -6 the law is taken
     criterion: float
     taken: bool
 
@@ -178,30 +160,24 @@ class JointModel(Fit):
 
     ``drive = inertia * acceleration + viscous * velocity + dry * sign(velocity) + offset``
     and, where there are such, ``+ load_coefficient |M| sign(velocity) - M / N``; in SI at the motor. With
-    ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry.
-
-    ``white_errors`` are those as if the residual were white, as published for EMPS; ``covariance`` holds its
-    correlation in time, and the scatter between records where there are several, which ``between`` has alone
-    (by name, a standard deviation of one record). ``relative_residual``: norm of the residual over that of
-    the drive signal, after decimation. ``alone`` are the records fitted one by one; ``bias`` was taken
-    off each value as the fit's own, ``bias_told`` says how, or why not, ``simulated`` are the records as the
-    design simulates them that comes of it (none: it cannot). ``laws`` are the friction laws that were tried.
-    ``recipe`` is that of the first record, ``asked`` that of all (none: each has its own).
+    ``knots_rad_s`` the torques ``map_k`` at these speeds take the place of viscous and dry. The covariance
+    holds the residual's correlation in time, and the scatter between records where there are several.
     """
 
     form: FrictionForm = "symmetric"
-    white_errors: Floats
-    between: Mapping[str, float]
-    relative_residual: float
+    white_errors: Floats  # as if the residual were white, as published for EMPS
+    between: Mapping[str, float]  # the scatter between records alone, a standard deviation of one
+    relative_residual: float  # norm of the residual over that of the drive signal, after decimation
     records: tuple[RecordFit, ...]
-    recipe: Recipe
-    asked: Recipe | None = field(default=None, repr=False)
+    recipe: Recipe  # of the first record
+    asked: Recipe | None = field(default=None, repr=False)  # of all; none: each has its own
     condition: float
-    alone: tuple[Fit, ...] = field(default=(), repr=False)
+    alone: tuple[Fit, ...] = field(default=(), repr=False)  # the records fitted one by one
     knots_rad_s: tuple[float, ...] | None = None
     weights: tuple[float, ...] = ()
-    bias: Mapping[str, float] = field(default_factory=dict)
-    bias_told: str = ""
+    bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
+    bias_told: str = ""  # how, or why not
+    # the records as the design simulates them that comes of it; none: it cannot
     simulated: tuple[Record, ...] = field(default=(), repr=False)
     laws: tuple[LawChoice, ...] = field(default=(), repr=False)
 
@@ -229,10 +205,8 @@ class JointModel(Fit):
 
     @property
     def rows_in(self) -> int:
-        """Rows of all records."""
         return sum(record.rows_in for record in self.records)
 
     @property
     def rows_used(self) -> int:
-        """Rows of the regression."""
         return sum(record.rows_used for record in self.records)

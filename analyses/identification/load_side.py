@@ -18,18 +18,13 @@ NOISE_SHARE = 0.1  # largest share of the coupling's torque that noise of the ou
 
 @dataclass(frozen=True, kw_only=True)
 class TwoSides:
-    """Motor and load of a drive with a coupling.
+    """Motor and load of a drive with a coupling."""
 
-    ``motor`` is the motion at the motor shaft, ``load`` that at the coupling's own shaft. ``torque`` is what
-    the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``. ``told`` says where the
-    load's motion comes from, ``used`` which signal it takes.
-    """
-
-    motor: Motion
-    load: Motion
-    torque: Floats
-    told: str
-    used: Mapping[str, str] = field(default_factory=dict)
+    motor: Motion  # at the motor shaft
+    load: Motion  # at the coupling's own shaft
+    torque: Floats  # what the coupling carries without a moment at the output, ``J_l dW/dt + T_f,load``
+    told: str  # where the load's motion comes from
+    used: Mapping[str, str] = field(default_factory=dict)  # which signal it takes
 
 
 def two_sides(

@@ -34,17 +34,13 @@ MOTION_SIGNALS = ("speed", "velocity", "angle", "output_angle", "position")
 
 @dataclass(frozen=True, kw_only=True)
 class OutputErrorResult(Fit):
-    """Refined values by dotted key, and the relative error before and after.
+    """Refined values by dotted key; their errors respect the correlation in time of what is left."""
 
-    These errors are those of the drive signal: norm of the difference over norm of the measured. The standard
-    errors respect the correlation in time of what is left. ``at_bound`` are those that ended at the least or
-    largest value of their key: the records want another, and no error of theirs holds.
-    """
-
-    error_before: float
+    error_before: float  # of the drive signal: norm of the difference over norm of the measured
     error_after: float
     iterations: int
     design: Design
+    # what ended at the least or largest value of its key: the records want another, no error of it holds
     at_bound: tuple[str, ...] = ()
 
 
@@ -85,7 +81,6 @@ def fit_output(
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
     count, most = 0, ITERATIONS * (2 * len(paths) + 1)
-
     box = 1.0 + (ends - start) / scale
 
     def values_at(moved: Floats) -> Floats:
@@ -207,10 +202,9 @@ def refine_records(
 def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
-    Rows that no fit is to use, as their signal is clipped, are not compared either.
-
-    A record without a command is held against the torque that the design's own inertia and friction need for
-    its motion, by the record's own recipe, whatever cut-off the fit had.
+    Rows that no fit is to use, as their signal is clipped, are not compared either. A record without a
+    command is held against the torque that the design's own inertia and friction need for its motion, by the
+    record's own recipe, whatever cut-off the fit had.
     """
     why = ""
     if command_of(design, record) is not None:

@@ -47,22 +47,17 @@ class Segment:
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
-    """The motions, one after the other, and the intervals that they are expected to give.
-
-    ``expected`` has the design's own values; ``half_widths`` are half the 95 % intervals over the value (of
-    the offset: over the dry friction), ``within`` what was asked. ``measured`` counts the records that are
-    there already, ``command`` is that of all motions at ``time_s``, at the output.
-    """
+    """The motions, one after the other, and the intervals that they are expected to give."""
 
     design: Design
-    within: float
+    within: float  # what was asked
     noise: float
-    measured: int
+    measured: int  # records that are there already
     segments: tuple[Segment, ...]
-    expected: Fit
-    half_widths: dict[str, float]
+    expected: Fit  # of the design's own values
+    half_widths: dict[str, float]  # of the 95 % intervals over the value (offset: over the dry friction)
     time_s: Floats = field(repr=False)
-    command: Floats = field(repr=False)
+    command: Floats = field(repr=False)  # of all motions, at the output
 
     @property
     def passed(self) -> bool:

@@ -25,19 +25,14 @@ GUARD = 1.5  # periods of the cut-off left out on both sides of a loss of contac
 
 @dataclass(frozen=True, kw_only=True)
 class Play:
-    """Half of the play b (rad at the coupling), and what the same rows tell of the load's friction.
+    """Half of the play, and what the same rows tell of the load's friction."""
 
-    ``half_std_rad`` holds the correlation of the rows in time, and the encoders' resolution, which repeats
-    itself from cycle to cycle. ``viscous_Nms_rad`` and ``dry_Nm`` are the load's at the coupling's shaft,
-    None where the rows do not tell them. ``rows`` were in contact.
-    """
-
-    half_rad: float
-    half_std_rad: float
+    half_rad: float  # at the coupling
+    half_std_rad: float  # with the rows' correlation in time, and the encoders' steps, alike in each cycle
     middle_rad: float
-    viscous_Nms_rad: float | None
-    dry_Nm: float | None
-    rows: int
+    viscous_Nms_rad: float | None  # of the load at the coupling's shaft; None where the rows do not tell it
+    dry_Nm: float | None  # the same
+    rows: int  # that were in contact
 
     @property
     def told(self) -> bool:

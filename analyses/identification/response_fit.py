@@ -35,19 +35,15 @@ class _Lower(Exception):
 
 @dataclass(frozen=True)
 class _Side:
-    """Points of a profile to one side of a fit: a coordinate held off by some distance, the others fitted.
-
-    ``straight``: coordinates over that distance, of a straight response. ``most``: how far is looked; where
-    the deviation is below its ``level`` there, the end of the interval is ``bound``.
-    """
+    """Points of a profile to one side of a fit: a coordinate held off by some distance, the others fitted."""
 
     search: Search
     best: Point
     k: int
     level: float
-    straight: Floats
-    most: float
-    bound: float
+    straight: Floats  # coordinates over that distance, of a straight response
+    most: float  # how far is looked
+    bound: float  # the end of the interval where the deviation is below its level there
 
     def fitted(self, begin: Point, at: float) -> tuple[Floats, float]:
         """The others fitted again, and the deviation over its level; at the farthest only which is more."""
@@ -113,21 +109,17 @@ def _along(path: Sequence[tuple[float, Floats]], at: float) -> Floats:
 class ResponseFit(Fit):
     """Values by key with which a loop's response is the measured one.
 
-    ``misfit`` is the root of the mean squared residual over its deviation, None where none was measured.
     Errors are widened by a misfit above 1; without deviations they are those of the residual, with Student's
-    factor at its degrees of freedom. ``ends`` are 95 % intervals by profiles, shape (p, 2), with the error of
-    what is kept; 1.96 standard errors reach their farther end. ``also`` are other values, beyond these, that
-    explain the response as well. ``covariance``: at what is kept; ``joint``: with the error of that.
-    ``slopes`` of what is left (``rest``, in its deviations), over the values.
+    factor at its degrees of freedom. 1.96 standard errors reach the farther end of an interval.
     """
 
-    misfit: float | None
+    misfit: float | None  # root of the mean squared residual over its deviation; None: none was measured
     at_bound: tuple[str, ...]
-    also: Mapping[str, float]
-    ends: Floats = field(repr=False)
-    joint: Floats = field(repr=False)
-    rest: Floats = field(repr=False)
-    slopes: Floats = field(repr=False)
+    also: Mapping[str, float]  # other values, beyond the intervals, that explain the response as well
+    ends: Floats = field(repr=False)  # 95 % intervals by profiles, (p, 2), with the error of what is kept
+    joint: Floats = field(repr=False)  # covariance with that error; ``covariance``: at what is kept
+    rest: Floats = field(repr=False)  # what is left, in its deviations
+    slopes: Floats = field(repr=False)  # of that, over the values
 
     def interval(self, name: str) -> tuple[float, float]:
         """95 % interval of one value, longer to the side where the response tells it less."""

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.parameters import own_share
 from analyses.identification.output_error import LEAST_STEPPED, box_of
 from analyses.identification.response_model import Values
@@ -51,23 +50,22 @@ class Point:
 
 @dataclass(frozen=True, kw_only=True)
 class Search:
-    """Coordinates of the first ``count`` values, which are looked for, and of others that are kept.
+    """Coordinates of values that are looked for, and of others that are kept.
 
-    ``origin + turn y``, y the exponential of a coordinate where it is a logarithm (``logs``): that of an
+    The values are ``origin + turn y``, y the exponential of a coordinate where it is a logarithm: that of an
     inertia or a stiffness over the design's. What is kept has independent deviations of the design's own
-    error, which weigh as measured. ``box`` holds the coordinates, ``ends`` the values, each of shape (2, p).
-    ``unit``: deviation of what is left of the response.
+    error, which weigh as measured.
     """
 
     residual: Callable[[Values], Floats]
     names: tuple[str, ...]
-    count: int
-    logs: NDArray[np.bool_]
+    count: int  # of those that are looked for, the first
+    logs: Mask
     origin: Floats
     turn: Floats
-    box: Floats
-    ends: Floats
-    unit: float
+    box: Floats  # of the coordinates, shape (2, p)
+    ends: Floats  # of the values
+    unit: float  # deviation of what is left of the response
 
     @classmethod
     def of(
@@ -155,9 +153,7 @@ class Search:
                 break
         return here
 
-    def _step(
-        self, here: Point, slopes: Floats, size: Floats, free: NDArray[np.bool_], damp: float
-    ) -> Floats:
+    def _step(self, here: Point, slopes: Floats, size: Floats, free: Mask, damp: float) -> Floats:
         """One step of the free coordinates, whose slopes are over their sizes."""
         table = np.vstack([slopes, np.sqrt(damp) * np.eye(slopes.shape[1])])
         solve = np.linalg.pinv(table)[:, : len(here.rest)]

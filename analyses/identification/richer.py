@@ -15,20 +15,15 @@ STRIBECK_SPEEDS = 12
 
 @dataclass(frozen=True, kw_only=True)
 class LawScore:
-    """How well one law predicts runs that it was not fitted to.
-
-    ``error_Nm`` is the root of the mean weighted squared prediction error, in N m; ``gain`` the relative
-    reduction of the squared error against the plain law with its standard error ``gain_std`` (paired over the
-    runs). ``warranted``: the gain exceeds twice its standard error and 5 %.
-    """
+    """How well one law predicts runs that it was not fitted to."""
 
     name: str
     formula: str
     parameters: int = 0
-    error_Nm: float = nan
-    gain: float = nan
-    gain_std: float = nan
-    warranted: bool = False
+    error_Nm: float = nan  # root of the mean weighted squared prediction error
+    gain: float = nan  # relative reduction of the squared error against the plain law
+    gain_std: float = nan  # its standard error, paired over the runs
+    warranted: bool = False  # the gain exceeds twice that and 5 %
     possible: bool = True
     reason: str = ""
 

@@ -13,21 +13,17 @@ from analyses.records.record import longest
 
 @dataclass(frozen=True, kw_only=True)
 class SteadyCriterion:
-    """When a motion counts as steady.
+    """When a motion counts as steady: where its acceleration is not above the larger of two limits.
 
-    The acceleration is the slope of a least-squares line through the speed over ``window_s``. It must not
-    exceed the larger of ``relative_per_s`` times the plateau of the speed (its 95 % point) and
-    ``noise_factor`` times the standard deviation which white noise of the speed gives such a slope. Samples
-    below ``least_share`` of the plateau are standstill. Of the stretches that qualify the longest is taken,
-    ``trim_s`` is cut off at both ends, and at least ``least_duration_s`` must remain.
+    The acceleration is the slope of a least-squares line through the speed; the longest stretch is taken.
     """
 
-    window_s: float = 0.25
-    relative_per_s: float = 0.02
-    noise_factor: float = 5.0
-    least_share: float = 0.5
-    trim_s: float = 0.1
-    least_duration_s: float = 0.5
+    window_s: float = 0.25  # of that line
+    relative_per_s: float = 0.02  # times the plateau of the speed, its 95 % point: one limit
+    noise_factor: float = 5.0  # times what white noise of the speed gives such a slope (std): the other
+    least_share: float = 0.5  # of the plateau: samples below are standstill
+    trim_s: float = 0.1  # cut off at both ends
+    least_duration_s: float = 0.5  # must remain
 
     def __str__(self) -> str:
         said = f"slope of the speed over {self.window_s:g} s at most {100 * self.relative_per_s:g} % of the "
@@ -99,19 +95,14 @@ def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:
 
 @dataclass(frozen=True, kw_only=True)
 class SteadyPoint:
-    """Means over the steady part of one run.
-
-    ``speed_rad_s`` and ``torque_Nm`` (kM i) are counted positive in the direction of the motion, ``load_Nm``
-    is the magnitude |M_ext|; ``direction`` is +1 or -1. ``covariance`` is that of the means of torque, speed
-    and load, shape (3, 3), with their correlation in time respected.
-    """
+    """Means over the steady part of one run, torque and speed positive in the direction of the motion."""
 
     run: str
-    direction: int
-    torque_Nm: float
+    direction: int  # +1 or -1
+    torque_Nm: float  # kM i
     speed_rad_s: float
-    load_Nm: float
-    covariance: Floats
+    load_Nm: float  # magnitude |M_ext|
+    covariance: Floats  # of the means of torque, speed and load, (3, 3), by their correlation in time
     window: SteadyWindow
     samples: int
     correlation_samples: tuple[float, float, float]

@@ -25,19 +25,14 @@ FLOORS = ("damping", "viscous", "load_viscous")
 
 @dataclass(frozen=True, kw_only=True)
 class Lines:
-    """Spectral lines at the excited frequencies: of the motor's torque, the motor's angle, and the load's.
-
-    The last may be left out. ``means`` are complex amplitudes over all periods, shape (signals, lines);
-    ``noise`` is their covariance, shape (lines, signals, signals), from the spectrum beside each line, with
-    ``freedom`` (complex) degrees.
-    """
+    """Spectral lines at the excited frequencies: of the motor's torque, its angle, and maybe the load's."""
 
     omega_rad_s: Floats
-    means: Complexes
-    noise: Complexes
+    means: Complexes  # amplitudes over all periods, shape (signals, lines)
+    noise: Complexes  # their covariance, shape (lines, signals, signals), from the spectrum beside each line
     names: tuple[str, ...]
     periods: int
-    freedom: int
+    freedom: int  # complex degrees, of the noise
 
 
 def excited_lines(record: Record, names: tuple[str, ...], period_s: float) -> Lines:
@@ -137,14 +132,11 @@ def period_of_excitation(record: Record, name: str) -> float:
 
 @dataclass(frozen=True, kw_only=True)
 class TwoMass(Fit):
-    """The two-mass drive that fits the lines best, with 95 % intervals.
-
-    ``misfit`` is the root of the mean squared residual over its noise: near 1 the model explains the lines.
-    Where it is larger the errors are widened by it. ``resonance_rad_s`` and ``antiresonance_rad_s`` are those
-    without damping.
-    """
+    """The two-mass drive that fits the lines best; its resonances are those without damping."""
 
     reduction: float
+    # root of the mean squared residual over its noise: near 1 the model explains the lines, above the errors
+    # are widened by it
     misfit: float
     lines: int
     reaction: float = 0.0

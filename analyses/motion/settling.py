@@ -201,16 +201,22 @@ def words(rest: Rest, factor: float, unit: str) -> str:
         left = f" but for {faint_words(rest, factor, unit)}" if rest.amplitude or rest.motor_amplitude else ""
         return f"comes to rest{left}"
     if rest.verdict == "diverging":
-        return "diverges"
+        return f"diverges{acting(rest)}"
     after = f"{float(f'{rest.after_s:.3g}'):g}"
     if rest.verdict == "still moving" and not (rest.amplitude or rest.motor_amplitude):
         return f"stands still {after} s later; whether it stays is not known"
     size = _size(rest, factor, unit)
     if rest.verdict == "still moving":
-        return f"still moving {after} s later, by {size}"
-    limits = f", {' and '.join(rest.limited)} limit acting" if rest.limited else ""
-    seen = f"{rest.periods} periods seen{limits}"
+        return f"still moving {after} s later, by {size}{acting(rest)}"
+    seen = f"{rest.periods} periods seen{acting(rest)}"
     return f"limit cycle of {size} at {rest.frequency_hz:.3g} Hz ({seen})"
+
+
+def acting(rest: Rest) -> str:
+    """Say which limits act at the end; the overload protection alone where it does, as it sets the others."""
+    if "overload" in rest.limited:
+        return ", the overload protection (I2t) folding the current back"
+    return f", {' and '.join(rest.limited)} limit acting" if rest.limited else ""
 
 
 def faint_words(rest: Rest, factor: float, unit: str) -> str:

@@ -38,12 +38,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import as_path, read_campaign_toml, shown_path
 from analyses.records.naming import canonical, spelled
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -59,18 +59,14 @@ Method = Literal["correlation", "event", "given"]
 
 @dataclass(frozen=True, kw_only=True)
 class Instruments:
-    """Bounds of the systematic errors, constant over a campaign, uniform within.
-
-    ``torque_accuracy`` is a share of ``torque_full_scale_Nm`` and bounds the error at zero and at full scale,
-    each on its own, with a straight line between. ``torque_constant`` bounds the relative error of kM
-    (0: taken as known).
-    """
+    """Bounds of the systematic errors, constant over a campaign, uniform within."""
 
     torque_full_scale_Nm: Annotated[float, "N*m"] = 10.0
+    # of full scale: at zero and there, each on its own, with a straight line between
     torque_accuracy: Annotated[float, ""] = 0.0
     current_gain: Annotated[float, ""] = 0.0
     current_offset_A: Annotated[float, "A"] = 0.0
-    torque_constant: Annotated[float, ""] = 0.0
+    torque_constant: Annotated[float, ""] = 0.0  # relative error of kM; 0: taken as known
 
     def __post_init__(self) -> None:
         for name, value in asdict(self).items():
@@ -104,7 +100,6 @@ class Campaign:
     instruments: Instruments
     runs: tuple[RunEntry, ...]
     origin: str
-    notes: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -126,16 +121,16 @@ def load_campaign(path: str | Path) -> Campaign:
     refuse_design(root)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")
-    campaign = head.read(
-        Campaign,
-        drive=record_spec(root.table("drive")),
-        sensor=record_spec(root.table("sensor")) if "sensor" in root else None,
-        join=root.table("join").read(Join),
-        instruments=_instruments(root.table("instruments")),
-        runs=tuple(_run(table, path.parent) for table in root.tables("run")),
-        origin=str(path),
-        notes=(),
-    )
+    with in_file(str(path)):
+        campaign = head.read(
+            Campaign,
+            drive=record_spec(root.table("drive")),
+            sensor=record_spec(root.table("sensor")) if "sensor" in root else None,
+            join=root.table("join").read(Join),
+            instruments=root.table("instruments").read(Instruments),
+            runs=tuple(_run(table, path.parent) for table in root.tables("run")),
+            origin=str(path),
+        )
     campaign = campaign if "name" in head else replace(campaign, name=shown_path(path.stem))
     _check(campaign)
     return campaign
@@ -163,13 +158,6 @@ def _run(table: Table, folder: Path) -> RunEntry:
     entry = table.read(RunEntry)
     sensor = folder / entry.sensor if entry.sensor and table.data["sensor"] else None
     return replace(entry, drive=folder / entry.drive, sensor=sensor)
-
-
-def _instruments(table: Table) -> Instruments:
-    try:
-        return table.read(Instruments)
-    except InputError as error:
-        raise InputError(error.message, where=table.origin) from None
 
 
 def record_spec(table: Table) -> RecordSpec:

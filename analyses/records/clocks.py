@@ -25,20 +25,15 @@ class Mismatch(InputError):
 
 @dataclass(frozen=True, kw_only=True)
 class ClockJoin:
-    """How the second recorder's time was put on the first one's, by which of their signals.
-
-    ``t_first = offset_s + rate * t_second``, with standard deviations and the correlation reached.
-    ``rate`` is 1 and ``rate_std`` None where the records do not tell it (a single event). ``offset_std_s`` is
-    that of the offset at the middle of the second record.
-    """
+    """How the second recorder's time was put on the first one's: ``t_first = offset_s + rate * t_second``."""
 
     offset_s: float
-    offset_std_s: float = 0.0
+    offset_std_s: float = 0.0  # at the middle of the second record
     rate: float = 1.0
-    rate_std: float | None = None
-    quality: float = 1.0
+    rate_std: float | None = None  # None: the records do not tell the rate (a single event)
+    quality: float = 1.0  # correlation reached
     method: str = "given"
-    first_signal: str = ""
+    first_signal: str = ""  # by which it was done
     second_signal: str = ""
 
     def __str__(self) -> str:

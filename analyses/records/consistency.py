@@ -32,8 +32,6 @@ LEAST_ROWS = 10  # smoothed and thinned, of a comparison
 STEADY = 0.1  # relative difference of steps of the position beside a row that is missing or filled in
 COPPER_1_K = 3.93e-3
 WINDING_K = (-75.0, 160.0)  # from 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H
-
-
 FOLLOWED = (
     ("position_reference", "position"),
     ("reference", "output_angle"),
@@ -48,15 +46,12 @@ FOLLOWED = (
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: what, whether it agrees (None: not determined), and in words.
-
-    ``unproven``: what is not determined leaves it open whether the record agrees.
-    """
+    """One thing that was looked at."""
 
     subject: str
-    passed: bool | None
+    passed: bool | None  # whether it agrees; None: not determined
     text: str
-    unproven: bool = field(default=False, repr=False)
+    unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
@@ -131,16 +126,12 @@ def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class RateRatio:
-    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves.
+    """A recorded speed over the rate of the recorded position, and the interval that noise of both leaves."""
 
-    ``place`` is the position's signal, ``found`` the ratio, ``alike`` the cosine; ``low`` and ``high`` hold
-    it with noise in either (Frisch's bounds: regressed each on the other, with the error of each).
-    """
-
-    place: str
-    found: float
-    alike: float
-    low: float
+    place: str  # the position's signal
+    found: float  # the ratio
+    alike: float  # the cosine
+    low: float  # Frisch's bounds: each regressed on the other, with the error of each
     high: float
     rate: Floats
     moves: Mask

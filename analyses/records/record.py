@@ -20,11 +20,7 @@ RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling ac
 
 @dataclass(kw_only=True)
 class RowCounts:
-    """Lines and rows of a file; once it is read ``rows_in == rows_out + sum(dropped.values())``.
-
-    ``first_dropped`` names for each reason the first place where it happened; ``columns`` are those of the
-    file, ``first_stamp`` that which its times count from.
-    """
+    """Lines and rows of a file; once it is read ``rows_in == rows_out + sum(dropped.values())``."""
 
     lines: int = 0
     comments: int = 0
@@ -33,9 +29,9 @@ class RowCounts:
     rows_in: int = 0
     rows_out: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
-    first_dropped: dict[str, str] = field(default_factory=dict)
-    columns: tuple[str, ...] = field(default=(), repr=False)
-    first_stamp: datetime | None = field(default=None, repr=False)
+    first_dropped: dict[str, str] = field(default_factory=dict)  # where each reason was met first
+    columns: tuple[str, ...] = field(default=(), repr=False)  # of the file
+    first_stamp: datetime | None = field(default=None, repr=False)  # that its times count from
 
     def drop(self, reason: str, where: str, count: int = 1) -> None:
         """Count rows that are left out, and where the first of them was."""
@@ -50,15 +46,12 @@ class RowCounts:
 
 @dataclass(frozen=True, kw_only=True)
 class InputColumn:
-    """One column of a file: the signal that it became (empty: none), the unit that was read, and a note.
-
-    The note tells why a column was left out, or what was done to it beside the conversion of its unit.
-    """
+    """One column of a file."""
 
     column: str
-    signal: str = ""
-    unit: str = ""
-    note: str = ""
+    signal: str = ""  # that it became; empty: none
+    unit: str = ""  # that was read
+    note: str = ""  # why it was left out, or what was done to it beside the conversion of its unit
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -26,25 +26,18 @@ TO_LINE = 3.0**0.5
 
 @dataclass(frozen=True, kw_only=True)
 class CsvFormat:
-    """The text layout of a file.
+    """The text layout of a file."""
 
-    ``separator`` is one character or ``"whitespace"`` (any run of blanks and tabs), ``comment`` begins lines
-    that are counted and passed over, ``row_end`` closes each row before the line end. ``header``: whether the
-    first line holds the column names (None: where no ``names`` are given); ``encoding`` is that of the header
-    only. ``matrix`` is that of a MATLAB file whose columns are ``names``, or named by a list of texts in the
-    file. With ``stamps`` the time is written as ISO 8601 stamps, read as seconds from the first.
-    """
-
-    separator: str = ","
+    separator: str = ","  # one character, or "whitespace": any run of blanks and tabs
     decimal: str = "."
-    comment: str = "#"
-    row_end: str = ""
-    header: bool | None = None
+    comment: str = "#"  # begins lines that are counted and passed over
+    row_end: str = ""  # closes each row before the line end
+    header: bool | None = None  # whether the first line holds the column names; None: without ``names``
     names: tuple[str, ...] = ()
     skip_lines: int = 0
-    encoding: str = "utf-8"
-    matrix: str = ""
-    stamps: bool = False
+    encoding: str = "utf-8"  # of the header only
+    matrix: str = ""  # of a MATLAB file, whose columns are ``names``, or named by a list of texts in the file
+    stamps: bool = False  # the time is written as ISO 8601 stamps, read as seconds from the first
 
     def __post_init__(self) -> None:
         if self.separator != "whitespace" and (len(self.separator) != 1 or self.separator in "\r\n\"'"):
@@ -72,18 +65,13 @@ class CsvFormat:
 
 @dataclass(frozen=True, kw_only=True)
 class TimeColumn:
-    """Where the time comes from.
-
-    Either a column in a unit of time, or a column of ticks with the period of one tick, which may
-    wrap around at ``wrap`` ticks; or, with ``column`` None, a constant period.
-    Rows whose raw value is below ``minimum`` are dropped, and counted.
-    """
+    """Where the time comes from: a column in a unit of time or of ticks, or, without one, its period."""
 
     column: str | int | None = None
     unit: str = "s"
-    tick_s: Annotated[float | None, "s"] = None
-    wrap: float | None = None
-    minimum: float | None = None
+    tick_s: Annotated[float | None, "s"] = None  # period of one tick
+    wrap: float | None = None  # ticks at which they begin anew
+    minimum: float | None = None  # rows whose raw value is below are dropped, and counted
     period_s: Annotated[float | None, "s"] = None
 
     def __post_init__(self) -> None:
@@ -96,19 +84,16 @@ class TimeColumn:
 
 @dataclass(frozen=True, kw_only=True)
 class SignalColumn:
-    """One signal: its name in the analyses, its column (name, or number from 1), its unit.
+    """One signal; its value in SI is ``(raw + offset) * scale`` converted from ``unit``."""
 
-    The value in SI is ``(raw + offset) * scale`` converted from ``unit``. A column ``"u - pulses"`` that the
-    file does not have is the difference (or sum) of those it has. The model has the equivalent DC
-    motor: of an AC motor ``value`` tells whether a line current or a voltage was written as ``rms`` or
-    ``peak``, and ``between = "phase"`` that a voltage is that of a phase to the star point.
-    """
-
-    name: str
+    name: str  # in the analyses
+    # its name, or number from 1; "u - pulses", where the file has no such, is the difference of those it has
     column: str | int
     unit: str = "1"
     scale: float = 1.0
     offset: float = 0.0
+    # of an AC motor, for the equivalent DC motor of the model: how a line current or a voltage is written,
+    # and whether a voltage is that of a phase to the star point
     value: Literal["dc", "rms", "peak"] = "dc"
     between: Literal["line-line", "phase"] = "line-line"
 
@@ -138,22 +123,15 @@ class SignalColumn:
 
 @dataclass(frozen=True, kw_only=True)
 class RecordSpec:
-    """Everything needed to read the files of one recorder.
-
-    ``bad_rows``: what to do with a row that is no row of numbers (default: refuse the file, with line,
-    column and reason). ``missing``: what to do with an empty or NaN value (default: drop the row;
-    ``interpolate`` for signals logged at several rates, see `analyses.records.table_record`).
-    ``disorder``: what to do when the time does not increase (default: refuse). Dropped rows are counted
-    by reason. ``resample_tolerance``: see `Record.resampled`.
-    """
+    """Everything needed to read the files of one recorder; rows that are dropped are counted by reason."""
 
     time: TimeColumn
     signals: tuple[SignalColumn, ...]
     format: CsvFormat = CsvFormat()
-    bad_rows: Policy = "error"
-    missing: Missing = "drop"
-    disorder: Policy = "error"
-    resample_tolerance: Annotated[float, ""] = RESAMPLE_TOLERANCE
+    bad_rows: Policy = "error"  # where one holds no numbers: the file is refused, with line, column, reason
+    missing: Missing = "drop"  # a value empty or NaN: its row; "interpolate" for signals at several rates
+    disorder: Policy = "error"  # where the time does not increase
+    resample_tolerance: Annotated[float, ""] = RESAMPLE_TOLERANCE  # see `Record.resampled`
 
     def __post_init__(self) -> None:
         if not 0.0 < self.resample_tolerance <= 1.0:

@@ -36,8 +36,8 @@ class Asked:
 
     The result is confirmed by certified margins, nominal and at each requirement's worst corner.
 
-    Writes tuned.toml (a design), tune.html and tune.json. Exit status 1 where the requirements cannot be
-    met.
+    Writes tune.html, tune.json and, where the requirements are met, tuned.toml (a design). Exit status 1
+    where they cannot be met.
 
     Try: actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
     """

@@ -80,8 +80,8 @@ def commands_page() -> str:
     lines = [
         "# Commands",
         "",
-        "Made from the command line itself; each command has `--help`. Exit status: 0 all requirements met,",
-        "1 one is not met or not proven, 2 bad input, 3 no result (numerical failure, time limit, crash).",
+        "Made from the command line itself; each command has `--help`. Exit status: 0 what is judged is met,",
+        "1 something is not or not proven to be, 2 bad input, 3 no result (failure, time limit, crash).",
         "`python -m reports.cli` is the same program where `actuator-lti` is not on the path.",
         "",
     ]

@@ -1,17 +1,11 @@
 """The simulator's own derivative: a complete linear model of the running drive, from its compiled tick.
 
 On an operating motion one base period of the drive, H ticks (the least common multiple of its stages'
-updates), is a map of its state s and of a signal v added at one place and held there over its own period,
-
-    s' = F(s, v),   y = G(s, v).
-
-It is affine where no event changes (a limit, a reversal, a parting of the coupling) and smooth under a load
-that bends with the angle.  Its derivative
-
-    A = dF/ds,   B = dF/dv,   C = dG/ds,   D = dG/dv
-
-says everything that a linear loop says: response, poles, margins, at any rate, of any slow mode, stable or
-not.  It shares no code with the linear loops, so the two may be held against each other.
+updates), is a map of its state s and of a signal v added at one place and held there over its own period:
+s' = F(s, v), y = G(s, v).  It is affine where no event changes (a limit, a reversal, a parting of the
+coupling) and smooth under a load that bends with the angle.  Its derivative A = dF/ds, B = dF/dv, C = dG/ds,
+D = dG/dv says everything that a linear loop says: response, poles, margins, at any rate, of any slow mode,
+stable or not.  It shares no code with the linear loops, so the two may be held against each other.
 
 `nonlinear.bench.differences` takes it; what two sizes of its steps differ in is the stated error.
 """
@@ -25,18 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.loader import AnyDesign, as_design
+from actuator_lti.types import Complexes, Floats
 from nonlinear.bench.differences import Differences
 from nonlinear.bench.injection import Watched
-from nonlinear.bench.lifted import (
-    Complexes,
-    Floats,
-    eigenvalues,
-    even,
-    lifted,
-    response,
-    sensitivities,
-    without_rest,
-)
+from nonlinear.bench.lifted import eigenvalues, even, lifted, response, sensitivities, without_rest
 from nonlinear.bench.loop_setup import LoopSetup, loop_setup
 
 

@@ -34,19 +34,15 @@ HELD = 1e12  # so many times its inertia holds the rotor at its speed
 
 @dataclass(frozen=True)
 class LoopSetup:
-    """A drive set up to test one loop.
-
-    ``loop``: ``"current"``, ``"velocity"``, ``"position"`` (outer loops open), or a break point ``"u"``,
-    ``"i_ref"``, ``"w_ref"``, ``"output"`` (all other loops closed).
-    ``bias``: the motion underneath.
-    ``held``: whether the rotor is held at its speed.
-    """
+    """A drive set up to test one loop."""
 
     design: Design
+    # "current", "velocity", "position": outer loops open; a break point "u", "i_ref", "w_ref", "output": all
+    # other loops closed; or one of `PATHS`
     loop: str
-    bias: OperatingMotion
+    bias: OperatingMotion  # the motion underneath
     limits_on: bool = True
-    held: bool = False
+    held: bool = False  # whether the rotor is held at its speed
 
     @cached_property
     def wired(self) -> Drive:

@@ -40,26 +40,18 @@ FLAT = 1e-12  # of Tc/w_s: a smaller slope of the tanh law is none
 
 @dataclass(frozen=True)
 class OperatingMotion:
-    """A drive at constant speed: every signal of the cascade, motor side.
+    """A drive at constant speed: every signal of the cascade, motor side."""
 
-    ``speed_rad_s``: 0: the drive stands, and dry friction has to be left out of the test.
-    ``current_A``, ``voltage_V``: what the motor takes (zero current for an ideal torque source).
-    ``friction_on``: whether dry friction and offset torque take part.
-    ``load_Nm``: constant moment at the output.
-    ``twist_rad``, ``coupling_Nm``: of the coupling, at its own shaft; 0 where the drive train is rigid.
-    ``extra_Nm``: constant torque at the motor shaft: against what presses the coupling past its play, and
-    on a drive that stands against its own.
-    ``room_rad_s``: how far the motor speed may move before the friction is another.
-    """
-
-    speed_rad_s: float
-    current_A: float
+    speed_rad_s: float  # 0: the drive stands, and dry friction has to be left out of the test
+    current_A: float  # what the motor takes; zero for an ideal torque source
     voltage_V: float
-    friction_on: bool
-    load_Nm: float = 0.0
-    twist_rad: float = 0.0
+    friction_on: bool  # whether dry friction and offset torque take part
+    load_Nm: float = 0.0  # constant moment at the output
+    twist_rad: float = 0.0  # of the coupling, at its own shaft, as its torque; 0 where there is none
     coupling_Nm: float = 0.0
-    room_rad_s: float = inf
+    room_rad_s: float = inf  # how far the motor speed may move before the friction is another
+    # constant torque at the motor shaft: against what presses the coupling past its play, and on a drive that
+    # stands against its own
     extra_Nm: float = 0.0
 
     def load(self, rows: Rows) -> None:

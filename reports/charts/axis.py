@@ -87,8 +87,6 @@ class Axis:
 def linear_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]:
     """Give ticks at multiples of 1, 2, 2.5 or 5 times a power of ten.
 
-    Examples
-    --------
     >>> [words for _, words in linear_ticks(0.0, 1.0)]
     ['0', '0.2', '0.4', '0.6', '0.8', '1']
     >>> [words for _, words in linear_ticks(19.66001, 19.66009, 4)]
@@ -104,8 +102,6 @@ def linear_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, st
 def log_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]:
     """Give ticks at decades, or at 1, 2 and 5 times a decade where there are few.
 
-    Examples
-    --------
     >>> [words for _, words in log_ticks(0.3, 5000.0)]
     ['1', '10', '100', '1k']
     >>> [words for _, words in log_ticks(3.0, 60.0)]

@@ -22,8 +22,6 @@ _READER = TypeAdapter(Chart)
 def chart_data(chart: Chart) -> Tree:
     """Give a chart as JSON knows it.
 
-    Examples
-    --------
     >>> chart = Chart(width=300.0)
     >>> _ = chart.panel().curve([0.0, 1.0], [2.0, None], "y")
     >>> again = chart_of(chart_data(chart))

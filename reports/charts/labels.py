@@ -20,8 +20,6 @@ Box = tuple[float, float, float, float]
 def text_width(words: str, size: float) -> float:
     """Estimate the width of a line of text, rather too wide than too narrow.
 
-    Examples
-    --------
     >>> round(text_width("GM 9.4 dB", 10.0))
     49
     """

@@ -62,15 +62,13 @@ class Pen:
             return 'style="' + ";".join(f"{key}:{value}" for key, value in resolved.items()) + '"'
         return " ".join(f'{key}="{value}"' for key, value in resolved.items())
 
-    def stroke(self, look: Look) -> str:
-        return self.style(
+    def line(self, path: str, look: Look, more: str = "") -> str:
+        stroke = self.style(
             fill="none", stroke=look.colour, stroke_width=f"{look.width:g}",
             stroke_dasharray=DASHES[look.dash % len(DASHES)],
             stroke_opacity="" if look.opacity == 1.0 else f"{look.opacity:g}", stroke_linejoin="round",
         )  # fmt: skip
-
-    def line(self, path: str, look: Look, more: str = "") -> str:
-        return f'<path{more} d="{path}" {self.stroke(look)}/>'
+        return f'<path{more} d="{path}" {stroke}/>'
 
     def filled(self, path: str, look: Look, more: str = "") -> str:
         fill = look.fill or look.colour

@@ -119,8 +119,6 @@ def time_axis(panel: Panel, last_s: float) -> float:
 def kept_rows(series: Sequence[np.ndarray], buckets: int = 300) -> np.ndarray:
     """Rows of a long series to draw: of each bucket the first, and the smallest and largest of every series.
 
-    Examples
-    --------
     >>> y = np.zeros(1000)
     >>> y[503] = 1.0
     >>> bool(503 in kept_rows([y], 10))

@@ -141,20 +141,19 @@ def answer(
     parts = [*notices(missing, one.name), *in_amperes(one.sections(result), drive)]
     if drive is not None:
         doc.waived(parts, drive)
-    passed = getattr(result, "passed", None)
-    passed = passed or getattr(result, "verdict", passed)
-    if passed is not None:
-        parts[bool(missing)]["verdict"] = Verdict.of(passed)
+    verdict = one.verdict(result)
+    if verdict is not None:
+        parts[bool(missing)]["verdict"] = verdict
     files = one.shows("write", lambda *_: [])(result, out)
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)
     if as_json:
         print_json(one.shows("data", plain_data)(result))
     else:
-        _print(one, drive, result, parts, passed)
+        _print(one, drive, result, parts, verdict)
         for path in files:
             print_line(f"wrote {path}")
-    leave_with(passed in (None, True, "met"))
+    leave_with(verdict in (None, Verdict.MET))
 
 
 def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, quiet: bool) -> list[str]:
@@ -168,18 +167,18 @@ def _pages(one: Analysis, drive: Design, parts: Sequence[Section], out: Path, qu
 
 
 def _print(
-    one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], passed: bool | Verdict | None
+    one: Analysis, drive: Design | None, result: Any, parts: Sequence[Section], verdict: Verdict | None
 ) -> None:
     from reports.study_pages import in_amperes
     from reports.terminal import print_blocks, print_section, print_verdict
 
     name = getattr(drive, "name", "")
     if (made := one.shows("brief", lambda _: None)(result)) is not None:
-        print_verdict(passed or False, f"{name}: {in_amperes(made.words, drive, 'result')}")
+        print_verdict(verdict or Verdict.NOT_MET, f"{name}: {in_amperes(made.words, drive, 'result')}")
         print_blocks(in_amperes(made.blocks, drive), made.notes)
         return
     for k, part in enumerate(parts):
-        print_section(part, None if k else passed, name="" if k else name)
+        print_section(part, None if k else verdict, name="" if k else name)
 
 
 def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, Any]:

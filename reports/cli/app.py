@@ -70,7 +70,11 @@ def about(
         ),
     ] = None,
 ) -> None:
-    """Linear loop analysis of electromechanical actuators, checked by an exact nonlinear simulator."""
+    """Linear loop analysis of electromechanical actuators, checked by an exact nonlinear simulator.
+
+    Exit status of every command: 0 what is judged is met, or nothing is; 1 something is not met, or not
+    proven and not waived (of bench records: not met); 2 bad input; 3 no result; 130 interrupted.
+    """
     time_limit.start(time_limit.usual(context.invoked_subcommand) if limit is None else limit)
 
 

@@ -24,9 +24,7 @@ def folder_for_results(path: Path | None) -> Path | None:
     """Refuse a folder that cannot be written, before anything is computed; made only when it is needed."""
     if path is None:
         return None
-    there = path.absolute()
-    while not there.exists() and there != there.parent:
-        there = there.parent
+    there = next(one for one in (path.absolute(), *path.absolute().parents) if one.exists())
     if not there.is_dir():
         raise InputError("is not a directory; allowed for --out: a folder, made if needed", where=str(there))
     if not os.access(there, os.W_OK | os.X_OK):
@@ -103,8 +101,6 @@ def load_drive(name_or_path: str, changes: Sequence[str] | None = None) -> Desig
 def read_changes(changes: Sequence[str]) -> Tree:
     """Keys and values of ``KEY=VALUE`` texts; numbers, lists and tables as TOML has them, all else a text.
 
-    Examples
-    --------
     >>> read_changes(["limits.voltage=24 V", "gear.worm.ratio=40", "friction.law=tanh"])
     {'limits.voltage': '24 V', 'gear.worm.ratio': 40, 'friction.law': 'tanh'}
     """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -73,8 +74,6 @@ def print_line(text: str) -> None:
 def printable(text: str) -> str:
     """The text without control characters but line breaks and tabs, and without marks of direction.
 
-    Examples
-    --------
     >>> printable("a\\x1b[31mb\\u202e")
     'a?[31mb?'
     """
@@ -90,8 +89,6 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int
 
     Nothing is shown where standard error is no terminal, so that logs stay clean.
 
-    Examples
-    --------
     >>> with progress("counting") as report:
     ...     report(1, 1)
     """
@@ -115,3 +112,26 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int
     finally:
         for bar in bars:
             bar.stop()
+
+
+_told: set[str] = set()
+
+
+@contextmanager
+def told_if_slow(text: str, patience_s: float = 1.0) -> Iterator[None]:
+    """Write a line to a terminal's standard error if the block is still at work after a while; once each."""
+
+    def tell() -> None:
+        if text not in _told:
+            _told.add(text)
+            sys.stderr.write(f"{text}\n")
+            sys.stderr.flush()
+
+    timer = threading.Timer(patience_s, tell)
+    timer.daemon = True
+    if text not in _told and sys.stderr.isatty():
+        timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

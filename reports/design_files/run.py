@@ -38,8 +38,6 @@ class Listed:
 
 @dataclass(frozen=True)
 class Catalogue:
-    """The shipped designs."""
-
     designs: tuple[Listed, ...]
 
     def __str__(self) -> str:
@@ -138,8 +136,6 @@ def _is_called(key: KeyEntry, text: str) -> bool:
 
 @dataclass(frozen=True)
 class Started:
-    """The file that was written."""
-
     file: str
 
     def __str__(self) -> str:

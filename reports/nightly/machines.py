@@ -5,6 +5,8 @@ from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
 from actuator_lti.files.tree import Tree
+from reports.html import environment
+from reports.nightly import changes
 from reports.nightly.changes import Comparison, cause_lines
 from reports.nightly.text import markdown_cell, one_line
 from reports.nightly.view import STATES, DesignView, Overview
@@ -94,7 +96,7 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
         case("is built", "error", design.why, design.result.status, design.result.message.partition("\n")[2])
         return
     case("is built")
-    worse = design.regressions
+    worse = design.baseline.regressions
     lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
     text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
     message = f"{len(worse)} figure(s) worse than the baseline"
@@ -124,36 +126,7 @@ def _value(value: float | None) -> str:
 
 def markdown(night: Overview) -> str:
     """Summary for a pull request: verdict first, then what fails, what changed and what is behind it."""
-    sign = "✓" if night.passed else "✗"
-    run = f"Run {night.run.id}, {night.run.started}, study commit {night.run.study_commit[:12] or 'unknown'}."
-    lines = [f"## {sign} Nightly {markdown_cell(night.title)}: {night.counts}", "", run, ""]
     notable = [d for d in night.designs if d.state != "pass" or d.last_night.changes]
-    if notable:
-        lines += ["| design | state | worst requirement | left to its limit | moved since last night |"]
-        lines += ["|---|---|---|---:|---:|", *map(_row, notable[:_LISTED])]
-        lines += [f"| and {len(notable) - _LISTED} more | | | | |"] if len(notable) > _LISTED else []
-    else:
-        lines.append("Nothing moved since last night.")
-    for design in notable[:_LISTED]:
-        lines += _details(design)
-    return "\n".join([*lines, ""])
-
-
-def _row(design: DesignView) -> str:
-    lost = "not met" if design.result.worst_id else ""
-    worst = lost if design.result.worst is None else f"{100 * design.result.worst:+.1f} %"
-    state = " ".join(STATES[design.state])
-    cells = (markdown_cell(design.name), state, markdown_cell(design.result.worst_id), worst)
-    return f"| {' | '.join(cells)} | {len(design.last_night.changes)} |"
-
-
-def _details(design: DesignView) -> list[str]:
-    lines = []
-    for change in design.last_night.changes[:8]:
-        marks = " (worse)" * bool(change.worse) + " (flapping)" * change.flapping
-        values = f"{or_none(change.before)} → {or_none(change.after)} {markdown_cell(change.unit)}"
-        lines.append(f"- {markdown_cell(change.figure, 120)}: {values}{marks}")
-    lines += [f"- {markdown_cell(line, 200)}" for line in cause_lines(design.last_night.cause)[:8]]
-    if design.broken:
-        lines.append(f"- {design.result.status}: {markdown_cell(design.why, 200)}")
-    return ["", f"**{markdown_cell(design.name)}**", "", *lines] if lines else []
+    told = {"told": changes, "states": STATES, "cell": markdown_cell, "or_none": or_none}
+    template = environment().get_template("nightly/summary.md.j2")
+    return template.render(night=night, notable=notable, listed=_LISTED, **told)

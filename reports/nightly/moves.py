@@ -59,8 +59,6 @@ class Tolerances:
 def read_tolerances(table: Mapping[str, object], where: str) -> Tolerances:
     """Read ``{"*phase_margin*" = "0.5 deg", "*bandwidth*" = "1 %"}``; a bare number is in the figure's unit.
 
-    Examples
-    --------
     >>> read_tolerances({"*bandwidth*": "1 %"}, "study.toml").rules
     (Rule(pattern='*bandwidth*', absolute=0.0, relative=0.01),)
     """
@@ -109,8 +107,6 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
 
     Steps that are smaller than the tolerance, in the unit of the values, do not count.
 
-    Examples
-    --------
     >>> [p.index for p in change_points(np.array([1.0, 1.0, np.nan, 1.0, 2.0, 2.0]), 0.1)]
     [4]
     """
@@ -137,8 +133,6 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
 def flaps(values: np.ndarray, tolerance: float) -> bool:
     """Whether a figure goes to and fro: within 14 nights twice or more back to where it was before.
 
-    Examples
-    --------
     >>> flaps(np.array([1.0, 2.0, 1.0, 2.0]), 0.1), flaps(np.array([1.0, 1.0, 2.0, 2.0]), 0.1)
     (True, False)
     """
@@ -155,8 +149,6 @@ def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:
 
     A gap is a pause longer than 1.75 times the usual one (the median of the last 60).
 
-    Examples
-    --------
     >>> missing_nights(["2026-01-0%dT02:00:00Z" % d for d in (1, 2, 3, 6, 7)])
     ((2, 2),)
     """

@@ -188,12 +188,8 @@ class _Child:
     def close(self) -> None:
         """End the process, whatever it does; then whoever waits for its answer has none, and its pipes go."""
         self._process.kill()
-        with self._asked:
-            self._process.wait()
-            for stream in (self._process.stdin, self._process.stdout, self._said):
-                if stream is not None:
-                    with suppress(OSError):  # a question that nobody has read
-                        stream.close()
+        with self._asked, self._said, suppress(OSError), self._process:
+            pass  # who leaves waits and closes; a question that nobody has read is no error
 
 
 # ---- the side of the process ---------------------------------------------------------------------------

@@ -16,8 +16,6 @@ Named = tuple[str, str, int, str]  # of a figure: name, unit, which way is bette
 def packed(figures: Iterable[Figure]) -> str:
     """Values of figures as text, no bit lost: base64 of float64, NaN where there is none.
 
-    Examples
-    --------
     >>> unpacked(packed([Figure(name="x", value=0.1), Figure(name="y", value=None)]))
     array([0.1, nan])
     """

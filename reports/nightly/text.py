@@ -22,8 +22,6 @@ def sha256(data: bytes | str) -> str:
 def one_line(text: str, limit: int = 300) -> str:
     """Text as one visible line of at most ``limit`` characters.
 
-    Examples
-    --------
     >>> one_line("a\\n b", 10), one_line("abcdef", 4)
     ('a b', 'abc…')
     """
@@ -34,8 +32,6 @@ def one_line(text: str, limit: int = 300) -> str:
 def markdown_cell(text: str, limit: int = 80) -> str:
     """Text that stays text in a Markdown table: markup characters escaped, one line.
 
-    Examples
-    --------
     >>> markdown_cell("a|b <i>")
     'a\\\\|b &lt;i&gt;'
     """
@@ -47,8 +43,6 @@ def markdown_cell(text: str, limit: int = 80) -> str:
 def csv_cell(value: object) -> str:
     """One CSV value that no spreadsheet takes for a formula: a quote in front of what could start one.
 
-    Examples
-    --------
     >>> csv_cell("=1+1"), csv_cell("-3.5"), csv_cell(None), csv_cell(2.0)
     ("'=1+1", '-3.5', '', '2.0')
     """

@@ -12,7 +12,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 from analyses.slugs import hashed
 from reports.nightly.cache import Cache
-from reports.nightly.changes import Between, Change, Comparison
+from reports.nightly.changes import Between, Comparison
 from reports.nightly.history import History
 from reports.nightly.moves import WINDOW, missing_nights
 from reports.nightly.records import Baseline, Result, Run
@@ -72,16 +72,12 @@ class DesignView:
         return list(self.meta.get("verdicts", ()))
 
     @property
-    def regressions(self) -> tuple[Change, ...]:
-        return self.baseline.regressions
-
-    @property
     def state(self) -> str:
         if self.broken:
             return "broken"
         if self.result.status != "pass":
             return self.result.status
-        return "regression" if self.regressions else "pass"
+        return "regression" if self.baseline.regressions else "pass"
 
     @property
     def report(self) -> str:
@@ -140,7 +136,6 @@ def report_folder(result: Result) -> str:
 
 
 def vanished(name: str, site: Path) -> InputError:
-    """That a result cannot be read back."""
     return InputError(f"the result of {name[:60]!r} has vanished from the cache: run again", where=str(site))
 
 

@@ -88,8 +88,6 @@ def believed(sections: Sequence[doc.Section]) -> str:
 def power_above(value: float) -> str:
     """The power of ten that a value does not pass.
 
-    Examples
-    --------
     >>> power_above(2.3e-9), power_above(1e-9)
     ('10⁻⁸', '10⁻⁹')
     """
@@ -123,8 +121,6 @@ def _lost(item: doc.VerdictItem) -> bool:
 def move_words(design: Design, move: Move) -> str:
     """Say a move in the unit in which the design file has the gain.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> move_words(load_design("ilr33-amber"), Move("control.velocity.integral_time", 0.015, 0.0286))
     'control.velocity.integral_time 15 ms to 28.6 ms mends it'
@@ -209,9 +205,3 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
         [] if result.step is None else [loop_section.step(LOOPS[name], result, None, name=name, small=True)]
     )
     return [bode, *step]
-
-
-def unchecked() -> doc.Finding:
-    """Give the finding of a report that no simulation stands behind."""
-    text = "No simulation stands behind this report: friction, limits and large commands are not checked."
-    return doc.Finding(severity="warn", text=text, where="provenance")

@@ -42,7 +42,7 @@ def section(comparison: Comparison) -> list[doc.Section]:
     best = compare_best.section(shown)
     best["intro"] = f"{best['intro']} {compare_best.shown_words(shown)}".strip()
     made = [best, verdicts(shown), figures(shown), differences(shown)]
-    return [*made, *ledger(shown), *compare_figures.sections(shown)]
+    return [*made, *ledger(shown), compare_figures.overlays(shown), compare_figures.tornadoes(shown)]
 
 
 def brief(comparison: Comparison) -> Brief:

@@ -19,10 +19,6 @@ MOST_BARS = 10
 MOST_CHARTS = 8
 
 
-def sections(comparison: Comparison) -> list[doc.Section]:
-    return [overlays(comparison), tornadoes(comparison)]
-
-
 def overlays(comparison: Comparison) -> doc.Section:
     drawn = comparison.all[:MOST_CURVES]
     blocks: list[doc.Block] = []

@@ -21,7 +21,7 @@ def section(result: Corners) -> doc.Section:
     alt = f"{caption} The figures stand in the table of every loop at every corner."
     details = doc.details("Every loop at every corner", [_loop_table(result), *named])
     blocks = [_summary_table(result), doc.figure("corners", chart(result), caption, alt=alt), details]
-    told: doc.Severity = "info" if result.passed else "warn"
+    told = doc.severity(result.verdict)
     words = summary(result)
     return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=told, told=told)
 

@@ -2,7 +2,7 @@
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import AS_PREDICTED, LimitCycles
-from analyses.motion.settling import FROM_THE_LARGEST, Settling, judged_by, verdict_of, words
+from analyses.motion.settling import FROM_THE_LARGEST, Settling, acting, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import Unit, fine_unit, load_unit
 
@@ -24,7 +24,7 @@ def section(result: LimitCycles) -> doc.Section:
     causes = " or ".join(CAUSES[name] for name in result.looked_for) or "play or a quantised output sensor"
     none = doc.text(f"No limit cycle of {causes} is predicted.")
     predicted = _predicted(result, fine) if result.confirmations else none
-    told: doc.Severity = "info" if verdict_of(result.design, result.hunting) is Verdict.MET else "warn"
+    told = doc.severity(result.verdict)
     blocks, words = [predicted, _rests(result, fine)], summary(result)
     return doc.section("cycles", "Limit cycles", blocks, result=words, intro=intro, status=told, told=told)
 
@@ -72,7 +72,7 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
     def end(one: Settling) -> str:
         stands = one.rest.verdict == "still moving" and not one.swing_rad
         words = "stands still, not known for how long" if stands else one.rest.verdict
-        return words + ", a limit acting" * bool(one.rest.limited)
+        return words + acting(one.rest)
 
     size = fine.column()
     columns = [

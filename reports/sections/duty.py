@@ -25,7 +25,8 @@ def section(result: Duty) -> doc.Section:
     if result.overload is None:
         note += " No overload state: the design states no limits.peak_time."
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
-    told: doc.Severity = "info" if result.verdict is Verdict.MET and not result.limited else "warn"
+    told = doc.severity(result.verdict)
+    told = "warn" if told == "info" and result.limited else told
     blocks, words = [table, _figure(result)], summary(result)
     return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
 

@@ -19,7 +19,6 @@ from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words
 from reports.terminal import Brief, SideBySide
 
-STATUS: dict[bool | None, doc.Status] = {True: "pass", False: "fail", None: "warn"}
 EVIDENCE: dict[str, doc.State] = {
     "certified": {"text": "certified", "status": "pass"},
     "checked": {"text": "checked", "status": "info"},
@@ -47,7 +46,7 @@ def _figure(quantity: str, key: str, format: str) -> doc.Shown:
 def _state(figures: LoopFigures) -> doc.State:
     if figures.held is not None:
         return {"text": "unstable by itself", "status": "warn"}
-    return {"text": figures.margins.verdict, "status": STATUS[figures.margins.stable]}
+    return {"text": figures.margins.verdict, "status": Verdict.of(figures.margins.stable).role()}
 
 
 def _samples(figures: LoopFigures) -> float | None:
@@ -179,8 +178,6 @@ def _elsewhere(result: Margins) -> str:
 def place_words(place: str) -> str:
     """An operating point within a sentence.
 
-    Examples
-    --------
     >>> place_words("motor driven by the load"), place_words("in the gap of the play"), place_words("")
     ('with the motor driven by the load', 'in the gap of the play', 'sliding')
     """

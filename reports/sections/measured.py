@@ -68,16 +68,10 @@ def _margins(of: StabilityMargins) -> doc.Block:
     found: list[tuple[str, float | None, Any, str, float | None]]
     found = [("Gain margin", db, range_, "dB", m.frequency_rad_s) for db, range_, m in gains]
     found += [("Phase margin", m.deg, m.deg_range, "deg", m.frequency_rad_s) for m in of.phase_margins]
-    found += [
-        (
-            "Delay margin",
-            m.seconds * 1e3,
-            m.seconds_range and 1e3 * np.array(m.seconds_range),
-            "ms",
-            m.frequency_rad_s,
-        )
-        for m in of.delay_margins
+    delays = [
+        (1e3 * m.seconds, m.seconds_range and 1e3 * np.array(m.seconds_range), m) for m in of.delay_margins
     ]
+    found += [("Delay margin", ms, range_, "ms", m.frequency_rad_s) for ms, range_, m in delays]
     modulus = of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s
     found.append(("Modulus margin", *modulus))
     columns = [

@@ -179,8 +179,6 @@ def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
 def _words(name: str) -> str:
     """Name a column for people.
 
-    Examples
-    --------
     >>> _words("position.phase_margin"), _words("drive.output_rate@8")
     ('position loop: phase margin', 'drive: output rate at 8 N m')
     """

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
-from actuator_lti.files.tree import Tree
 from reports import document as doc
-from reports.nightly.machines import summary
+from reports.nightly.machines import summary as data
 from reports.nightly.text import one_line
 from reports.nightly.view import STATES, Overview
+
+__all__ = ["data", "section", "write"]
 
 
 def section(night: Overview) -> doc.Section:
@@ -14,7 +15,7 @@ def section(night: Overview) -> doc.Section:
     for design in (one for one in night.designs if one.state != "pass"):
         why = design.why or design.result.worst_id or "; ".join(design.meta.get("words", ()))
         if design.state == "regression":
-            worst = design.regressions
+            worst = design.baseline.regressions
             why = f"{len(worst)} figures worse than the baseline, {worst[0].figure}"
         rows.append((STATES[design.state][1], one_line(design.name, 60), one_line(why, 300)))
     columns = [doc.column("state", "State"), doc.column("name", "Design"), doc.column("why", "Why")]
@@ -22,10 +23,6 @@ def section(night: Overview) -> doc.Section:
     cached = sum(design.result.cached for design in night.designs)
     words = f"night {night.run.id}: {night.counts} ({cached} unchanged)"
     return doc.section("night", "Night", blocks, result=words)
-
-
-def data(night: Overview) -> Tree:
-    return summary(night)
 
 
 def write(night: Overview, _folder: Path | None) -> list[str]:

@@ -87,9 +87,8 @@ def tolerance_words(item: Parameter) -> str:
     return f"±{text}" if tolerance.kind == "uniform" else f"σ {text}, {tolerance.kind}"
 
 
-def provenance(
-    design: Mapping[str, Any], head: Mapping[str, Any], findings: Sequence[doc.Finding] = ()
-) -> doc.Section:
+def provenance(design: Mapping[str, Any], head: Mapping[str, Any], *, checked: bool = True) -> doc.Section:
+    """Make the section; it says, too, where the report is not ``checked`` by simulation."""
     rows = {
         "design": f"{design['name']}, revision {design['revision'] or 'none'}",
         "design file": design["origin"] or "none",
@@ -106,4 +105,6 @@ def provenance(
         f"Computed by actuator-lti {head['version']} from the design with hash {head['design_hash'][:12]}."
     )
     blocks = [doc.details("To build this report again", [table])]
+    text = "No simulation stands behind this report: friction, limits and large commands are not checked."
+    findings = [] if checked else [doc.Finding(severity="warn", text=text, where="provenance")]
     return doc.section("provenance", "Provenance", blocks, result=words, findings=findings)

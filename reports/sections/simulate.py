@@ -68,8 +68,6 @@ UNITS = (
 def _in_words(name: str, value: float) -> list[doc.Row]:
     """A figure as people read it.
 
-    Examples
-    --------
     >>> [row["unit"] for row in _in_words("largest_motor_speed_rad_s", 100.0)]
     ['rad/s', 'rpm']
     """
@@ -152,8 +150,6 @@ def _limiters(*signals: str) -> Acting:
 def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> list[list[float]]:
     """From when to when something was active; spans that a figure cannot tell apart are joined.
 
-    Examples
-    --------
     >>> spans(np.array([False, True, True, False]), np.arange(4.0))
     [[1.0, 3.0]]
     """

@@ -32,7 +32,7 @@ def section(result: TuningResult) -> doc.Section:
 
 
 def write(result: TuningResult, folder: Path | None) -> list[str]:
-    if folder is None:
+    if folder is None or not result.feasible:
         return []
     write_text(folder / "tuned.toml", write_changed(result.before, result.design))
     return [str(folder / "tuned.toml")]
@@ -68,7 +68,7 @@ def changed(result: TuningResult) -> bool:
 
 def _amount(r: BindingRequirement) -> str:
     if r.distance is None:
-        return "an unstable loop" if r.relative < 0 else "plenty"
+        return "an unstable loop" if r.relative < 0 else "unbounded"
     if _at_limit(r):
         return "nothing"
     return with_unit(abs(r.distance), r.unit, ".3g")

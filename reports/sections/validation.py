@@ -22,7 +22,6 @@ from reports.terminal import Brief
 MORE = {
     "response": "response of the closed loop",
     "poles": "closed-loop poles",
-    "gain_margin": "gain margin",
     "gain_margin_up": "gain margin, upwards",
     "gain_margin_down": "gain margin, downwards",
     "bandwidth": "bandwidth (−3 dB) of the feedback loop",
@@ -163,10 +162,7 @@ def _item(id: str, label: str, passed: bool | None, reason: str, **more: Any) ->
 
 
 def by_loop(rows: Sequence[Check]) -> dict[str, list[Check]]:
-    grouped: dict[str, list[Check]] = {}
-    for row in rows:
-        grouped.setdefault(row.loop, []).append(row)
-    return grouped
+    return {name: [row for row in rows if row.loop == name] for name in dict.fromkeys(r.loop for r in rows)}
 
 
 def table(rows: Sequence[Check], caption: str) -> doc.Block:

@@ -2,7 +2,6 @@
 """Every kind of bad design file, and what a mistyped value is answered with: one line that says what is allowed."""
 
 import re
-from pathlib import Path
 
 import pytest
 import tomli_w
@@ -10,9 +9,8 @@ import tomli_w
 from actuator_lti.design import design_tree, load_design, read_design_text, write_design
 from actuator_lti.design.key_reference import key_reference
 from actuator_lti.design.loader import design_text
-from actuator_lti.errors import InputError
 from reports.cli.main import main
-from tests.refusals import mistakes
+from tests.refusals import mistakes, refused
 
 # ruff: noqa: E501 (a table of cases, one a line)
 
@@ -152,16 +150,11 @@ def test_the_stages_of_a_force_source_are_held_apart(old: str, new: str, says: s
 
 
 def test_files_that_are_no_design_are_refused(tmp_path) -> None:
-    def line(path: Path) -> str:
-        with pytest.raises(InputError) as caught:
-            load_design(path)
-        return str(caught.value)
-
-    assert "no such file; allowed" in line(tmp_path / "missing.toml")
+    refused(load_design, tmp_path / "missing.toml", words="no such file; allowed")
     (tmp_path / "misssing.toml").write_text("", encoding="utf-8")
-    assert 'no such file (there is "misssing.toml")' in line(tmp_path / "missing.toml")
+    refused(load_design, tmp_path / "missing.toml", words='no such file (there is "misssing.toml")')
     (tmp_path / "binary.toml").write_bytes(b"[design]\nname = '\xff\xfe'")
-    assert "byte 17 is not UTF-8" in line(tmp_path / "binary.toml")
+    refused(load_design, tmp_path / "binary.toml", words="byte 17 is not UTF-8")
 
 
 def test_a_byte_order_mark_and_windows_line_ends_are_read(tmp_path) -> None:

@@ -17,10 +17,12 @@ from actuator_lti.design import load_design, parameter_value, read_design_text, 
 from actuator_lti.design.controller_files import import_controller_file
 from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Design
+from actuator_lti.design.objects import Imported
 from actuator_lti.design.writing import design_tree
 from actuator_lti.errors import InputError
-from actuator_lti.files.response import read_response
+from actuator_lti.files.response import RecordedResponse, read_response
 from reports.cli.main import main
+from tests.refusals import refused
 
 BASE = with_overrides(load_design("ilr33-amber"), {"limits.continuous_current": "1 A"})
 ODRIVE = """{"axis0": {
@@ -79,6 +81,12 @@ def without(stage: str) -> Design:
     return design_from_tree(tree, "base")
 
 
+def taken(folder: Path, text: str, base: Design) -> Imported:
+    """What a settings file of this text makes of a design."""
+    (folder / "settings").write_text(text)
+    return import_controller_file(folder / "settings", base)
+
+
 @pytest.mark.parametrize(
     ("text", "stage", "wanted", "more", "left"),
     [  # turn/s per turn, N m per turn/s over N m per A peak, tracking critically damped at 8 kHz
@@ -116,8 +124,7 @@ def without(stage: str) -> Design:
 def test_each_makers_gains_in_the_units_of_the_model(
     text: str, stage: str, wanted: tuple, more: dict, left: str, tmp_path: Path
 ) -> None:
-    (tmp_path / "settings").write_text(text)
-    result = import_controller_file(tmp_path / "settings", without(stage))
+    result = taken(tmp_path, text, without(stage))
     expected = {key: value for key, value in zip(GAINS, wanted, strict=False) if value is not None} | more
     found = {key: parameter_value(result.design, key) for key in expected}
     assert found == pytest.approx(expected, rel=1e-12)
@@ -137,9 +144,8 @@ def test_each_makers_gains_in_the_units_of_the_model(
     ],
 )
 def test_what_the_design_cannot_hold_is_refused(text: str, words: str, tmp_path: Path) -> None:
-    (tmp_path / "settings").write_text(text)
     with pytest.raises(InputError, match=words):
-        import_controller_file(tmp_path / "settings", BASE)
+        taken(tmp_path, text, BASE)
 
 
 @pytest.mark.parametrize(
@@ -154,8 +160,7 @@ def test_what_the_design_cannot_hold_is_refused(text: str, words: str, tmp_path:
 )
 def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_path: Path) -> None:
     """A constant of 0, an infinite gain, no poles, no gain at all: the design keeps what it has."""
-    (tmp_path / "settings").write_text(text)
-    result = import_controller_file(tmp_path / "settings", BASE)
+    result = taken(tmp_path, text, BASE)
     assert parameter_value(result.design, f"control.{key}") == parameter_value(BASE, f"control.{key}")
     assert any(note.endswith(f"not taken, control.{key} stays as it is") for note in result.notes)
 
@@ -176,16 +181,14 @@ PID = {"control.position.integral_time": "1 s", "control.position.derivative_tim
 def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, tmp_path: Path) -> None:
     """An integral gain of 0, no limit, no filter: nothing of the base stays in its place."""
     base = with_overrides(without(stage), (PID if stage else {"encoder.filter_time": "1 ms"}))
-    (tmp_path / "settings").write_text(text)
-    result = import_controller_file(tmp_path / "settings", base)
+    result = taken(tmp_path, text, base)
     assert key in base.parameters
     assert key not in result.design.parameters
     assert any(note.endswith(f": none, {key} is left out") for note in result.notes)
 
 
 def test_what_a_sketch_says_of_its_motor_is_told(tmp_path: Path) -> None:
-    (tmp_path / "settings").write_text(OF_RESISTANCE)
-    notes = import_controller_file(tmp_path / "settings", without("current")).notes
+    notes = taken(tmp_path, OF_RESISTANCE, without("current")).notes
     for words in (
         "KV_rating = 90: by voltage the library adds the back-EMF",
         "phase_resistance = 5.6: by voltage",
@@ -197,8 +200,7 @@ def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:
     """A gain in torque without the constant that turns it into amperes; the newest firmware's encoder."""
     text = ODRIVE.replace('"torque_constant": 0.04,', "").replace('"cpr": 8192', '"use_index": true')
     text = text[:-1] + ', "inc_encoder0": {"config": {"cpr": 4000}}}'
-    (tmp_path / "settings").write_text(text)
-    result = import_controller_file(tmp_path / "settings", BASE)
+    result = taken(tmp_path, text, BASE)
     wanted = "vel_gain: needs axis0.motor.config.torque_constant for control.velocity.gain"
     assert sum(note.endswith(wanted) for note in result.notes) == 1
     assert parameter_value(result.design, "encoder.counts_per_rev") == 4000
@@ -231,14 +233,17 @@ TABLES = [
 ]
 
 
+def recorded(folder: Path, text: str) -> RecordedResponse:
+    """The response that a table in text is."""
+    (folder / "r.csv").write_text(text, encoding="utf-8")
+    return read_response(folder / "r.csv")
+
+
 @pytest.mark.parametrize(("cut", "head", "columns"), TABLES)
 def test_every_spelling_of_a_table(tmp_path, cut, head, columns):
     rows = [cut.join(f"{x:.12g}" for x in row) for row in zip(*columns, strict=True)]
     rows = [row.replace(".", ",") for row in rows] if cut == ";" else rows
-    (tmp_path / "r.csv").write_text(
-        "# bench\n" + "\n".join(filter(None, [head, *rows[::-1]])), encoding="utf-8"
-    )
-    read = read_response(tmp_path / "r.csv")
+    read = recorded(tmp_path, "# bench\n" + "\n".join(filter(None, [head, *rows[::-1]])))
     np.testing.assert_allclose(read.frequency_hz, HERTZ, rtol=1e-11)
     np.testing.assert_allclose(read.response, L, rtol=1e-10)
     assert np.isnan(read.deviation).all()
@@ -246,17 +251,14 @@ def test_every_spelling_of_a_table(tmp_path, cut, head, columns):
 
 @pytest.mark.parametrize("text", PAGE["read as 3 - 4j at 5 Hz"])
 def test_the_page_reads_the_same(tmp_path, text):
-    (tmp_path / "r.csv").write_text(text)
-    read = read_response(tmp_path / "r.csv")
+    read = recorded(tmp_path, text)
     at = np.isclose(read.frequency_hz, 5.0)
     np.testing.assert_allclose(read.response[at], [3.0 - 4.0j], rtol=1e-12)
 
 
 @pytest.mark.parametrize("text", PAGE["refused"])
 def test_the_page_refuses_the_same(tmp_path, text):
-    (tmp_path / "r.csv").write_text(text)
-    with pytest.raises(InputError):
-        read_response(tmp_path / "r.csv")
+    refused(recorded, tmp_path, text)
 
 
 @pytest.mark.parametrize(
@@ -276,8 +278,7 @@ def test_closed_loops_and_how_their_errors_grow(tmp_path, of):
     value = {"T": lambda loop: loop / (1.0 + loop), "S": lambda loop: 1.0 / (1.0 + loop)}[of]
     columns = (HERTZ, value(L).real, value(L).imag, np.full(4, 1e-7))
     rows = "\n".join(",".join(f"{x!r}" for x in row) for row in np.transpose(columns).tolist())
-    (tmp_path / "r.csv").write_text("f,real,imag,sigma\n" + rows)
-    read = read_response(tmp_path / "r.csv").as_loop(of)
+    read = recorded(tmp_path, "f,real,imag,sigma\n" + rows).as_loop(of)
     np.testing.assert_allclose(read.response, L, rtol=1e-12)
     near = L * (1.0 + read.deviation)  # a loop so far off is as far off when closed as the file says
     np.testing.assert_allclose(np.abs(value(near) / value(L) - 1.0), 1e-7, rtol=1e-4)
@@ -308,10 +309,7 @@ def test_closed_loops_and_how_their_errors_grow(tmp_path, of):
     ],
 )
 def test_what_is_no_response_is_refused(tmp_path, text, words):
-    (tmp_path / "r.csv").write_text(text)
-    with pytest.raises(InputError, match=r"r\.csv") as refused:
-        read_response(tmp_path / "r.csv")
-    assert words in str(refused.value)
+    refused(recorded, tmp_path, text, words=("r.csv", words))
 
 
 def test_a_deviation_counts_in_its_unit(tmp_path):
@@ -327,8 +325,7 @@ def test_a_deviation_counts_in_its_unit(tmp_path):
         ("deviation_percent", (2.0,)),
     ):
         row = ",".join(map(str, told))
-        (tmp_path / "r.csv").write_text(f"f,re,im,{names}\n1,3,4,{row}\n2,3,4,{row}\n")
-        read = read_response(tmp_path / "r.csv")
+        read = recorded(tmp_path, f"f,re,im,{names}\n1,3,4,{row}\n2,3,4,{row}\n")
         np.testing.assert_allclose(read.deviation, 0.02, rtol=0.01)
         np.testing.assert_allclose(read.radius, 0.02 * np.sqrt(np.log(100.0)), rtol=0.01)
 
@@ -350,13 +347,10 @@ def test_a_deviation_counts_in_its_unit(tmp_path):
     ],
 )  # fmt: skip
 def test_how_the_columns_are_taken_is_told(tmp_path, text, words):
-    (tmp_path / "r.csv").write_text(text)
-    assert words in read_response(tmp_path / "r.csv").read_as
+    assert words in recorded(tmp_path, text).read_as
 
 
 def test_a_row_at_0_hz_is_left_out_and_averages_want_a_coherence(tmp_path):
-    (tmp_path / "r.csv").write_text("f_hz,re,im\n0,9,0\n1,2,3\n2,2,2\n")
-    read = read_response(tmp_path / "r.csv")
+    read = recorded(tmp_path, "f_hz,re,im\n0,9,0\n1,2,3\n2,2,2\n")
     assert (read.frequency_hz.tolist(), read.left_out) == ([1.0, 2.0], 1)
-    with pytest.raises(InputError, match="averages: allowed with a column of coherence"):
-        read_response(tmp_path / "r.csv", 8)
+    refused(read_response, tmp_path / "r.csv", 8, words="averages: allowed with a column of coherence")

@@ -14,7 +14,7 @@ import actuator_lti.compiled.compiler as build
 from actuator_lti import load_design
 from actuator_lti.design.loader import design_text
 from nonlinear.export import c_export
-from nonlinear.runs import watch as waiting
+from reports.cli import output as waiting
 
 NOISY = design_text("ilr33-amber") + '[instruments]\ncurrent_noise = "0.1 A"\n'
 FILES = {"c emps --no-check": "main.c", "linear emps": "a.json", "fmu emps": "d.fmu"}

@@ -60,7 +60,7 @@ def traceback_of(line: str) -> str:
 def test_a_part_that_crashes_is_noted_and_the_rest_is_written(place, tmp_path, monkeypatch, cli) -> None:
     module, _, name = place.partition(":")
     unpainted = '<svg viewBox="0 0 9 9"></svg>'  # pictures take most of the time
-    monkeypatch.setattr("reports.drawing.draw_svg", lambda *_a, **_k: unpainted)
+    monkeypatch.setattr("reports.charts.svg.draw_svg", lambda *_a, **_k: unpainted)
     monkeypatch.setattr(import_module(module), name, broken)
     part, option = ("validation", "--quiet") if name == "validate" else ("linear", "--no-validation")
     ran = cli(*REPORT, option, "--out", tmp_path)
@@ -78,7 +78,7 @@ def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, cli) -> No
     def draw(block: dict, *arguments: object, **named: object) -> str:
         return broken() if block["figure"] == "nyquist" else '<svg viewBox="0 0 9 9"></svg>'
 
-    monkeypatch.setattr("reports.drawing.draw_svg", draw)
+    monkeypatch.setattr("reports.charts.svg.draw_svg", draw)
     ran = cli(*REPORT, "--no-validation", "--out", tmp_path)
     assert ran.status == 3
     assert "(nyquist)" in one_line(ran.err)

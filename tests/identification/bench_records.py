@@ -10,7 +10,7 @@ from actuator_lti.design.asked import FrozenMap
 from analyses.records.record import Record, RowCounts
 from nonlinear import Trajectory, commands, simulate
 from tests.changed import changed
-from tests.loops.two_mass import drive_d
+from tests.loops.loop_designs import drive_d
 
 Columns = dict[str, np.ndarray]
 NOISE_A = 0.02

@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Coupling, Design, FrictionPoint, Gravity, LoadFriction, PositionLoop
-from analyses.correlation.closed_loop import correlate_record
+from analyses.correlation.closed_loop import CorrelationResult, correlate_record
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
 from analyses.records.open_record import open_record
@@ -48,6 +48,10 @@ def _record(path: Path, run: Trajectory, columns: dict[str, str], **more: np.nda
     return write(path, table, fmt="%.17g")
 
 
+def _meets(result: CorrelationResult, near: float) -> None:
+    assert all(signal.relative_error < near for signal in result.signals.values()), result.signals
+
+
 def _swing(peak: float, hz: float = 3.0) -> Command:
     return commands.sine(peak, hz)
 
@@ -74,14 +78,28 @@ def test_a_record_meets_the_drive_that_made_it(kind: str, tmp_path) -> None:
     record = open_record(tmp_path / "r.csv")
     result = correlate_record(design, record)
     assert {signal.name for signal in result.signals.values()} == SIGNALS
-    for signal in result.signals.values():
-        assert signal.relative_error < (1e-9 if design is SLOPED else 1e-7), signal.name
+    _meets(result, 1e-9 if design is SLOPED else 1e-7)
     viscous = design.friction.viscous_Nms_rad + 1e-4
     other = replace(design, friction=replace(design.friction, viscous_Nms_rad=viscous, points=()))
     for wrong in (other, BASE) if design is SLOPED else (other,):
         found = correlate_record(wrong, record).signals.values()
         assert max(signal.relative_error for signal in found) > 1e-3
     assert design is not SLOPED or correlate_record(BASE, record)["current"].relative_error > 0.05
+
+
+@pytest.mark.parametrize("gaps", [(1,), (2,), (1, 1), (1, 2)])
+@pytest.mark.parametrize("phase", [0, 3])
+def test_steps_a_row_or_two_apart_are_those_of_the_drive(gaps: tuple[int, ...], phase: int, tmp_path) -> None:
+    """Rows of five ticks, steps at the row or two ticks before one."""
+    tick, rows = BASE.controller.period_s, 5
+    value, at = np.zeros(2001), np.cumsum((100, *gaps)) * rows + phase
+    for each in at:
+        value[each:] += 0.002
+    run = simulate(BASE, commands.sampled(np.arange(2001) * tick, value), 2000 * tick)
+    columns = {"time_s": run.time_s, **{name: getattr(run, key) for name, key in ROTARY.items()}}
+    table = {name: one[::rows] for name, one in (columns | {"reference [rad]": run.reference_rad}).items()}
+    found = correlate_record(BASE, open_record(write(tmp_path / "r.csv", table, fmt="%.17g")))
+    assert max(signal.relative_error for signal in found.signals.values()) < 1e-9
 
 
 @pytest.mark.parametrize(
@@ -100,8 +118,7 @@ def test_an_inner_command_drives_the_loops_inside_it(column: str, key: str, stag
     driven = command_of(BASE, record)
     assert driven.stage == driven.design.controller.outermost == stage
     result = correlate_record(BASE, record)
-    for signal in result.signals.values():
-        assert signal.relative_error < 1e-6, signal.name
+    _meets(result, 1e-6)
     assert any("do not act" in note for note in result.notes)
 
 
@@ -129,8 +146,7 @@ def test_a_supply_over_time_drives_the_model(design: Design, scales: bool, tmp_p
     assert any("supply" in note for note in result.notes)
     shares = {name: use.fraction for name, use in run.limits.items()}
     assert result.limits == pytest.approx(shares, abs=1e-3)
-    for signal in result.signals.values():
-        assert signal.relative_error < 1e-6, signal.name
+    _meets(result, 1e-6)
     flat = dict(record.signals) | {"supply": np.full(len(record), np.median(record["supply"]))}
     assert correlate_record(design, replace(record, signals=flat))["voltage"].relative_error > 0.05
 
@@ -146,8 +162,7 @@ def test_a_pendulum_that_begins_in_motion_under_a_speed_loop(tmp_path) -> None:
     }
     record = open_record(_record(tmp_path / "r.csv", run, ROTARY, **more)).slice(4000, 8000)
     result = correlate_record(design, record)
-    for signal in result.signals.values():
-        assert signal.relative_error < 5e-3, signal.name
+    _meets(result, 5e-3)
     assert result["speed"].modelled[0] == pytest.approx(record["speed"][0], rel=1e-3)
     assert result["current"].modelled[0] == pytest.approx(record["current"][0], rel=1e-3)
 

@@ -12,7 +12,6 @@ from analyses.estimation.least_squares import between_records, solve
 from analyses.records.open_record import open_records
 from nonlinear import commands, simulate
 from reports.document import load
-from reports.document import load as load_document
 from tests.identification.bench_records import columns_of, motion, staircase, write
 
 
@@ -229,7 +228,7 @@ def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, cli) -> None:
     (tmp_path / "runs.toml").write_text(text)
     words = ("identify", tmp_path / "runs.toml", "--design", "ctms-motor-position", "--refine")
     result = cli.data(*words, "--out", tmp_path / "o")
-    first = load_document(tmp_path / "o" / "identification.json")["sections"][0]["result"]
+    first = load(tmp_path / "o" / "identification.json")["sections"][0]["result"]
     assert first.startswith("Refined by simulation: motor.rotor_inertia 3.228")
     found = result["refined"]["parameters"]
     made = load_design(tmp_path / "o" / "ctms-motor-position-identified.toml")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
+from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.design import load_design, parameter_value, read_design_text, with_values, write_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
@@ -102,8 +103,6 @@ def test_suggested_runs_shrink_the_margins_spread_or_the_determinant(fit: Surfac
 
 def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -> None:
     """The phase margin of the velocity loop falls as the viscous friction falls: first order holds."""
-    from actuator_lti import assemble_loops, stability_margins
-
     result = suggest_runs(BASE, fit, count=1)
     spread = next(m for m in result.margins if m.label == "position phase margin, 0 N m")
     base = {"friction.dry_torque": float(fit.values[0]), "friction.viscous": float(fit.values[1])}
@@ -122,8 +121,6 @@ def test_the_slopes_of_the_margins_are_those_of_a_larger_step(fit: SurfaceFit) -
 
 
 def test_output_error_finds_the_values_of_a_record_and_names_one_at_its_bound() -> None:
-    from nonlinear import commands, simulate
-
     design = load_design("emps")
     paths = ("motor.rotor_inertia", "friction.viscous", "friction.dry_torque")
     command = commands.sine(0.1, 0.3)

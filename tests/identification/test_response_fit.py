@@ -87,12 +87,15 @@ def _written(folder: Path, hertz: np.ndarray, response: np.ndarray, deviation: f
     return path
 
 
+def _noisy(seen: np.ndarray, deviation: float, seed: int) -> np.ndarray:
+    noise = np.random.default_rng(seed).standard_normal((2, len(seen))) / np.sqrt(2.0)
+    return seen * (1.0 + deviation * (noise[0] + 1j * noise[1]))
+
+
 def _measured(folder: Path, of: str, deviation: float, seed: int, *, stated: bool = True) -> Path:
-    noise = np.random.default_rng(seed).standard_normal((2, len(HERTZ))) / np.sqrt(2.0)
     loop = open_loop(HERTZ)
     seen = {"L": loop, "T": loop / (1.0 + loop), "S": 1.0 / (1.0 + loop)}[of]
-    value = seen * (1.0 + deviation * (noise[0] + 1j * noise[1]))
-    return _written(folder, HERTZ, value, deviation if stated else None)
+    return _written(folder, HERTZ, _noisy(seen, deviation, seed), deviation if stated else None)
 
 
 def _found(folder: Path, *measured: object, **options: object) -> ResponseResult:
@@ -134,10 +137,8 @@ def test_a_response_far_below_the_resonance_does_not_tell_the_spring(of: str, se
     ends anywhere along the valley, 2000 of its small standard errors away.
     """
     hertz = np.geomspace(0.1, 6.0, 30)
-    noise = np.random.default_rng(seed).standard_normal((2, 30)) / np.sqrt(2.0)
     loop = open_loop(hertz)
-    seen = loop if of == "L" else loop / (1.0 + loop)
-    file = _written(tmp_path, hertz, seen * (1.0 + 0.03 * (noise[0] + 1j * noise[1])), 0.03)
+    file = _written(tmp_path, hertz, _noisy(loop if of == "L" else loop / (1.0 + loop), 0.03, seed), 0.03)
     result = identify_response(_design({}), file, of=of)  # type: ignore[arg-type]
     assert result.passed
     assert ": not determined" in result.fit.fixed["coupling.stiffness"].reason
@@ -148,8 +149,7 @@ def test_a_response_far_below_the_resonance_does_not_tell_the_spring(of: str, se
 def _below_antiresonance(folder: Path) -> tuple[Path, Callable[[Floats], Floats]]:
     """Below the antiresonance, 24 Hz: a file, and what is left of it over values, of the exact loop."""
     hertz = np.geomspace(1.0, 18.0, 25)
-    noise = np.random.default_rng(2).standard_normal((2, 25)) / np.sqrt(2.0)
-    seen = open_loop(hertz) * (1.0 + 0.05 * (noise[0] + 1j * noise[1]))
+    seen = _noisy(open_loop(hertz), 0.05, 2)
 
     def left(values: Floats) -> Floats:
         share = (open_loop(hertz, dict(zip(TRUTH, values, strict=True))) / seen - 1.0) / 0.05 * np.sqrt(2.0)

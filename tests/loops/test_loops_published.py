@@ -10,9 +10,10 @@ from loop_designs import amber, controlled, ctms_position, emps, without
 from scipy.optimize import brentq
 from scipy.signal import cont2discrete
 
-from actuator_lti import InputError, assemble_loops, load_design, plant
+from actuator_lti import assemble_loops, load_design, plant
 from actuator_lti.design import Design, shipped_designs, with_overrides
 from actuator_lti.design.model import Friction, Gear, Motor
+from tests.refusals import refused
 
 
 def at(system: Any, omega: float) -> complex:
@@ -228,5 +229,4 @@ def test_a_current_command_closes_the_current_loop() -> None:
     ],
 )
 def test_bad_arguments_are_named(name: str, bad: dict[str, Any], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        plant(name, **bad)
+    refused(plant, name, words=words, **bad)

@@ -295,7 +295,10 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
         words = f'.frequency = "{bad} rad/s": must be finite; allowed: a number with a unit like rad/s'
         assert words in refused(lambda: base.add_filter("velocity", **{**notch, "frequency": bad}))  # noqa: B023
     assert "not allowed beside" in refused(lambda: twice.add_filter("velocity", **notch))
-    assert "without encoder.filter_time" in refused(twice.with_values, {"encoder.filter_time": "1 ms"})
+    beside = "encoder.filter_time = 0.001 s: not allowed beside control.velocity.law, which may have it"
+    assert refused(twice.with_values, {"encoder.filter_time": "1 ms"}).endswith(beside)
+    speed = base.with_law("velocity", ([[0.5]], [[1.0, 0.0]], [[1.0]], [[1.0, 0.0]], T), ["error", "speed"])
+    assert "without encoder.filter_time" in refused(speed.with_values, {"encoder.filter_time": "1 ms"})
     force, slow = load_design("emps"), (*unit[:4], load_design("emps").controller.period_s)
     assert "without a coupling" in made(unit, ["twist"])
     assert "no current" in refused(force.with_law, "position", slow, ["current"])

@@ -7,11 +7,10 @@ from typing import Any
 import control
 import numpy as np
 import pytest
-from loop_designs import amber, controlled, emps
+from loop_designs import amber, controlled, drive_d, emps
 from own_laws import linear
 from recursion import run
 from test_stacked import FILTERS, everything
-from two_mass import drive_d
 
 from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, model, with_values

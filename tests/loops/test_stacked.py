@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from loop_designs import controlled, sprung
-from two_mass import drive_d, drive_e
+from loop_designs import controlled, drive_d, drive_e, sprung
 
 from actuator_lti import assemble_loops, closed_loop_bandwidth, stability_margins, step_figures
 from actuator_lti.asked.drive_figure import drive_figure

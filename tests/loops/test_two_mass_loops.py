@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from loop_designs import controlled
-from two_mass import drive_d, drive_e
+from loop_designs import controlled, drive_d, drive_e
 
 from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.asked.drive_figure import drive_figure

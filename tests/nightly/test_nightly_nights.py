@@ -10,7 +10,6 @@ from nightly_fakes import CODE, INLINE, Calendar, job, study
 from site_checks import check_whole
 
 from actuator_lti.bounds import NIGHTLY_JOBS
-from actuator_lti.errors import InputError
 from reports.nightly.changes import Columns
 from reports.nightly.figures import Figure
 from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
@@ -212,8 +211,7 @@ def test_old_reports_go_and_old_figures_stay(nights) -> None:
     ids=["too many", "twice", "too long", "empty", "blank", "half a sign"],
 )
 def test_a_study_that_cannot_be_is_refused_with_the_limit(tmp_path, jobs: list[Job], words: str) -> None:
-    with pytest.raises(InputError, match=words):
-        run_night(study(*jobs), tmp_path / "s", INLINE, code=CODE)
+    refused(run_night, study(*jobs), tmp_path / "s", INLINE, code=CODE, words=words)
     assert not (tmp_path / "s").exists()
 
 

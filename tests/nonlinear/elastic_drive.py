@@ -11,7 +11,7 @@ from nonlinear._kernels import layout
 from nonlinear.native import parameters, tick
 from nonlinear.row.parameters import design_row
 from tests.changed import changed
-from tests.loops.two_mass import MOTOR, drive_d
+from tests.loops.loop_designs import MOTOR, drive_d
 
 SOURCE = model.Motor(rotor_inertia_kgm2=2e-5, source_gain_Nm_V=1.0)
 

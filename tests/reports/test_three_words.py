@@ -210,3 +210,20 @@ def test_terminal_json_page_and_pdf_of_an_analysis_have_one_verdict(call, word: 
     assert f'<p class="overall {overall[1]}">' in page.read_text()
     assert f"The same figures stand in {page.stem}.json beside this page." in page.read_text()
     assert cli.data(*call, status=int(word != "met"))["verdict"] == word
+
+
+@pytest.mark.parametrize(
+    ("name", "design", "said"),
+    [
+        ("duty", "ballscrew", "requirements met"),
+        ("cycles", "joint", "failed: Limit cycles"),
+        ("duty", "fin", "not proven: Duty cycle"),
+    ],
+)
+def test_a_section_of_a_report_counts_as_its_command_does(
+    name: str, design: str, said: str, tmp_path, cli
+) -> None:
+    status = int("requirements" not in said)
+    cli.text(name, design, status=status)
+    words = cli.text("report", design, "--no-validation", "--also", name, "--out", tmp_path, status=status)
+    assert said in words

@@ -152,15 +152,18 @@ def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
 
 
 def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
-    words = ("--require", "position.bandwidth>=2000 Hz", "--no-curve", "--out", tmp_path, "--quiet")
-    assert "misses" in cli.text("tune", *words, status=1)
+    words = ("--no-curve", "--out", tmp_path, "--quiet", "--require")
+    assert "misses" in cli.text("tune", *words, "position.bandwidth>=2000 Hz", status=1)
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
+    assert not (tmp_path / "tuned.toml").exists()
+    cli.text("tune", *words, "position.bandwidth>=32 Hz")
+    made = json.loads((tmp_path / "tune.json").read_text())
     gains = {row["path"]: row["rounded"] for row in made["sections"][0]["blocks"][1]["rows"]}
     tuned = load_design(tmp_path / "tuned.toml")
     assert tuned.controller.position.gain == gains["control.position.gain"]
     asked = {item.id: item.minimum for item in tuned.requirements if item.quantity == "bandwidth"}
-    assert asked["position-bandwidth-wanted"] == 2000.0
+    assert asked["position-bandwidth-wanted"] == 32.0
 
 
 def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense():

@@ -13,11 +13,12 @@ from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _followed_most_hz, cases_of
+from analyses.failures.run import MOST_TICKS, _hold, _settling_s
 from nonlinear import commands, simulate
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections.failures import section, summary
 from tests.changed import changed
-from tests.loops.two_mass import drive_d
+from tests.loops.loop_designs import drive_d
 
 AMBER = load_design("ilr33-amber")
 SLOW = "its output does not get half-way to the stop in 5 s"
@@ -168,6 +169,17 @@ def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
         result = failures(design)
         assert ("jam" in {case.name for case in result.cases}) is there
         assert result.left_out == ({} if there else {"jam": SLOW})
+
+
+def test_a_self_locking_drive_is_where_it_holds_before_a_failure() -> None:
+    """Kv = 2 1/s alone: a thousandth is left after ln(1000)/2 = 3.45 s; no load torque shows that pole."""
+    slow = changed(AMBER, controller={"position": {"gain": 2.0}})
+    asked, rig = Asked.of(slow), Rig(slow, 0.0)
+    wait = _settling_s(slow, asked)
+    assert wait > 3.45
+    _hold(rig, half := 0.5 * asked.stop_rad, round(wait / slow.controller.period_s), MOST_TICKS)
+    assert rig.output_rad == pytest.approx(half, rel=1e-3)
+    assert rig.measured().motor_speed_rad_s == pytest.approx(0.0, abs=1e-3)
 
 
 def test_the_headline_names_what_reaches_the_stop_first() -> None:

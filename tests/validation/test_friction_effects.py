@@ -17,7 +17,7 @@ from nonlinear.bench.operating_motion import quiet
 from nonlinear.settling.rest import first_motion_s
 from reports.sections.friction_effects import section
 from tests.changed import changed
-from tests.loops.two_mass import MOTOR
+from tests.loops.loop_designs import MOTOR
 from tests.nonlinear.elastic_drive import stribeck
 
 AMBER, EMPS, JOINT = (load_design(name) for name in ("ilr33-amber", "emps", "joint"))

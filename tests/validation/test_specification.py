@@ -23,7 +23,7 @@ from analyses.specification.capability import drive_figures, thermal_duty, torqu
 from nonlinear import Drive, commands, simulate
 from nonlinear.bench.operating_motion import on_the_bench
 from reports import document as doc
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections import friction_effects as friction_section
 from reports.sections import large_signal as large_section
 from reports.sections import specification as specification_section

@@ -21,10 +21,10 @@ from analyses.stiffness import (
     stiffness_at_rest,
     stiffness_curves,
 )
-from reports.drawing import draw_svg
+from reports.charts.svg import draw_svg
 from reports.sections.stiffness import section
 from tests.changed import changed
-from tests.loops.two_mass import drive_d, drive_e
+from tests.loops.loop_designs import drive_d, drive_e
 
 FIN, COMPLIANT = load_design("fin"), load_design("ilr33-amber-compliant")
 K4 = [(1, 16.9017216631, -53.84128746), (20, 67.434351877, 146.7856309), (80, 729.024662292, 99.71033514)]

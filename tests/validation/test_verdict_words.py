@@ -30,7 +30,7 @@ from reports.sections.validation import summary
 from reports.verdict_summary import verdict_of
 from tests.changed import changed
 
-EMPS = load_design("emps")
+EMPS, JOINT = load_design("emps"), load_design("joint")
 WAIVED = Waiver(requirement="swing", reason="known", date="2026-11-23")
 
 
@@ -267,3 +267,12 @@ def test_the_command_line_says_it(cli) -> None:
     assert int(found[3]) >= PERIODS
     acting = [name for name, use in run.limits.items() if use.fraction > 0.0]
     assert found[4].split(" and ") == acting
+
+
+@pytest.mark.parametrize("peak_time_s", [1.0, None])
+def test_a_load_that_the_folded_current_does_not_hold_names_the_protection(peak_time_s) -> None:
+    """A load of 4 times the continuous torque, which peak current holds and the friction does not."""
+    joint = changed(JOINT, limits={"continuous_current_A": 2.0, "peak_time_s": peak_time_s})
+    load = -4.0 * joint.motor.torque_constant_Nm_A * 2.0 * joint.total_ratio
+    said = end_words(settle(joint, load, 0.01).rest, degrees(1.0), "deg")
+    assert said.startswith("diverges, the overload protection (I2t)") == (peak_time_s is not None)
