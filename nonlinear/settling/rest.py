@@ -11,8 +11,8 @@ question is asked of the whole state, and the drive is followed until it is answ
 - *limit cycle*: held by friction it stands a third time where it stood before, after equal times and swings
   (to `ALIKE`): what follows from standing there is known, so it does so for ever.  Or of `PERIODS` swings or
   more the later half is as large as the earlier, of the motor, too, and an event, a limit or a sensor's
-  counts are in it, as a linear drive has none.  (A load that nothing damps swings on, whatever its size, while
-  the motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
+  counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size, while the
+  motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
 - *diverging*: no finite state, or a motion that still grows at the end of the work;
 - *still moving*: none of these within `MOST_WORK` ticks and integration steps, as a stiff drive takes
   thousands of steps a tick.

@@ -151,12 +151,12 @@ def test_a_drive_that_its_load_carries_off_diverges() -> None:
 
 
 def test_a_load_that_nothing_damps_is_in_no_limit_cycle_while_the_motor_rests() -> None:
-    """It swings at sqrt(k/J_l) as large as a step has left it, each by another size."""
+    """Its energy stays, so it swings on as a step has left it; a cycle would come back to its own size."""
     load = {"friction": None, "gravity": None}
     free = changed(JOINT, coupling={"damping_Nms_rad": 0.0, "play_rad": 0.0}, load=load)
     ends = [settle(free, 0.0, step).rest for step in (0.01, 0.02, 0.04)]
     assert {rest.verdict for rest in ends} == {"still moving"}
-    assert np.ptp([rest.amplitude for rest in ends]) > 0.1 * ends[0].amplitude > 0.0
+    assert all(rest.amplitude > rest.motor_amplitude == 0.0 for rest in ends)
     assert words(ends[0], 1.0, "rad").endswith("the motor at rest")
 
 
