@@ -75,11 +75,10 @@ def told_apart(
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:
     """Ordinary least squares of ``y = w p``, of shapes (n, p) and (n,).
 
-    ``ends``: where each record ends, so that no block of rows reaches over two of them.
+    ``ends``: where each record ends, so that no block of rows reaches over two of them. The variance behind
+    ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
 
     Raises `InputError`: where there are no more rows than values.
-
-    The variance behind ``white`` is that about the residual's mean, over n - 1 rows, as published for EMPS.
     """
     if len(y) <= w.shape[1]:
         told = f"{len(y)} sample(s) are left to fit {w.shape[1]} parameter(s)"

@@ -1,6 +1,6 @@
 """Inertias, stiffness, damping and delay of a design from a measured frequency response of a loop."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from analyses.identification.response_model import Seen, loop_model
 from analyses.identification.response_search import STEP
 from analyses.identification.to_design import design_with_fit, with_correlations
 from analyses.identification.verdict import Identified, Item, kept_items, simulated_item
+from analyses.records.consistency import SURE
 from analyses.studies.sampling import correlation_of
 
 KEYS = (
@@ -46,6 +47,7 @@ class ResponseResult(Identified):
     loop: str
     of: Of
     fit: ResponseFit
+    own: Mapping[str, float]  # the design's values of what was fitted, as it came
 
 
 def identify_response(
@@ -88,7 +90,10 @@ def identify_response(
     fit = determined(start, names, seen, progress)
     kept = [key for key, one in fit.fixed.items() if one.value]
     scales = [name for name, one in CONSTANTS.items() if getattr(start.motor, one) is not None]
-    given = _given(start, fit, seen, kept + scales[:1] * CONSTANT_KEYS.isdisjoint(held))
+    toleranced = [key for key in held if own_std(start, key) > 0.0]
+    hanging_on = [*kept, *toleranced, *scales[:1] * CONSTANT_KEYS.isdisjoint(held)]
+    given = _given(start, replace(fit, fixed={**held, **fit.fixed}), seen, hanging_on)
+    given |= {key: _fixed(given[key]) for key in held.keys() & given.keys()}
     hanging, constant = fit.fixed.keys() & given.keys(), at_constant(replace(fit, fixed=given), start)
     made = _written(start, fit, given, f"frequency response {measured.name}{constant}")
     given |= {key: _told(start, key, given[key]) for key in hanging}
@@ -107,7 +112,8 @@ def identify_response(
         told = ", ".join(f"{key} = {value:.4g}" for key, value in fit.also.items())
         wrong = f"{told} (SI) explain it as well: hold one of them (--fix), or measure more frequencies"
         items.append(Item.of("also", "No other values explain the response", wrong))
-    items += kept_items(fit, held)
+    own = {key: parameter_value(start, key) for key in fit.names}
+    items += [*_far_items(start, fit, own), *_reach_items(made, start, measured), *kept_items(fit, held)]
     return ResponseResult(
         design=made,
         items=tuple(items),
@@ -116,7 +122,42 @@ def identify_response(
         loop=loop or design.controller.outermost,
         of=of,
         fit=fit,
+        own=own,
     )
+
+
+def _far_items(start: Design, fit: Fit, own: Mapping[str, float]) -> Iterator[Item]:
+    """Values that the design's own tolerance does not allow, both errors taken into account."""
+    for key, value in own.items():
+        std = float(np.hypot(fit.std(key), own_std(start, key)))
+        if own_std(start, key) > 0.0 and abs(fit[key] - value) > SURE * std:
+            off = f"{abs(fit[key] - value) / std:.3g} standard deviations, its tolerance among them"
+            reason = f"{_beside(fit[key], value, parameter(key, start.axis).unit)}: {off}"
+            yield Item(id=f"far-{key}", label=f"{key} is what the design allows", passed=None, reason=reason)
+
+
+def _reach_items(made: Design, start: Design, measured: RecordedResponse) -> Iterator[Item]:
+    """A stiffness that is told by frequencies below the antiresonance, sqrt(k/J) of the load side, alone."""
+    if made.coupling is None or start.coupling is None or not made.load_side_inertia_kgm2 > 0.0:
+        return
+    k, own, top = made.coupling.stiffness_Nm_rad, start.coupling.stiffness_Nm_rad, measured.frequency_hz[-1]
+    hertz = float(np.sqrt(k / made.load_side_inertia_kgm2)) / (2.0 * np.pi)
+    if k != own and hertz > top:
+        told = _beside(k, own, parameter("coupling.stiffness", start.axis).unit)
+        reason = f"measured to {top:.4g} Hz, the antiresonance is at {hertz:.4g} Hz: stiffness {told}"
+        yield Item(id="reach", label="The measurement reaches the antiresonance", passed=None, reason=reason)
+
+
+def _beside(value: float, own: float, unit: str) -> str:
+    return (
+        f"{value:.4g} {unit}, {value / own:.3g} of the design's {own:.4g}" if own else f"{value:.4g} {unit}"
+    )
+
+
+def _fixed(one: Fixed) -> Fixed:
+    """What is fixed as asked and has a tolerance in the design."""
+    words = "the standard errors are those at it, the written design has its tolerance correlated with them"
+    return replace(one, reason=f"{one.reason}; {words}")
 
 
 def _given(start: Design, fit: ResponseFit, seen: Seen, names: Sequence[str]) -> dict[str, Fixed]:
@@ -125,7 +166,8 @@ def _given(start: Design, fit: ResponseFit, seen: Seen, names: Sequence[str]) ->
     found = dict(zip(fit.names, fit.values, strict=True))
     for one in names:
         key, why = parameter(one).key, fit.fixed[one].reason if one in fit.fixed else ""
-        own = parameter_value(start, key)
+        if not (own := parameter_value(start, key)):
+            continue
         off = seen.off({**found, key: own * np.array([1.0, 1.0 + STEP])})
         moved = scaled_lstsq(fit.slopes, off[0] - off[1])
         share = np.divide(moved, STEP * fit.values, out=np.zeros_like(moved), where=fit.values != 0.0)
@@ -135,7 +177,7 @@ def _given(start: Design, fit: ResponseFit, seen: Seen, names: Sequence[str]) ->
 
 def _hanging(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], keys: Collection[str]) -> Fit:
     """The fit with some values that are not determined beside it: their own errors, and what those move."""
-    kept = [key for key in fit.fixed if key in keys]
+    kept = [key for key in given if key in keys]
     moves = np.array([[given[key].moves[name] for key in kept] for name in fit.names])
     moves = moves.reshape(len(fit.names), len(kept))
     std = np.array([own_share(start, key, given[key].value) * given[key].value for key in kept])

@@ -81,7 +81,6 @@ def fit_output(
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
     count, most = 0, ITERATIONS * (2 * len(paths) + 1)
-
     box = 1.0 + (ends - start) / scale
 
     def values_at(moved: Floats) -> Floats:
@@ -203,10 +202,9 @@ def refine_records(
 def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulated:
     """Simulate a design with a record's own command, and compare the signal that tells most.
 
-    Rows that no fit is to use, as their signal is clipped, are not compared either.
-
-    A record without a command is held against the torque that the design's own inertia and friction need for
-    its motion, by the record's own recipe, whatever cut-off the fit had.
+    Rows that no fit is to use, as their signal is clipped, are not compared either. A record without a
+    command is held against the torque that the design's own inertia and friction need for its motion, by the
+    record's own recipe, whatever cut-off the fit had.
     """
     why = ""
     if command_of(design, record) is not None:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from actuator_lti.design import parameter_value
 from actuator_lti.design.model import Design
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.parameters import own_share
 from analyses.identification.output_error import LEAST_STEPPED, box_of
 from analyses.identification.response_model import Values
@@ -61,7 +60,7 @@ class Search:
     residual: Callable[[Values], Floats]
     names: tuple[str, ...]
     count: int  # of those that are looked for, the first
-    logs: NDArray[np.bool_]
+    logs: Mask
     origin: Floats
     turn: Floats
     box: Floats  # of the coordinates, shape (2, p)
@@ -154,9 +153,7 @@ class Search:
                 break
         return here
 
-    def _step(
-        self, here: Point, slopes: Floats, size: Floats, free: NDArray[np.bool_], damp: float
-    ) -> Floats:
+    def _step(self, here: Point, slopes: Floats, size: Floats, free: Mask, damp: float) -> Floats:
         """One step of the free coordinates, whose slopes are over their sizes."""
         table = np.vstack([slopes, np.sqrt(damp) * np.eye(slopes.shape[1])])
         solve = np.linalg.pinv(table)[:, : len(here.rest)]

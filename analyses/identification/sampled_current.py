@@ -14,14 +14,13 @@ LARGEST_CHANGE = 0.2
 
 @dataclass(frozen=True, kw_only=True)
 class HeldVoltage:
-    """A winding of rate ``a = R/L`` whose voltage is held over ``period_s`` and switched ``delay_s`` after a
-    sample.
+    """A winding whose voltage is held over a period and switched some time after a sample.
 
     The part of the current that the back-EMF drives is smooth and needs no correction: with
     ``i_e = -kE w/(R + L s)`` the mean current is ``F (i - i_e) + i_e``, ``F`` by `mean_over_sample`.
     """
 
-    rate_1_s: float
+    rate_1_s: float  # a = R/L
     period_s: float
     delay_s: float
     back_emf_A_per_rad_s: float

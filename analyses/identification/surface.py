@@ -18,8 +18,6 @@ from analyses.records.campaign_file import Instruments
 NAMES = ("C0", "Cv", "CM")
 PATHS = tuple(parameter(name).key for name in NAMES)
 ITERATIONS = 6
-PAPER_LOAD_NM = 8.0
-PAPER_SPEED_RAD_S = 942.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -239,11 +237,7 @@ class Contribution:
 
 
 def contributions(
-    values: Floats,
-    covariance: Floats | None = None,
-    *,
-    load_Nm: float = PAPER_LOAD_NM,
-    speed_rad_s: float = PAPER_SPEED_RAD_S,
+    values: Floats, covariance: Floats | None = None, *, load_Nm: float = 8.0, speed_rad_s: float = 942.5
 ) -> tuple[Contribution, ...]:
     """Shares of C0, Cv w and CM |M_ext| in the friction torque, with first-order standard errors.
 

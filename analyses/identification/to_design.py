@@ -18,8 +18,6 @@ from analyses.identification.joint_model import JointModel
 
 LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to
-
-
 REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")
 PLAIN_KEYS = ("friction.viscous", "friction.dry_torque", *REVERSE)
 GRAVITY = ("gravity_sin", "gravity_cos")  # m g l cos(offset) and m g l sin(offset)

@@ -207,7 +207,8 @@ def words(rest: Rest, factor: float, unit: str) -> str:
         return f"stands still {after} s later; whether it stays is not known"
     size = _size(rest, factor, unit)
     if rest.verdict == "still moving":
-        return f"still moving {after} s later, by {size}{acting(rest)}"
+        still = ", the motor at rest" * (rest.motor_amplitude == 0.0)
+        return f"still moving {after} s later, by {size}{still}{acting(rest)}"
     seen = f"{rest.periods} periods seen{acting(rest)}"
     return f"limit cycle of {size} at {rest.frequency_hz:.3g} Hz ({seen})"
 

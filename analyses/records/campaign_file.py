@@ -38,12 +38,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
 from actuator_lti.bounds import CAMPAIGN_RUNS
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import as_path, read_campaign_toml, shown_path
 from analyses.records.naming import canonical, spelled
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
@@ -100,7 +100,6 @@ class Campaign:
     instruments: Instruments
     runs: tuple[RunEntry, ...]
     origin: str
-    notes: tuple[str, ...] = field(default=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -122,16 +121,16 @@ def load_campaign(path: str | Path) -> Campaign:
     refuse_design(root)
     root.only(("campaign", "drive", "sensor", "join", "instruments", "run"))
     head = root.table("campaign")
-    campaign = head.read(
-        Campaign,
-        drive=record_spec(root.table("drive")),
-        sensor=record_spec(root.table("sensor")) if "sensor" in root else None,
-        join=root.table("join").read(Join),
-        instruments=_instruments(root.table("instruments")),
-        runs=tuple(_run(table, path.parent) for table in root.tables("run")),
-        origin=str(path),
-        notes=(),
-    )
+    with in_file(str(path)):
+        campaign = head.read(
+            Campaign,
+            drive=record_spec(root.table("drive")),
+            sensor=record_spec(root.table("sensor")) if "sensor" in root else None,
+            join=root.table("join").read(Join),
+            instruments=root.table("instruments").read(Instruments),
+            runs=tuple(_run(table, path.parent) for table in root.tables("run")),
+            origin=str(path),
+        )
     campaign = campaign if "name" in head else replace(campaign, name=shown_path(path.stem))
     _check(campaign)
     return campaign
@@ -159,13 +158,6 @@ def _run(table: Table, folder: Path) -> RunEntry:
     entry = table.read(RunEntry)
     sensor = folder / entry.sensor if entry.sensor and table.data["sensor"] else None
     return replace(entry, drive=folder / entry.drive, sensor=sensor)
-
-
-def _instruments(table: Table) -> Instruments:
-    try:
-        return table.read(Instruments)
-    except InputError as error:
-        raise InputError(error.message, where=table.origin) from None
 
 
 def record_spec(table: Table) -> RecordSpec:

@@ -95,9 +95,7 @@ def _over(one: InputUse, known: InputUse | None) -> InputUse:
 
 
 def import_campaign(campaign: Campaign, *, progress: Progress = None) -> ImportedCampaign:
-    """Read every run that the campaign lists.
-
-    A run whose file is missing, broken, or cannot be joined is set aside with its reason.
+    """Read every run that the campaign lists; set aside is one whose file is missing, broken or not joined.
 
     Raises `InputError`: if no run at all can be used.
     """

@@ -32,8 +32,6 @@ LEAST_ROWS = 10  # smoothed and thinned, of a comparison
 STEADY = 0.1  # relative difference of steps of the position beside a row that is missing or filled in
 COPPER_1_K = 3.93e-3
 WINDING_K = (-75.0, 160.0)  # from 20 deg C, the coldest and hottest winding: -55 to 180 deg C, class H
-
-
 FOLLOWED = (
     ("position_reference", "position"),
     ("reference", "output_angle"),

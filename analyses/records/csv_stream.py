@@ -27,14 +27,12 @@ from analyses.records.spec import MISSING_TEXTS, CsvFormat, RecordSpec
 from analyses.records.table_record import Block, SiRows, record_of_rows
 
 BLOCK_BYTES = 1 << 22
-MAX_LINE_BYTES = CSV_LINE_BYTES.most
-MAX_ROWS = CSV_ROWS.most
 _RUN_OF_BLANKS = re.compile(rb"[ \t]+")
 STAMP = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
 """A time stamp of ISO 8601: to the second, its fraction, its zone."""
 
 
-def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = MAX_ROWS) -> Record:
+def read_csv_record(path: str | Path, spec: RecordSpec, *, max_rows: int = CSV_ROWS.most) -> Record:
     """Read a CSV file into a record: time in s from the file's own clock, signals in SI.
 
     A file of more than ``max_rows`` is averaged over 2, 4, 8 ... neighbours while it is read, so that memory
@@ -188,8 +186,8 @@ def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterat
             told = "holds NUL bytes: not a text file (UTF-16 is not read; save it as UTF-8)"
             raise InputError(told, where=origin)
         cut = data.rfind(b"\n") + 1
-        if not cut and len(rest) + len(data) > MAX_LINE_BYTES + BLOCK_BYTES:
-            told = f"a line longer than {MAX_LINE_BYTES} bytes: not a table of numbers"
+        if not cut and len(rest) + len(data) > CSV_LINE_BYTES.most + BLOCK_BYTES:
+            told = f"a line longer than {CSV_LINE_BYTES.most} bytes: not a table of numbers"
             raise InputError(told, where=origin)
         if cut:
             yield rest + data[:cut]

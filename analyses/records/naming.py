@@ -18,6 +18,7 @@ class Signal:
     also: tuple[str, ...] = ()
 
 
+COMMAND = ("reference", "cmd", "command", "setpoint", "target")
 SIGNALS = (
     Signal("reference", "rad", "commanded output angle",
            ("ref", "cmd", "command", "setpoint", "target", "demand", "position_reference", "position_command",
@@ -26,21 +27,16 @@ SIGNALS = (
     Signal("position_reference", "m", "commanded position",
            ("reference", "ref", "cmd", "command", "setpoint", "target", "demand", "position_command", "qg")),
     Signal("speed_reference", "rad/s", "commanded motor speed",
-           ("reference", "cmd", "command", "setpoint", "target", "speed_command", "motor_speed_reference",
-            "target_speed", "velocity_reference", "velocity_command")),
+           (*COMMAND, "speed_command", "motor_speed_reference", "target_speed", "velocity_reference",
+            "velocity_command")),
     Signal("output_speed_reference", "rad/s", "commanded output speed", ("output_speed_command",)),
     Signal("velocity_reference", "m/s", "commanded velocity",
-           ("reference", "cmd", "command", "setpoint", "target", "speed_command", "speed_reference",
-            "velocity_command")),
-    Signal("current_reference", "A", "commanded current",
-           ("reference", "cmd", "command", "setpoint", "target", "current_command", "iq_ref", "i_ref")),
+           (*COMMAND, "speed_command", "speed_reference", "velocity_command")),
+    Signal("current_reference", "A", "commanded current", (*COMMAND, "current_command", "iq_ref", "i_ref")),
     Signal("torque_reference", "N*m", "commanded motor torque",
-           ("reference", "cmd", "command", "setpoint", "target", "torque_command", "torque_setpoint",
-            "target_torque", "motor_torque_reference")),
-    Signal("force_reference", "N", "commanded drive force",
-           ("reference", "cmd", "command", "setpoint", "target", "force_command", "target_force")),
-    Signal("voltage_reference", "V", "commanded voltage",
-           ("reference", "cmd", "command", "setpoint", "target", "voltage_command", "u_ref")),
+           (*COMMAND, "torque_command", "torque_setpoint", "target_torque", "motor_torque_reference")),
+    Signal("force_reference", "N", "commanded drive force", (*COMMAND, "force_command", "target_force")),
+    Signal("voltage_reference", "V", "commanded voltage", (*COMMAND, "voltage_command", "u_ref")),
     Signal("output_angle", "rad", "output angle",
            ("output_position", "load_angle", "fin_angle", "joint_angle", "joint_position", "deflection",
             "present_position")),

@@ -36,8 +36,6 @@ ODRIVE_SPEC = RecordSpec(
         SignalColumn(name="speed", column="velocity", unit="turn/s"),
     ),
 )
-
-
 HEAD_BYTES = 1 << 16
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = (b"\x1f\x8b", b"PK", b"BZ", b"\xfd7")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.mat5 import MatContent, read_mat5
 from actuator_lti.files.reading import decode, parse_json, read_bytes, shown_path
 from actuator_lti.start.extras import need
@@ -68,25 +68,11 @@ def _columns(tree: Mapping[str, Any], group: str) -> Iterator[tuple[str, Floats]
             yield group + name, np.array(value, dtype=np.float64)
 
 
-def read_mat_record(path: str | Path, spec: RecordSpec) -> Record:
-    """Read vectors of a MATLAB file into a record; its scalars become ``constants``.
-
-    The columns of the spec are variable names (``group.field`` for those of a structure), or columns of the
-    matrix that ``spec.format.matrix`` names.
-    """
-    path = Path(path)
-    content, digest = load_mat(path)
-    constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
-    return record_of_columns(columns_of(content, spec.format, path), spec, path, digest, constants)
-
-
 def load_mat(path: Path) -> tuple[MatContent, str]:
     """The content of a file, without its empty arrays, and its SHA-256."""
     data = read_bytes(path, ".mat file", MAT_BYTES)
-    try:
+    with in_file(str(path)):
         content = read_mat5(data)
-    except InputError as error:
-        raise InputError(error.message, where=str(path)) from None
     content.arrays = {key: value for key, value in content.arrays.items() if value.size}
     return content, hashlib.sha256(data).hexdigest()
 
@@ -121,10 +107,16 @@ TABLES = {".parquet": load_parquet, ".pq": load_parquet, ".json": load_json}
 
 
 def read_record(path: Path, spec: RecordSpec) -> Record:
-    """A record of any kind, by the file's ending."""
+    """A record of any kind, by the file's ending; scalars of a MATLAB file become ``constants``.
+
+    Its columns are variable names (``group.field`` for those of a structure), or columns of the matrix that
+    ``spec.format.matrix`` names.
+    """
     suffix = path.suffix.lower()
     if suffix == ".mat":
-        return read_mat_record(path, spec)
+        content, digest = load_mat(path)
+        constants = {k: float(v.ravel()[0]) for k, v in content.arrays.items() if v.size == 1}
+        return record_of_columns(columns_of(content, spec.format, path), spec, path, digest, constants)
     if suffix in TABLES:
         vectors, digest = TABLES[suffix](path)
         return record_of_columns(vectors, spec, path, digest)

@@ -10,8 +10,9 @@ question is asked of the whole state, and the drive is followed until it is answ
   from there;
 - *limit cycle*: held by friction it stands a third time where it stood before, after equal times and swings
   (to `ALIKE`): what follows from standing there is known, so it does so for ever.  Or of `PERIODS` swings or
-  more the later half is as large as the earlier, and an event, a limit or a sensor's counts are in it, as a
-  linear drive has none.  Which one a drive ends in may depend on the step;
+  more the later half is as large as the earlier, of the motor, too, and an event, a limit or a sensor's
+  counts are in it, as a linear drive has none.  (A load that nothing damps swings on, at any size, while the
+  motor comes to rest: no cycle.)  Which one a drive ends in may depend on the step;
 - *diverging*: no finite state, or a motion that still grows at the end of the work;
 - *still moving*: none of these within `MOST_WORK` ticks and integration steps, as a stiff drive takes
   thousands of steps a tick.
@@ -167,7 +168,7 @@ class _Watch:
                 swing = self._swing()
                 if self._faint(swing):
                     return self._rest("at rest")
-                if swing.alike and self._bent():
+                if swing.alike and self._bent() and self._motor_keeps_on():
                     return self._rest("limit cycle", swing)
                 if self._idle():
                     return self._rest("at rest")
@@ -329,6 +330,12 @@ class _Watch:
         return bool(
             counted or passes or p[at.LAW] > 0.0 or any(flags & limits or n for _, flags, n in self._late())
         )
+
+    def _motor_keeps_on(self) -> bool:
+        """Whether the motor swings in the last half of the entries, and as far at its end."""
+        motor = np.concatenate(self.seen, axis=1)[2]
+        early, late = (float(np.ptp(part)) for part in np.array_split(motor[motor.size // 2 :], 2))
+        return early > 0.0 and _alike(early, late)
 
     def _late(self) -> list[tuple[int, int, int]]:
         """What acted in the last half of the entries."""

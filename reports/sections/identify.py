@@ -136,7 +136,15 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
         f"sampled loop, {noise}.{f' {read[:1].upper()}{read[1:]}.' if read else ''}"
     )
-    blocks: list[doc.Block] = [identified.parameter_table("Identified values", fit, axis=result.design.axis)]
+    own: list[doc.Shown] = [
+        (doc.column("own", "Design", format="sig:5"), lambda key: result.own[key]),
+        (
+            doc.column("ratio", "Over it", format="sig:3"),
+            lambda key: result.own[key] and fit[key] / result.own[key],
+        ),
+    ]
+    axis = result.design.axis
+    blocks = [identified.parameter_table("Identified values", fit, axis=axis, more=own)]
     both = decibels_and_degrees(measured.response, result.modelled)
     for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
         chart = style.Chart(width=style.WIDE, height=280.0)

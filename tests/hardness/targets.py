@@ -33,7 +33,7 @@ from analyses.records import campaign_file
 from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.open_record import open_record
-from analyses.records.readers import read_mat_record, read_record
+from analyses.records.readers import read_record
 from analyses.records.record import Record
 from analyses.records.spec import CsvFormat, RecordSpec, SignalColumn, TimeColumn
 from analyses.studies import study
@@ -329,7 +329,7 @@ def targets() -> tuple[Target, ...]:
         Target("record file", (RECORD,), record),
         Target("record", (ROWS,), lambda p: accounted(read_csv_record(p, SPEC)), ".csv"),
         Target("record by itself", (KNOWN_ROWS,), open_record, ".csv"),
-        Target("mat", mat_files(), lambda p: accounted(read_mat_record(p, SPEC)), ".mat"),
+        Target("mat", mat_files(), lambda p: accounted(read_record(p, SPEC)), ".mat"),
         Target("JSON record", (JSON_ROWS,), lambda p: read_record(p, SPEC), ".json", tree_fault),
         Target("parquet", (parquet_file(),), lambda p: read_record(p, SPEC), ".parquet"),
         Target("command or load", (ROWS,), lambda p: read_columns(p, (0, 1)), ".csv"),

@@ -23,7 +23,7 @@ from analyses.records.campaign_file import load_campaign
 from analyses.records.csv_stream import read_csv_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.open_record import open_record
-from analyses.records.readers import read_mat_record, read_record
+from analyses.records.readers import load_mat, read_record
 from nonlinear import commands
 from tests import refusals
 
@@ -181,7 +181,7 @@ def test_integers_control_characters_and_keys_twice() -> None:
 
 KINDS: dict[str, Callable[[Path], object]] = {
     ".csv": lambda path: read_csv_record(path, SPEC),
-    ".mat": lambda path: read_mat_record(path, SPEC),
+    ".mat": load_mat,
     ".parquet": lambda path: read_record(path, SPEC),
     ".toml": load_campaign,
     ".rec": open_record,
@@ -224,9 +224,9 @@ def test_a_small_file_that_unpacks_to_gigabytes(tmp_path) -> None:
     path, most = tmp_path / "b.mat", bounds.MAT_VALUES.most
     path.write_bytes(packed_zeros(9 * most))
     assert path.stat().st_size < 4_000_000
-    refusals.refused(read_mat_record, path, SPEC, words=("b.mat", "more than allowed: at most 50000000"))
+    refusals.refused(read_record, path, SPEC, words=("b.mat", "more than allowed: at most 50000000"))
     path.write_bytes(packed_zeros(most + (1 << 20)))
-    refusals.refused(read_mat_record, path, SPEC, words=("numbers of a .mat or Parquet file",))
+    refusals.refused(read_record, path, SPEC, words=("numbers of a .mat or Parquet file",))
 
 
 def test_twenty_thousand_runs_are_read_and_one_more_is_not(tmp_path) -> None:

@@ -363,3 +363,46 @@ def test_a_linear_axis_reads_its_values_in_newtons_and_metres(tmp_path) -> None:
         assert re.search(rf"{key} [^;]*± \S+ {unit}[;,.]", shown), key
     assert "N m" not in shown
     assert "kg m" not in shown
+
+
+def _toleranced(key: str, value: str, share: str) -> model.Design:
+    """The design with another value, and a tolerance of it."""
+    return _design({}).with_values({key: {"value": value, "tolerance": share}})
+
+
+def test_what_is_fixed_with_a_tolerance_is_correlated_with_what_hangs_on_it(tmp_path) -> None:
+    """All inertias, stiffness and frictions of one scale make the same loop: the load's 10 % are theirs."""
+    design, file = _toleranced("load.inertia", "0.04 kg m^2", "10 %"), _measured(tmp_path, "L", 1e-3, 0)
+    held = {"load.inertia": TRUTH["load.inertia"], "motor.rotor_inertia": TRUTH["motor.rotor_inertia"]}
+    made = identify_response(design, file, fixed=held).design
+    pairs = {frozenset((one.first, one.second)): one.coefficient for one in made.correlations}
+    # above the resonance the rotor alone turns, so that the antiresonance sqrt(k/J_l) tells k over J_l
+    assert pairs[frozenset(("load.inertia", "coupling.stiffness"))] > 0.95
+    share = own_std(made, "coupling.stiffness") / parameter_value(made, "coupling.stiffness")
+    assert share == pytest.approx(0.1 / np.sqrt(3.0), rel=0.2)
+
+
+def test_a_value_beyond_the_design_s_tolerance_is_said_with_both_numbers(tmp_path) -> None:
+    file = _measured(tmp_path, "L", 1e-3, 0)
+    found = identify_response(_toleranced("coupling.stiffness", "450 Nm/rad", "2 %"), file)
+    (item,) = (one for one in found.items if one.id == "far-coupling.stiffness")
+    assert item.passed is None
+    assert re.match(r"900.* N m/rad, 2.* of the design's 450: ", item.reason)
+    assert [row["ratio"] for row in section(found)["blocks"][-3]["rows"][2:3]] == pytest.approx(
+        [2.0], rel=0.01
+    )
+    allowed = identify_response(_toleranced("coupling.stiffness", "540 Nm/rad", "80 %"), file)
+    assert not [one for one in allowed.items if one.id.startswith("far-")]
+
+
+def test_a_stiffness_from_below_the_antiresonance_is_not_proven(tmp_path) -> None:
+    """sqrt(900/0.04)/(2 pi) = 23.87 Hz; the points end at 18 Hz."""
+    file, _ = _below_antiresonance(tmp_path)
+    free = ("motor.rotor_inertia", "load.inertia", "coupling.stiffness")
+    off = {"coupling.stiffness": 2.0}
+    held = {key: TRUTH[key] for key in TRUTH if key not in free}
+    (item,) = (one for one in identify_response(_design(off), file, fixed=held).items if one.id == "reach")
+    assert item.passed is None
+    assert re.search(r"measured to 18 Hz, the antiresonance is at 2\d.* of the design's 1800", item.reason)
+    whole = identify_response(_design(off), _measured(tmp_path, "L", 1e-3, 0))
+    assert not [one for one in whole.items if one.id == "reach"]

@@ -150,6 +150,16 @@ def test_a_drive_that_its_load_carries_off_diverges() -> None:
     assert judge(run.running).verdict == "diverging"
 
 
+def test_a_load_that_nothing_damps_is_in_no_limit_cycle_while_the_motor_rests() -> None:
+    """Its energy stays, so it swings on as a step has left it; a cycle would come back to its own size."""
+    load = {"friction": None, "gravity": None}
+    free = changed(JOINT, coupling={"damping_Nms_rad": 0.0, "play_rad": 0.0}, load=load)
+    ends = [settle(free, 0.0, step).rest for step in (0.01, 0.02, 0.04)]
+    assert {rest.verdict for rest in ends} == {"still moving"}
+    assert all(rest.amplitude > rest.motor_amplitude == 0.0 for rest in ends)
+    assert words(ends[0], 1.0, "rad").endswith("the motor at rest")
+
+
 def test_a_gimbal_with_a_spring_and_a_steering_motor_with_play_hunt() -> None:
     """+-0.40 deg at 0.12 Hz; 0.213 Hz, 0.458 deg peak to peak at the motor's side, 0.3 deg of it play."""
     gimbal = settle(load_design(HERE / "gimbal.toml"), 0.0, 0.1).rest
