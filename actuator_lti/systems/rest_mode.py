@@ -8,6 +8,7 @@ and taken out.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,12 +63,11 @@ def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.nda
     As, Cs = (np.stack([each[k] for each in systems]) for k in (0, 2))
     if As.shape[1] < 2 or not (np.isfinite(As).all() and np.isfinite(Cs).all()):
         return None
-    integrators = np.flatnonzero((np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0) | (len(As) > 1))
-    over, seen = np.eye(As.shape[1]), []
-    for A, C in zip(As, Cs, strict=True):
-        seen.append(C @ over)
-        over = A @ over
-    found = [v for j in integrators if (v := _at_rest(over, np.vstack(seen), at, int(j), alone)) is not None]
+    holds = (np.diagonal(As, axis1=1, axis2=2) == at).all(axis=0)
+    round_trip = _round_trip(As, at, holds)
+    seen = np.vstack([C @ over for C, over in zip(Cs, round_trip.before, strict=True)])
+    integrators = np.flatnonzero(holds | (len(As) > 1))
+    found = [v for j in integrators if (v := _at_rest(round_trip, seen, int(j), alone)) is not None]
     if not found:
         return None
     parts = np.abs(found) / balanced(As[0])[1]
@@ -76,6 +76,26 @@ def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.nda
     j = int(integrators[largest])
     v = _on_its_way(As, found[k])
     return (j, v / v[:, [j]]) if v[:, j].all() else None
+
+
+class _RoundTrip(NamedTuple):
+    """All ticks together: what is before each of them, shape (M, n, n), of what was before the first."""
+
+    before: np.ndarray
+    change: np.ndarray  # what all of them change, shape (n, n)
+    terms: np.ndarray  # size of what that is the sum of
+
+
+def _round_trip(As: np.ndarray, at: float, holds: np.ndarray) -> _RoundTrip:
+    """``holds``: integrators in every tick: of those only what they sum is a term, not themselves."""
+    one = np.eye(As.shape[1])
+    before, change, sums = [one], np.zeros_like(one), np.zeros_like(one)
+    for A in As:
+        over = before[-1]
+        change, sums = change + (A - at * one) @ over, sums + np.abs(A - at * one) @ np.abs(over)
+        before.append(A @ over)
+    whole = np.abs(As[-1]) @ np.abs(before[-2]) + abs(at) * one
+    return _RoundTrip(np.array(before[:-1]), change, np.where(holds[:, None], sums, whole))
 
 
 def _on_its_way(As: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -87,13 +107,11 @@ def _on_its_way(As: np.ndarray, v: np.ndarray) -> np.ndarray:
     return np.array(way)
 
 
-def _at_rest(A: np.ndarray, c: np.ndarray, at: float, j: int, alone: bool) -> np.ndarray | None:
-    """The vector v with v_j = 1, A v = ``at`` v and C v = 0 within rounding; ``None`` where there is none."""
-    n = len(A)
+def _at_rest(ticks: _RoundTrip, c: np.ndarray, j: int, alone: bool) -> np.ndarray | None:
+    """The vector v with v_j = 1 that nothing changes, C v = 0, within rounding; ``None`` if there is none."""
+    rows, allowed = ticks.change, ticks.terms
+    n = len(rows)
     o = np.arange(n) != j
-    rows = A - at * np.eye(n)
-    rounded = (at != A) & np.eye(n, dtype=bool)  # of an integrator only what it sums is, not itself
-    allowed = np.where(rounded, np.abs(A) + abs(at), np.abs(rows))
     v = np.zeros(n)
     v[j] = 1.0
     largest = np.abs(rows).max(axis=1)

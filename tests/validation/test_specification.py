@@ -310,7 +310,7 @@ def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
     assert "not followed" not in section(duty(AMBER, asked))["result"]
     made = section(duty(AMBER, replace(asked, amplitude_rad=1.0, frequency_hz=20.0)))
     assert "it is not followed as asked, limited by" in made["result"]
-    assert made["status"] == "warn"
+    assert made["status"] == "fail"  # 9.5 A of 4 A
     slow = with_overrides(AMBER, {"command.rate": "7 deg/s"})  # 0.02 rad at 1 Hz are 7.2 deg/s
     assert duty(slow, asked).limited == ("profile",)
     assert duty(with_overrides(AMBER, {"command.rate": "8 deg/s"}), asked).limited == ()
