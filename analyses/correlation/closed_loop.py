@@ -17,7 +17,7 @@ from analyses.correlation.compare import SignalComparison, compare_signals
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
-from analyses.records.naming import KNOWN_UNITS
+from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, prepared
 from nonlinear import State, Trajectory, commands, simulate
 
@@ -94,8 +94,7 @@ def correlate_record(
         modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
     driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
-    load = driving.LOADS[design.axis]
-    used = dict.fromkeys(measured, "compared") | {load: "load", "enable": "enabled part"}
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
     used[driven.signal] = "command" if outermost else f"{driven.stage} command"
     if design.effective_motor.source_gain_Nm_V is None:
         used["supply"] = "supply"

@@ -15,11 +15,11 @@ from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
+from analyses.records.naming import LOADS
 from analyses.records.record import Record
 from nonlinear import State, commands, loads
 from nonlinear.loads import LoadMoment
 
-LOADS = {"rotary": "torque", "linear": "load_force"}
 STAGES = ("position", "velocity", "current", "voltage")
 COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("rotary", "position"): ("reference",),

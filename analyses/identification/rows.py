@@ -16,6 +16,7 @@ from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated
+from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record, lasting, period_of, prepared
 
 REST_SHARE = 0.005
@@ -52,7 +53,7 @@ def is_benchmark(record: Record) -> bool:
 
 def is_loaded(record: Record) -> bool:
     """Whether a record holds the load."""
-    return bool({"load_force", "torque"} & set(record.signals))
+    return any(name in record.signals for name in LOADS.values())
 
 
 def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
@@ -82,10 +83,9 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
     """Position, speed and acceleration at the motor, from the position or, without one, from the speed."""
     period = period_of(record)
-    place = place_of(design, record)
-    if place is not None:
+    if (place := place_of(design, record)) is not None:
         return recipe.motion(place[1], period), place[0]
-    rate = "velocity" if design.axis == "linear" else "speed"
+    rate = RATES[design.axis]
     if rate not in record.signals:
         wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
         raise InputError(f"no motion: {wanted} is needed", where=record.name)
@@ -102,7 +102,7 @@ def moment_of(
     Without a recorded one, that of the design's own moments and (with ``gravity``) pendulum at the recorded
     angle; the signal is then empty.
     """
-    name = "load_force" if design.axis == "linear" else "torque"
+    name = LOADS[design.axis]
     if name in record.signals:
         return record[name], name
     load = design.load if gravity else replace(design.load, gravity=None)
