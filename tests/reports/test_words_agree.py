@@ -40,7 +40,7 @@ INCLUDED |= {": mean of its profile and filter included": SHAPED}
 
 
 def test_a_margin_that_goes_with_the_hold_of_a_torque_says_what_it_is_in_the_motor() -> None:
-    """The continuous form, which has the delays of the controller and no held torque, is its other writing."""
+    """The continuous form, with the delays of the controller and no held torque, is its other writing."""
     cogging = {"cogging_Nm": 0.02, "cogging_periods": 100.0, "cogging_phase_rad": pi}
     design = changed(load_design("fin"), motor=cogging, load={"moment_slope_Nm_rad": 0.0})
     known = margins(design).loops["velocity"]
