@@ -14,6 +14,7 @@ from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
+from analyses.margins import Asked as MarginsAsked
 from analyses.margins import margins
 from analyses.motion.settling import Settling
 from analyses.specification.requirements import which_response
@@ -28,7 +29,7 @@ from reports.sections import validation
 from reports.sections.answer import believed
 from reports.sections.cycles import section as cycles_section
 from reports.sections.large_signal import _shift_table
-from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
+from reports.sections.margins import DOWNWARDS, brief, margin_table, result, spread_table
 from reports.sections.names import Unit
 from reports.terminal import print_blocks
 from tests.changed import changed
@@ -54,6 +55,18 @@ def test_a_margin_that_goes_with_the_hold_of_a_torque_says_what_it_is_in_the_mot
     assert held < continuous - 3.0
     slack = {"cogging_Nm": 5e-4}
     assert not any("instant" in one for one in margins(changed(design, motor=slack)).loops["position"].notes)
+
+
+def test_margins_that_the_smoothing_of_dry_friction_decides_say_those_without_it() -> None:
+    """Over 1e9 rad/s it has no slope left: then rest is as sliding, and the note's margin that at rest."""
+    amber = load_design("ilr33-amber")
+    (note,) = (one for one in brief(margins(amber)).notes if "smoothing_speed (not given)" in one)
+    wide = margins(
+        with_values(amber, {"friction.smoothing_speed": 1e9}), MarginsAsked(operating_point="rest")
+    )
+    for name, said in re.findall(r"(\w+) loop (\S+) deg", note) or pytest.fail(note):
+        assert float(said) == pytest.approx(wide.loops[name].margins.phase_margin_deg, abs=0.006)
+    assert not any("smoothing" in one for one in brief(margins(load_design("ilr33-amber-tanh"))).notes)
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
