@@ -46,22 +46,11 @@ UNEVEN = 1.5  # times the usual interval: a longer one is a hole
 class Command:
     """A signal of time; built by the functions of this module.
 
-    Attributes
-    ----------
-    kind : str
-        Name of the function that built it.
-    code : int
-        Kind as the kernel knows it.
-    numbers : tuple of float
-        Amplitude, start time and what the kind needs (see ``_kernels.signals``).
-    highest_hz : float
-        Highest frequency asked for, 0 where that has no meaning.
-    end_s : float
-        When it is over; inf where it goes on.
-    samples : ndarray or None
-        Times (s) and values of a tabulated command, shape (2, m); zero before the first of them.
-    held : bool
-        Whether each tabulated value holds until the next; else linear between them.
+    ``kind``: name of that function; ``code``: kind as the kernel knows it; ``numbers``: amplitude, start time
+    and what the kind needs (see ``_kernels.signals``); ``highest_hz``: highest frequency asked for, 0 where
+    that has no meaning; ``end_s``: when it is over, inf where it goes on; ``samples``: times (s) and values
+    of a tabulated command, shape (2, m), zero before the first of them; ``held``: whether each tabulated
+    value holds until the next; else linear between them.
     """
 
     kind: str

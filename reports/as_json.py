@@ -1,5 +1,6 @@
 """A result as plain data: fields and properties by their Python names, SI, designs by name and hash."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from math import degrees
@@ -14,6 +15,17 @@ from actuator_lti.files.reading import shown_path
 from actuator_lti.files.tree import Tree
 from analyses.linear.loop_figures import HELD, LoopFigures
 from reports.document import plain
+
+_LINEAR = (
+    (re.compile(r"_Nms_rad$"), "_Ns_m"),
+    (re.compile(r"_Nm_rad$"), "_N_m"),
+    (re.compile(r"_Nm$"), "_N"),
+    (re.compile(r"_kgm2$"), "_kg"),
+    (re.compile(r"(acceleration\w*)_rad_s2$"), r"\1_m_s2"),
+    (re.compile(r"((?:speed|rate|ripple|slowest)\w*)_rad_s$"), r"\1_m_s"),
+    (re.compile(r"(?<!phase)_rad$"), "_m"),
+)
+"""What a result's names end with, and on a linear axis."""
 
 
 def as_json(value: Any) -> Any:
@@ -37,6 +49,25 @@ def as_json(value: Any) -> Any:
     if isinstance(value, tuple | list | np.ndarray):
         return [as_json(item) for item in value]
     return plain(value)
+
+
+def on_a_line(data: Any) -> Any:
+    """Plain data of a linear axis: its names say m, N and kg; frequencies in rad/s, phases in rad stay.
+
+    >>> on_a_line({"amplitude_rad": 0.1, "seen_Nm_rad": [{"speed_rad_s": 1.0, "frequency_rad_s": 2.0}]})
+    {'amplitude_m': 0.1, 'seen_N_m': [{'speed_m_s': 1.0, 'frequency_rad_s': 2.0}]}
+    """
+    if isinstance(data, list):
+        return [on_a_line(item) for item in data]
+    if not isinstance(data, dict):
+        return data
+    return {_on_a_line(key): on_a_line(item) for key, item in data.items()}
+
+
+def _on_a_line(name: str) -> str:
+    for of, line in _LINEAR:
+        name = of.sub(line, name)
+    return name
 
 
 def _named(value: Any) -> Any:

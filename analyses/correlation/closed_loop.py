@@ -18,7 +18,7 @@ from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
-from analyses.records.naming import KNOWN_UNITS
+from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, prepared
 from nonlinear import State, Trajectory, commands, simulate
 
@@ -97,8 +97,7 @@ def correlate_record(
         findings += (following_finding(design, follows),)
     driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
-    load = driving.LOADS[design.axis]
-    used = dict.fromkeys(measured, "compared") | {load: "load", "enable": "enabled part"}
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
     used[driven.signal] = "command" if outermost else f"{driven.stage} command"
     if design.effective_motor.source_gain_Nm_V is None:
         used["supply"] = "supply"

@@ -147,8 +147,6 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
 def flat_tops(values: Floats) -> Mask:
     """Where a signal stands at its largest or smallest value for three samples or more.
 
-    Examples
-    --------
     >>> flat_tops(np.array([0.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.0])).astype(int).tolist()
     [0, 1, 1, 1, 0, 0, 0, 0]
     """

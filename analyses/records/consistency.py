@@ -15,6 +15,7 @@ from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
+from analyses.records.naming import RATES
 from analyses.records.record import Record
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
@@ -85,17 +86,10 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
 
 def place_of(design: Design, record: Record) -> tuple[str, Floats] | None:
     """The position at the motor and the signal that it comes from; None where none is recorded."""
-    if design.axis == "linear":
-        return ("position", record["position"]) if "position" in record.signals else None
-    if "angle" in record.signals:
-        return "angle", record["angle"]
-    if "output_angle" in record.signals:
-        return "output_angle", design.total_ratio * record["output_angle"]
+    for name in ("position",) if design.axis == "linear" else ("angle", "output_angle"):
+        if name in record.signals:
+            return name, record[name] * (design.total_ratio if name == "output_angle" else 1.0)
     return None
-
-
-def _rate_name(design: Design) -> str:
-    return "velocity" if design.axis == "linear" else "speed"
 
 
 def _smooth(record: Record, values: Floats) -> Floats:
@@ -144,7 +138,7 @@ class RateRatio:
 
 def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     """Speed against the rate of the position; None where one of them is not recorded, or nothing moves."""
-    place, name = place_of(design, record), _rate_name(design)
+    place, name = place_of(design, record), RATES[design.axis]
     if place is None or name not in record.signals:
         return None
     # over each interval the same filter on both, the slope first: they agree up to the ends, and a motion
@@ -192,7 +186,7 @@ def _bounds(y: Floats, x: Floats, beside_x: Floats, beside_y: Floats) -> tuple[f
 
 
 def _rate(design: Design, record: Record) -> Finding | None:
-    ratio, name = rate_ratio(design, record), _rate_name(design)
+    ratio, name = rate_ratio(design, record), RATES[design.axis]
     if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
@@ -212,7 +206,7 @@ def _rate(design: Design, record: Record) -> Finding | None:
 
 def _still(design: Design, record: Record) -> Finding | None:
     """A position that stands still while the speed says, beyond its noise, that it moves."""
-    place, name = place_of(design, record), _rate_name(design)
+    place, name = place_of(design, record), RATES[design.axis]
     if place is None or name not in record.signals or np.ptp(place[1]):
         return None
     speed, unit = record[name], "m" if design.axis == "linear" else "rad"
@@ -241,7 +235,7 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
 
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
-    if place_of(design, record) is not None and _rate_name(design) in record.signals:
+    if place_of(design, record) is not None and RATES[design.axis] in record.signals:
         return None
     ticks, whole = _ticks_a_row(design, record)
     if ticks < 1.0 - TICK_TOLERANCE or record.averaged > 1:

@@ -93,7 +93,7 @@ def _inertias(design: Design, model: Design) -> Iterator[Row]:
     rows["load"] = design.load_side_inertia_kgm2 * design.ratio_behind_coupling if design.coupling else 0.0
     drive = rows.running().begin(torque)
     Ts = design.controller.period_s
-    unit = "kg" if design.axis == "linear" else "kg*m^2"
+    unit, push = ("kg", "force") if design.axis == "linear" else ("kg*m^2", "torque")
     pairs = [("inertia", model.inertia_kgm2, torque * Ts / drive.value("SPEED"))]
     if design.coupling is not None:
         behind = design.load_side_inertia_kgm2 * Ts / drive.value("LOAD_SPEED")
@@ -103,7 +103,7 @@ def _inertias(design: Design, model: Design) -> Iterator[Row]:
         ]
     for name, predicted, found in pairs:
         yield judged(name, "drive", predicted, found, EXACT * predicted, unit=unit,
-                     condition="a known torque over one tick, without friction")  # fmt: skip
+                     condition=f"a known {push} over one tick, without friction")  # fmt: skip
 
 
 def speeds_of(design: Design, direction: int) -> list[float]:

@@ -113,6 +113,7 @@ def answer(
     from analyses.isolation import isolated
     from reports import document as doc
     from reports.as_json import as_json as plain_data
+    from reports.as_json import on_a_line
     from reports.study_pages import in_amperes, notices
 
     drive: Any = getattr(getattr(subject, "base", None), "design", subject)
@@ -148,7 +149,8 @@ def answer(
     if out is not None:
         files += _pages(one, drive, parts, out, quiet)
     if as_json:
-        print_json(one.shows("data", plain_data)(result))
+        data = one.shows("data", plain_data)(result)
+        print_json(on_a_line(data) if getattr(drive, "axis", "") == "linear" else data)
     else:
         _print(one, drive, result, parts, verdict)
         for path in files:

@@ -97,7 +97,7 @@ NAMES = {"motor": "Motor encoder", "output": "Output encoder"}
 
 def counts(found: Sequence[Counts], axis: str = "rotary") -> doc.Section:
     intro = (
-        "A counted angle is a staircase. About the edge of a count it is a relay (gain 2 q/(π A)); for "
+        "A counted position is a staircase. About the edge of a count it is a relay (gain 2 q/(π A)); for "
         "large amplitudes its gain tends to 1. The motor's counts are seen in the speed made of them, the "
         "output's in its position."
     )

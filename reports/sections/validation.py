@@ -36,7 +36,7 @@ for _limiter in LIMITERS.values():
     _onset = f"{_limiter.name}_onset".replace("-", "_")
     MORE[_onset] = f"command in front of the {_limiter.words}"
     MORE[f"{_onset}_integral"] = f"integral that the {_limiter.words} clamps"
-PLACES = {"command": "Command to output", "load": "Load torque to output", "drive": "Numbers of the design"}
+PLACES = {"command": "Command to output", "load": "Load to output", "drive": "Numbers of the design"}
 NOISE = 1e-9  # of the value: a smaller error changes with the order in which sums are taken
 UP = Context(prec=2, rounding=ROUND_UP)
 
@@ -202,6 +202,8 @@ def _rounded(row: Check, value: float | None, digits: int) -> float | None:
 def quantity_name(row: Check) -> str:
     """Words for a quantity; a gain margin, which the simulator has as a ratio, in dB as elsewhere."""
     words = MORE.get(row.name) or QUANTITIES.get(row.name, row.name.replace("_", " "))
+    words = words.replace("torque", "force") if row.unit == "N" else words
+    words = words.replace("inertia", "mass") if row.unit == "kg" else words
     if not row.name.startswith("gain_margin") or not row.predicted:
         return words
     return f"{words}, {gain_margin(20.0 * math.log10(row.predicted), 2)} dB"

@@ -1,5 +1,6 @@
 """Two places of a report that speak of one thing say the same."""
 
+import re
 from dataclasses import replace
 from math import pi
 from typing import Any
@@ -182,3 +183,14 @@ def test_a_drive_that_stands_still_unproven_is_not_said_to_rest_after_every_step
     )
     ends = [row["end"] for row in made["blocks"][-1]["rows"]]
     assert ends == ["stands still, not known for how long", "at rest"]
+
+
+def test_a_linear_axis_is_told_in_metres_and_newtons(cli) -> None:
+    """Angles, torques and inertias are no names of what a force moves; frequencies stay in rad/s."""
+    for name in ("failures", "cycles", "stiffness", "margins"):
+        names = set(re.findall(r'"(\w+)":', cli(name, "ballscrew", "--json").out))
+        turning = {one for one in names if re.search(r"(?<!frequency)(?<!band)_rad(_s2?)?$|Nm|kgm2", one)}
+        assert not turning, name
+    words = cli("validate", "emps").out
+    assert "steady force" in words
+    assert "torque" not in words.lower()
