@@ -81,6 +81,15 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
 
 
 @each
+def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> None:
+    """As in the motor: poles exp(+-j omega Ts), omega = sqrt(A Z/J)."""
+    at = Operating(angle_rad=case.stable / N, torques_at_once=True)
+    poles = np.linalg.eigvals(TickProgram(wire(case.put(rotor()), at), "voltage").tick(0).A)
+    assert np.abs(poles) == pytest.approx(1.0, abs=1e-12)
+    assert np.max(np.angle(poles)) == pytest.approx(sqrt(A * case.order / J) * Ts, rel=1e-9)
+
+
+@each
 def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
     at = Operating(speed_rad_s=40.0, angle_rad=0.3)
     own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))

@@ -31,11 +31,29 @@ from reports.sections.large_signal import _shift_table
 from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
 from reports.sections.names import Unit
 from reports.terminal import print_blocks
+from tests.changed import changed
 
 SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
 SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 INCLUDED = {"": {}, ": feed-forward included": {"control.position.feedforward": 1.0}}
 INCLUDED |= {": mean of its profile and filter included": SHAPED}
+
+
+def test_a_margin_that_goes_with_the_hold_of_a_torque_says_what_it_is_in_the_motor() -> None:
+    """The continuous form, with the delays of the controller and no held torque, is its other writing."""
+    cogging = {"cogging_Nm": 0.02, "cogging_periods": 100.0, "cogging_phase_rad": pi}
+    design = changed(load_design("fin"), motor=cogging, load={"moment_slope_Nm_rad": 0.0})
+    known = margins(design).loops["velocity"]
+    note = next(one for one in known.notes if "acted at every instant" in one)
+    there = float(re.search(r"phase margin (\S+) deg if cogging", note)[1])
+    held = known.margins.phase_margin_deg
+    continuous = stability_margins(
+        assemble_loops(design, form="continuous").velocity.open_loop
+    ).phase_margin_deg
+    assert there == pytest.approx(continuous, abs=0.1)
+    assert held < continuous - 3.0
+    slack = {"cogging_Nm": 5e-4}
+    assert not any("instant" in one for one in margins(changed(design, motor=slack)).loops["position"].notes)
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:
