@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated
 
-from actuator_lti.design.data_sheet import SHEET
+from actuator_lti.design.data_sheet import SHEET, stated_in
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
@@ -111,4 +111,6 @@ def explained(design: Design) -> tuple[Explained, ...]:
         result.append(
             Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}")
         )
-    return tuple(result)
+    sheet = (Explained(*stated, "friction, below") for stated in stated_in(design))
+    at = next((k for k, one in enumerate(result) if one.path.startswith("friction.")), len(result))
+    return (*result[:at], *sheet, *result[at:])

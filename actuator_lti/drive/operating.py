@@ -40,6 +40,8 @@ class Operating:
     ``twist_rad``: twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A
     spring that bends has the stiffness of this twist; without one, of that under ``load_Nm``.
     ``torques_held``: whether torques that depend on the angle are taken as they stand, without their slopes.
+    ``torques_at_once``: whether they act at every instant, as they do on a motor, where model.md section 11
+    (and so the simulator) holds them over a tick.
     """
 
     point: OperatingPoint = "sliding"
@@ -51,6 +53,7 @@ class Operating:
     angle_rad: float = 0.0
     twist_rad: float = 0.0
     torques_held: bool = False
+    torques_at_once: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no operating point."""

@@ -61,7 +61,7 @@ class Drive:
         plant, control = self.plant, self.design.controller
         B = np.stack(np.broadcast_arrays(plant.B_T, plant.B_M), axis=-1)
         hold = delayed_hold(plant.A, plant.B_u[..., None], B, control.period_s, control.computing_delay_s)
-        if "th" in plant.states:
+        if "th" in plant.states and not self.operating.torques_at_once:
             hold.Phi[..., :, plant.states.index("th")] = np.eye(len(plant.states))[plant.states.index("th")]
         return hold
 

@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
 from analyses.correlation.compare import SignalComparison, compare_signals
+from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
@@ -92,6 +93,8 @@ def correlate_record(
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     with because({record.name: findings}):
         modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+    if (follows := followed(design, record, modelled, command)) is not None:
+        findings += (following_finding(design, follows),)
     driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
     used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}

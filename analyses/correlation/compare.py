@@ -49,8 +49,6 @@ def compare_signals(
     Raises `InputError`: for signals of different shape, fewer than two samples, values that are not finite,
     or a measured signal that is zero throughout.
 
-    Examples
-    --------
     >>> t = np.linspace(0.0, 1.0, 1001)
     >>> c = compare_signals("speed", "rad/s", t, np.sin(6.0 * (t - 0.01)), np.sin(6.0 * t))
     >>> round(c.delay_s, 4)

@@ -141,8 +141,6 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
 def steps_at(values: Floats, together: int = 1) -> Ints:
     """The first row behind each jump of the values, of at most so many ``together``, between standstills.
 
-    Examples
-    --------
     >>> values = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])
     >>> steps_at(values).tolist(), steps_at(values, 2).tolist()
     ([2], [2, 5, 6])

@@ -59,9 +59,8 @@ def loop_model(
     def blocks(wired: Drive) -> tuple[list[Block], Any]:
         if of == "closed":
             _, signal, every, _ = whole_path(wired)
-            return phase_blocks(
-                TickProgram(wired, wired.outermost), every, "ref", signal
-            ), every * wired.tick_s
+            program = TickProgram(wired, wired.outermost)
+            return phase_blocks(program, every, "ref", signal), every * wired.tick_s
         if name in wired.stages:
             return stage_blocks(wired, name), wired.period_s(name)
         return point_blocks(wired, name), wired.period_s(wired.producer(name))

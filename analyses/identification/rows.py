@@ -1,7 +1,7 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -127,10 +127,61 @@ def record_rows(
     take the place of the form's dry and viscous friction.
     """
     record, shared = prepared(record), design
-    design = record.drive(shared)
-    period, free = period_of(record), design.load.path == "back-drivable"
-    _check(record, gravity and not free)
+    design, period = record.drive(shared), period_of(record)
+    _check(record, gravity and design.load.path != "back-drivable")
     recipe = recipe_for(record) if recipe is None else recipe
+    own = _balance(design, record, recipe, gravity=gravity)
+    motion, angle = own.motion, own.angle
+    names, columns = friction_columns(motion, form, knots_rad_s)
+    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
+    part = _part(motion, recipe)
+    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
+    sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
+    w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
+    names.append("load_coefficient")
+    if gravity:
+        names += ["gravity_sin", "gravity_cos"]
+        w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
+    table = np.column_stack(w)
+    if record.settings:  # the values looked for are those of the shared design
+        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
+    keep = _kept(record, motion, part, recipe)
+    return Rows(
+        name=record.name,
+        rows_in=len(record),
+        used=own.used,
+        notes=(*record.notes, own.note),
+        names=tuple(names),
+        w=table[keep],
+        y=y[keep],
+        sine=sine,
+        cosine=cosine,
+        speed=speed[keep],
+        acceleration=rows[keep, 0],
+        step_s=period * recipe.decimation,
+        keep=keep,
+        recipe=recipe,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Balance:
+    """The torques of a record's drive at every sample, less what the design knows of them."""
+
+    motion: Motion  # at the motor
+    angle: Floats  # of the output
+    drive: Floats  # at the motor
+    known: Floats  # moment at the output that the gears' friction takes a share of
+    used: Mapping[str, str]
+    note: str
+
+
+def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -> _Balance:
+    """The drive torque less known moments, cogging and what the load side takes.
+
+    ``gravity``: the pendulum is looked for, and not known.
+    """
+    free = design.load.path == "back-drivable"
     motion, place = motion_of(design, record, recipe)
     angle, sides = np.asarray(motion.position / design.total_ratio), None
     if design.coupling is not None:
@@ -152,43 +203,26 @@ def record_rows(
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
         told, used = f"{told}, {sides.told}", {**sides.used, **used}
-    names, columns = friction_columns(motion, form, knots_rad_s)
-    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
+    return _Balance(
+        motion=motion, angle=angle, drive=drive, known=known, used=used, note=f"{place} and {told}"
+    )
+
+
+def _part(motion: Motion, recipe: Recipe) -> slice:
+    """The samples without those dropped at the start, and at the end of a record that ends in motion."""
     pace, skip = np.abs(motion.velocity), recipe.skip_end_samples
     in_motion = float(pace[-1]) > END_SHARE * float(np.max(pace)) and len(pace) > 4 * skip
-    part = slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
-    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
-    sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
-    w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
-    names.append("load_coefficient")
-    if gravity:
-        names += ["gravity_sin", "gravity_cos"]
-        w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
-    table = np.column_stack(w)
-    if record.settings:  # the values looked for are those of the shared design
-        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
-    moving = ~_at_rest(motion.velocity, period)
+    return slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
+
+
+def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
+    """Which decimated rows are used: no sample at rest, or left out, lies close by."""
+    moving = ~_at_rest(motion.velocity, period_of(record))
     if record.left_out is not None:
         moving &= ~record.left_out
     near = 2 * recipe.decimation + 1
     apart = minimum_filter1d(moving[part].astype(np.uint8), near, mode="constant", cval=1) > 0
-    keep = apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]  # no sample at rest lies close by
-    return Rows(
-        name=record.name,
-        rows_in=len(record),
-        used=used,
-        notes=(*record.notes, f"{place} and {told}"),
-        names=tuple(names),
-        w=table[keep],
-        y=y[keep],
-        sine=sine,
-        cosine=cosine,
-        speed=speed[keep],
-        acceleration=rows[keep, 0],
-        step_s=period * recipe.decimation,
-        keep=keep,
-        recipe=recipe,
-    )
+    return apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]
 
 
 def _check(record: Record, locked: bool) -> None:

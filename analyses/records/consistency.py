@@ -244,7 +244,7 @@ def _clock(design: Design, record: Record) -> Finding | None:
     if whole:
         told = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
         return Finding(subject, True, told)
-    text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
+    text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
 
 

@@ -87,8 +87,6 @@ class ColumnName:
 def taken_apart(column: str) -> ColumnName:
     """Words and unit of a column name.
 
-    Examples
-    --------
     >>> taken_apart("Motor speed [rpm]").base, taken_apart("Motor speed [rpm]").unit
     ('motor_speed', 'rpm')
     >>> taken_apart("t/ms").unit, taken_apart("current_A").unit, taken_apart("Irms (A)").rms

@@ -191,8 +191,6 @@ def period_of(record: Record) -> float:
 def stretches(marked: Mask) -> list[tuple[int, int]]:
     """Where marked rows follow each other: the first, and the one after the last.
 
-    Examples
-    --------
     >>> stretches(np.array([True, False, False, True, True]))
     [(0, 1), (3, 5)]
     """
