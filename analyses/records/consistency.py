@@ -17,6 +17,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
 from analyses.records.record import Record
+from analyses.records.single_rows import impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
@@ -27,6 +28,8 @@ ONE_PHASE = (
 )
 ALIKE = 0.9
 OVER = 1.2
+FEW_ROWS = 1e-3  # of a record: single ones; of more the unit is wrong, not the row
+BAD_ROW = "bad rows, take them out of the file"
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
 LEAST_ROWS = 10  # smoothed and thinned, of a comparison
@@ -78,9 +81,12 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     followed it, and current, speed, voltage, supply and load against the design's limits. A ratio that a
     known factor explains is named.
     """
-    checks = (_rate, _still, _clock, _steps, _reduction, _electrical, _command, _supply)
-    design = record.drive(design)
-    found = (*(check(design, record) for check in checks), *_limits(design, record))
+    design, as_read = record.drive(design), record.as_read or record
+    jumps = _jumps(design, as_read)
+    checks = [_rate, _still, _clock, _steps, _reduction, _electrical, _command, _supply]
+    if jumps is not None:
+        checks.remove(_steps)
+    found = (jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
     return tuple(result for result in found if result is not None)
 
 
@@ -246,6 +252,24 @@ def _clock(design: Design, record: Record) -> Finding | None:
         return Finding(subject, True, told)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
+
+
+def _jumps(design: Design, record: Record) -> Finding | None:
+    """Steps of the position that no speed within the limit makes in their time."""
+    place, rate = place_of(design, record), OVER * reachable_speed(design)
+    if place is None or not isfinite(rate) or record.averaged > 1:
+        return None
+    rows = impossible_steps(record, place[1], rate, SURE)
+    if not len(rows):
+        return None
+    unit = "m" if design.axis == "linear" else "rad"
+    jumps, few = named_rows(record, rows, place[0], unit, jumps=True), len(rows) <= FEW_ROWS * len(record)
+    told = (
+        f"the {place[0]} jumps {jumps}: more than the speed limit, {reachable_speed(design):.4g} {unit}/s at "
+    )
+    told += "the motor, allows in that time: "
+    told += BAD_ROW if few else "is the unit of the position or of the time right?"
+    return Finding(f"steps of the {place[0]} from row to row", False, told)
 
 
 def _steps(design: Design, record: Record) -> Finding | None:
@@ -473,12 +497,16 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     """The largest value of a signal against a limit of the design."""
     if what not in record.signals or not isfinite(limit) or limit <= 0.0:
         return None
-    result = float(np.quantile(np.abs(record[what]), 0.999))
-    passed = result <= OVER * limit
-    text = f"{subject.partition(' ')[0]} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
+    size = np.abs(record[what])
+    most, usual = float(np.max(size)), float(np.quantile(size, 1.0 - FEW_ROWS))
+    rows = np.flatnonzero(size > OVER * limit + noise_bound(record[what], SURE))
+    passed, allowed = usual <= OVER * limit, f"the design's limit is {limit:.4g} {unit}"
+    if passed and len(rows):
+        return Finding(subject, False, f"{named_rows(record, rows, what, unit)}, {allowed}: {BAD_ROW}")
+    text = f"{subject.partition(' ')[0]} up to {most if passed else usual:.4g} {unit}, {allowed}"
     if not passed:
-        factor = explaining(result / limit, unit)
-        text += f", {result / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
+        factor = explaining(usual / limit, unit)
+        text += f", {usual / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
     return Finding(subject, passed, text)
 
 
