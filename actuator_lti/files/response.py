@@ -101,8 +101,9 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     A table in text has its columns parted by comma, semicolon (then with decimal comma, too), tab or space,
     and says in its heading what they are: ``frequency_hz,gain_db,phase_deg``, ``f,real,imag,coherence``,
     ``omega,ratio...``; without a heading they are Hz, dB, deg and perhaps coherence. A .mat file has arrays
-    of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name leaves open (dB or ratio, deg or rad) and the numbers do
-    not decide is refused, as are two columns that say the same and contradict.
+    of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name leaves
+    open (dB or ratio, deg or rad) and the numbers do not decide is refused, as are two columns that say the
+    same and contradict.
 
     A deviation without unit, or in per cent, is the root mean square of the complex error over the size of
     the value. In dB it is that of the gain alone, in deg or rad of the phase alone: of one part of the error,
