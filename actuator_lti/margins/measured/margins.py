@@ -13,6 +13,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
 from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds, distance_ranges
+from actuator_lti.margins.measured.local_fit import averaged
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import (
     Agreement,
@@ -107,8 +108,10 @@ def measured_points(data: MeasuredResponse, band: tuple[float, float] | None) ->
     if not (np.isfinite(L).all() and np.isfinite(omega).all()) or (L == 0.0).any():
         raise InputError("measured data: every value must be finite and not zero")
     if (np.diff(omega) <= 0.0).any():
-        raise InputError("measured data: a frequency is given twice")
-    return omega, L, radius
+        twice = omega[1:][np.diff(omega) <= 0.0][0]
+        allowed = "each once, repeats as MeasuredResponse.from_repeats"
+        raise InputError(f"measured data: {twice:.6g} rad/s is given twice; allowed: {allowed}")
+    return omega, *averaged(omega, L, radius)
 
 
 def refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
