@@ -124,7 +124,8 @@ def unresolved_intervals(L: Complex, radius: Real) -> Mask:
 def bend(u: Real, y: Real) -> Real:
     """How far y may leave its chord in each interval, from the second differences nearby.
 
-    Their steps are as near to the interval as points are: of closer ones the noise would be taken for curvature.
+    Their steps are as long as the interval, as near as there are points: the noise of closer ones is no
+    curvature.
     """
     h, end = np.diff(u), u.size - 1
     left = np.arange(h.size)
