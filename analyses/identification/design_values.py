@@ -133,8 +133,6 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     chi-square says whether the rest is chance. None where chance explains all, no one cause does, or fewer
     than two of the values that it moves are off by themselves.
 
-    Examples
-    --------
     >>> names = ("inertia", "dry", "viscous")
     >>> off = [
     ...     DesignValue(name=n, design=1.0, found=0.8, ratio=0.8, error=0.01, allowed=0.05) for n in names

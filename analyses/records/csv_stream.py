@@ -251,8 +251,6 @@ class BoundedRows:
     of twice as many rows of the file. ``factor`` tells how many. A remainder shorter than ``factor`` at
     the end of the file becomes a row of its own, so no row is lost.
 
-    Examples
-    --------
     >>> rows = BoundedRows(columns=1, limit=4)
     >>> rows.add(np.arange(8.0).reshape(-1, 1))
     >>> rows.array()[:, 0].tolist(), rows.factor

@@ -333,16 +333,10 @@ WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
     "s read as ms": (_scaled(1e-3, "time"), WHOLE, {}, "is the unit of the time right?"),
     "radians read as degrees": (_scaled(np.pi / 180.0, "angle"), ALL, {}, "degrees read as radians"),
     "current of another run": (_of_another_run("current"), BARE, {}, "does not explain"),
-    "command of another run": (
-        _of_another_run("reference"), ALL, TRUTH, "not that of the command"
-    ),
+    "command of another run": (_of_another_run("reference"), ALL, TRUTH, "not that of the command"),
     "range of the current x 2 midway": (_range_from(0.5, 2.0), BARE, {}, "does not explain"),
-    "torque constant 20 % off": (
-        dict, BARE, TRUTH | STRONG, "factor 1.2"
-    ),
-    "torque constant, by the voltage": (
-        dict, WHOLE, STRONG, "so kM and all"
-    ),
+    "torque constant 20 % off": (dict, BARE, TRUTH | STRONG, "factor 1.2"),
+    "torque constant, by the voltage": (dict, WHOLE, STRONG, "so kM and all"),
     "dry friction 1 000 times": (dict, ALL, {"friction.dry_torque": 3.0}, "factor 1000"),
 }  # fmt: skip
 

@@ -1,5 +1,6 @@
 """Torques that bend with the angle or go with the speed of the load: closed forms of both writings."""
 
+import re
 from dataclasses import dataclass, replace
 from math import acos, asin, cos, exp, pi, sin, sqrt
 
@@ -9,6 +10,7 @@ from loop_designs import controlled, source_drive
 
 from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
@@ -79,6 +81,15 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
 
 
 @each
+def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> None:
+    """As in the motor: poles exp(+-j omega Ts), omega = sqrt(A Z/J)."""
+    at = Operating(angle_rad=case.stable / N, torques_at_once=True)
+    poles = np.linalg.eigvals(TickProgram(wire(case.put(rotor()), at), "voltage").tick(0).A)
+    assert np.abs(poles) == pytest.approx(1.0, abs=1e-12)
+    assert np.max(np.angle(poles)) == pytest.approx(sqrt(A * case.order / J) * Ts, rel=1e-9)
+
+
+@each
 def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
     at = Operating(speed_rad_s=40.0, angle_rad=0.3)
     own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))
@@ -123,8 +134,15 @@ def test_keys_of_a_wave(name: str) -> None:
     other, own = (getattr(each, part).over_angle.at(0.2) for each in (fin, design))
     assert own - other == pytest.approx(peak * cos(0.6), rel=1e-12)
     assert getattr(read_design_text(write_design(design)), part) == getattr(design, part)
-    with pytest.raises(InputError, match=f"{name}_periods{HELD}"):
-        fin.with_values({**values, f"{name}_periods": 1e6})
+    fastest = reachable_speed(fin) / (fin.total_ratio if part == "load" else 1.0)
+    most = 0.5 / (fastest * fin.controller.period_s)
+    for factor in (1e3, 1.25):
+        values |= {f"{name}_periods": f"{factor * most} rad/rad"}
+        with pytest.raises(InputError, match=f"{name}_periods{HELD}") as refused:
+            fin.with_values(values)
+    takes = dict(re.findall(r"(control\.period|limits\.speed) = (\S+ \S+)", str(refused.value)))
+    for key in ("control.period", "limits.speed"):  # either takes it
+        fin.with_values({**values, key: takes[key]})
 
 
 def test_keys_of_a_moment() -> None:

@@ -1,0 +1,124 @@
+"""One cause in a record that is otherwise right: it is named, first, and no verdict says otherwise."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import load_design, with_values
+from analyses.correlation.asked import Asked
+from analyses.correlation.closed_loop import correlate_record
+from analyses.correlation.compare import compare_signals
+from analyses.correlation.run import Correlation
+from analyses.records.consistency import check_record
+from analyses.records.open_record import open_record
+from analyses.records.record import Record, prepared
+from tests.identification.bench_records import Columns, motion, record_of, signals_of, write
+
+DRIVE = load_design("ilr33-amber")
+
+
+@pytest.fixture(scope="module")
+def columns() -> Columns:
+    return signals_of(motion(2), 1)
+
+
+def _record(columns: Columns, *names: str, **changed: np.ndarray) -> Record:
+    columns = {**columns, **changed}
+    return record_of(columns["time"], **{name: columns[name] for name in names})
+
+
+def _correlated(record: Record) -> tuple[bool, str]:
+    """Whether the drive that made a record is told to be it, and all that contradicts."""
+    result = correlate_record(DRIVE, record)
+    wrong = "; ".join(f"{one.subject}: {one.text}" for one in result.findings if one.passed is False)
+    return Correlation(DRIVE, Asked(records=[]), (result,)).passed, wrong
+
+
+@pytest.mark.parametrize("clock", [1.0, 1.03, 0.96])
+def test_the_model_of_a_record_tells_its_clock(clock: float, columns: Columns) -> None:
+    record = _record(columns, "reference", "angle", "current", time=clock * columns["time"])
+    passed, wrong = _correlated(record)
+    assert passed is (clock == 1.0), wrong
+    if clock != 1.0:
+        off = re.search(r"a clock about (\S+) % off", wrong)
+        assert off
+        assert float(off[1]) == pytest.approx(100.0 * (clock - 1.0), rel=0.05)
+
+
+def _lines(path: Path, columns: Columns, name: str, line: int, value: float) -> None:
+    """A file of 4001 rows below a line of names, one value of which is another."""
+    changed = columns[name].copy()
+    changed[line - 2] = value
+    table = {"time_s": "time", "reference_rad": "reference", "angle_rad": "angle", "current_A": "current"}
+    seen = {**columns, name: changed}
+    write(path, {column: seen[signal] for column, signal in table.items()})
+
+
+def _wrong(path: Path) -> str:
+    found = check_record(DRIVE, prepared(open_record(path)))
+    return "\n".join(f"{one.subject}: {one.text}" for one in found if one.passed is False)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words"),
+    [
+        ("current", 999.0, r"^current against its limit: 999 A in line 1236 \(1.234 s\), .* bad row"),
+        ("current", -999.0, r"^current against its limit: -999 A in line 1236 \(1.234 s\), .* bad row"),
+        ("angle", 1745.0, r"^steps of the angle.* jumps from \S+ to 1745 rad in line 1236 .*line 1237 "),
+        ("angle", 0.0, r"^steps of the angle.* jumps from \S+ to 0 rad in line 1236 .*line 1237 "),
+    ],
+)
+def test_one_row_that_no_drive_can_have_is_named(name, value, words, columns, tmp_path) -> None:
+    """Of the file, of one that lacks a line before it; without its line nothing is wrong."""
+    path = tmp_path / "r.csv"
+    _lines(path, columns, name, 1236, value)
+    assert re.search(words, _wrong(path), re.MULTILINE)
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:999] + lines[1000:]))
+    assert "in line 1235 (1.234 s)" in _wrong(path)
+    path.write_text("".join(lines[:1235] + lines[1236:]))
+    assert not _wrong(path)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6, 1e-3])
+def test_a_time_in_another_unit_is_named_by_its_factor(factor: float, columns: Columns) -> None:
+    """The design's inertia and friction are none of the drive's: only the loop's gain tells."""
+    other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 6e-3})
+    record = _record(columns, "reference", "angle", "current", time=factor * columns["time"])
+    (told,) = (one for one in check_record(other, record) if one.subject.startswith("time"))
+    assert told.passed is False
+    assert "factor 1e6 (micro" in told.text if factor == 1e6 else "factor 1000 (milli" in told.text
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed")])
+def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
+    other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 1.5e-3})
+    record = _record(columns, *signals, "current", current=sign * columns["current"])
+    told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
+    assert bool(told) is (sign < 0.0)
+    assert not told or "the sign of the current is turned" in told[0]
+
+
+@pytest.mark.parametrize("times", [1.0, 0.7])
+def test_white_noise_of_a_record_is_no_error_of_the_model(times: float) -> None:
+    """A sine with a third of its size of noise: of the model that made it, and of one that is 30 % off."""
+    true = np.sin(np.linspace(0.0, 60.0, 6000))
+    noise = 0.3 * np.sqrt(0.5) * np.random.default_rng(3).standard_normal(6000)
+    found = compare_signals("current", "A", np.arange(6000.0), true + noise, times * true)
+    assert found.share_of_motion > 0.28
+    assert found.noise_rms == pytest.approx(np.std(noise), rel=0.05)
+    known = 0.3 * np.sqrt(8.0 * np.sqrt(5.26 / 6000))  # to eight deviations of s^2 by so many rows
+    size = np.hypot(1.0, 0.3)
+    assert (1.0 - times) / size <= found.share_beyond_noise <= np.hypot(1.0 - times, known) / size
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_ripple_from_row_to_row_is_an_error_of_the_model(every: int) -> None:
+    """Rows of which each second, or third, is off: white noise has one variance by all orders."""
+    ripple = np.where(np.arange(6000) % every == 0, 0.4, 0.0)
+    true = np.sin(np.linspace(0.0, 60.0, 6000))
+    found = compare_signals("current", "A", np.arange(6000.0), true + ripple, true)
+    assert found.share_beyond_noise == found.share_of_motion > 0.2
