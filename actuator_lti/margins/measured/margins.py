@@ -44,11 +44,8 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
     from one side to the other, with the range of its margin over all places at which they may. Where the
     phase betrays a resonance between two points, or a pair of crossings cannot be excluded, a note says so.
 
-    Raises
-    ------
-    InputError
-        More than one input or output, fewer than two points, values that are zero or not finite, or points
-        so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
+    Raises `InputError`: for more than one input or output, fewer than two points, values that are zero or not
+    finite, or points so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
     """
     response = measured_response(data)
     omega, L, radius = measured_points(response, band_rad_s)
