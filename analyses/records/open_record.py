@@ -36,7 +36,8 @@ ODRIVE_SPEC = RecordSpec(
         SignalColumn(name="speed", column="velocity", unit="turn/s"),
     ),
 )
-BESIDE = ("file", "settings", "signals")  # keys of a record file that are none of a layout
+BESIDE = ("file", "settings", "signals")
+BY_ROW = ("bad_rows", "missing", "disorder", "resample_tolerance")  # keys that describe no column
 HEAD_BYTES = 1 << 16
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = (b"\x1f\x8b", b"PK", b"BZ", b"\xfd7")
@@ -113,10 +114,10 @@ def _described(path: Path) -> list[Record]:
 
 
 def _read_as_told(path: Path, own: Table) -> Record:
-    """A file as its table says; where that names no column, the columns' own names do."""
-    if signals := own.data["signals"]:
-        rest = {key: value for key, value in own.data.items() if key not in BESIDE}
-        return read_record(path, record_spec(Table({**rest, "signals": signals}, own.path, own.origin)))
+    """A file as its table says; where that describes no column, the columns' own names do."""
+    if own.data["signals"] or not set(own) <= {*BESIDE, *BY_ROW}:
+        rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
+        return read_record(path, record_spec(Table(rest, own.path, own.origin)))
     known, _ = _spec_of_file(path, path.suffix.lower())
     given = {key: getattr(known, key) for key in ("format", "time", "signals")}
     return read_record(path, own.read(RecordSpec, beside=BESIDE, **given))
