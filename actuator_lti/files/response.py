@@ -26,6 +26,7 @@ from actuator_lti.files.response_columns import (
     taken_as,
     unit_of,
 )
+from actuator_lti.files.response_repeats import Repeats
 from actuator_lti.systems.measured_response import GAUSSIAN, MeasuredResponse
 from actuator_lti.types import Floats
 
@@ -102,6 +103,8 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name leaves
     open (dB or ratio, deg or rad) and the numbers do not decide is refused, as are two columns that say the
     same and contradict.
+
+    Rows at the same frequency are repeats: their mean is taken, and where no noise is told their scatter.
 
     A deviation without unit, or in per cent, is the root mean square of the complex error over the size of
     the value. In dB it is that of the gain alone, in deg or rad of the phase alone: of one part of the error,
@@ -190,8 +193,6 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
         raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
     order = f.argsort(kind="stable")
-    if (np.diff(f[order]) == 0.0).any():
-        raise InputError("a frequency is given twice")
     z, coherence = complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
     if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
         per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())
@@ -200,8 +201,13 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         raise InputError("a value that is 0 or beyond the range of floats")
     refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
     deviation, radius, noise = noise_of(table, units, averages)
+    every = Repeats(f[order], z[order], deviation[order], coherence[order], radius[order], noise)
+    read, told = every.averaged(), taken_as(columns, found, units, known=bool(noise))
+    if read.f.size < 2:
+        raise InputError(f"every row is at {read.f[0]:.6g} Hz; allowed: two frequencies or more")
+    if twice := f.size - read.f.size:
+        told += f"; rows that repeat a frequency are averaged ({twice})"
     return RecordedResponse(
-        f[order], z[order], deviation[order], coherence[order], name, count - int(good.sum()),
-        radius[order], noise, taken_as(columns, found, units, known=bool(noise)),
-        float(table[PERIOD][0]) if PERIOD in table else None,
+        read.f, read.z, read.deviation, read.coherence, name, count - int(good.sum()),
+        read.radius, read.noise, told, float(table[PERIOD][0]) if PERIOD in table else None,
     )  # fmt: skip
