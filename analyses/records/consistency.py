@@ -57,6 +57,7 @@ class Finding:
     passed: bool | None  # whether it agrees; None: not determined
     text: str
     unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
+    done: str = ""  # what was done about it where it does not agree: put right, or held by the intervals
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
@@ -203,7 +204,7 @@ def _rate(design: Design, record: Record) -> Finding | None:
     clock = f"{said}: a clock {100.0 * off:+.2g} % off, or the scale of one of them"
     if abs(off) <= RATE_TOLERANCE:
         noise = f"beyond their noise ({ratio.low:.4f} to {ratio.high:.4f})"
-        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it")
+        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it", done="widened")
     named = with_factor(said, ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
     return Finding(subject, False, clock if named == said else named)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design, with_values
+from actuator_lti.design import load_design, with_values, write_design
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.compare import compare_signals
@@ -15,7 +15,7 @@ from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
-from tests.identification.bench_records import Columns, motion, record_of, signals_of, write
+from tests.identification.bench_records import Columns, bare, motion, record_of, signals_of, write
 
 DRIVE = load_design("ilr33-amber")
 
@@ -178,3 +178,17 @@ def test_rows_missing_on_a_grid_are_no_jitter(jitter_s: float, words: str, colum
     record = prepared(_record(less, "angle", "current", time=less["time"] + jitter))
     (item,) = (one for one in sampling_items(record) if one.id.startswith("times"))
     assert words in item.reason
+
+
+def test_the_values_of_a_run_down_are_those_at_the_friction_that_is_kept(tmp_path, cli) -> None:
+    """No torque of a motor: J, Cv and C0 show as ratios alone, C0 is the design's, and J with it."""
+    design = with_values(bare("ilr33-amber"), {"limits.speed": 2000.0})
+    J, C0, Cv = design.inertia_kgm2, design.friction.dry_torque_Nm, design.friction.viscous_Nms_rad
+    time, fall = np.arange(0.0, 3.0, 1e-3), Cv / J
+    speed = np.maximum((900.0 + C0 / Cv) * np.exp(-fall * time) - C0 / Cv, 0.0)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * 1e-3])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    columns = {"time_s": time, "angle_rad": angle, "speed_rad_s": speed, "current_A": noise}
+    (tmp_path / "d.toml").write_text(write_design(design))
+    said = cli("identify", write(tmp_path / "r.csv", columns), "--design", tmp_path / "d.toml").out
+    assert "all at the design's dry friction" in " ".join(said.split())
