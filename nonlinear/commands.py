@@ -66,8 +66,6 @@ class Command:
 
         Raises `InputError`: for a start before zero or not finite, or a command that has a start of its own.
 
-        Examples
-        --------
         >>> sampled([0.0, 0.001, 0.002], [1.0, 2.0, 3.0]).later(0.001).values(1e-3, 4).tolist()
         [0.0, 1.0, 2.0, 3.0]
         """
@@ -338,8 +336,6 @@ def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event 
 
     Raises `InputError`: as `sampled`, but for holes.
 
-    Examples
-    --------
     >>> events([0.0, 0.002, 0.0021], [1.0, 2.0, 3.0]).values(1e-3, 4).tolist()
     [1.0, 1.0, 2.0, 3.0]
     """
@@ -361,8 +357,6 @@ def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "recor
 def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "series") -> Command:
     """A series whose times count from the beginning of the run; zero before its first row.
 
-    Examples
-    --------
     >>> on_its_clock([0.002, 0.003], [5.0, 7.0]).values(1e-3, 5).tolist()
     [0.0, 0.0, 5.0, 7.0, 7.0]
     """

@@ -119,8 +119,6 @@ class Filter:
         An InputError for other than one to three numbers in ``b``, more than two in ``a``, or a pole on or
         outside the unit circle.
 
-        Examples
-        --------
         >>> Filter(kind="biquad", b=(0.5,), a=(-0.5, 0.0)).polynomials
         ((0.5, 0.0), (1.0, -0.5))
         """

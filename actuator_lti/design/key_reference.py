@@ -30,8 +30,6 @@ class KeyEntry:
 def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     """All keys in the order of a design file, with the units of a full cascade on this axis.
 
-    Examples
-    --------
     >>> entry = next(key for key in key_reference() if key.path == "control.velocity.every")
     >>> entry.default, entry.allowed
     ('1', 'at least 1 and at most 1000')
@@ -93,8 +91,6 @@ class Explained:
 def explained(design: Design) -> tuple[Explained, ...]:
     """Every number that stands in the file of a design, in its order.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> items = {item.path: item for item in explained(load_design("ballscrew"))}
     >>> one = items["motor.torque_constant"]

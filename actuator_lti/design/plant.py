@@ -145,8 +145,6 @@ class Coupling:
     def stretch_rad(self, torque_Nm: Any) -> Any:
         """Twist without play that carries a torque at its own shaft, with the sign of the torque.
 
-        Examples
-        --------
         >>> strain_wave = Coupling(stiffness_Nm_rad=10.0, torque_1_Nm=2.0, stiffness_2_Nm_rad=20.0)
         >>> strain_wave.stretch_rad(-6.0), strain_wave.stiffness_at(0.25)
         (-0.4, 20.0)

@@ -145,8 +145,6 @@ def described_dry(dry_Nm: Any, speed_amplitude_rad_s: Any) -> Any:
 def dead_zone(x: float) -> float:
     """Describing function of a dead zone of half width x times the amplitude (model.md section 9).
 
-    Examples
-    --------
     >>> dead_zone(0.0), dead_zone(1.0), round(dead_zone(0.5), 6)
     (1.0, 0.0, 0.391002)
     """

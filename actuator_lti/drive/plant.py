@@ -76,8 +76,6 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
     Raises `InputError`: for an operating point that the design does not have, or a locked rotor without a
     current.
 
-    Examples
-    --------
     >>> from actuator_lti.design.model import Controller, Design, Limits, Motor, PositionLoop, Validation
     >>> from actuator_lti.design.model import Friction
     >>> design = Design(

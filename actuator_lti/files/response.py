@@ -63,8 +63,6 @@ class RecordedResponse:
     def as_loop(self, of: Loop) -> RecordedResponse:
         """The open loop L = T/(1 - T) = 1/S - 1 of a closed loop or a sensitivity, its deviation with it.
 
-        Examples
-        --------
         >>> half = RecordedResponse(*np.array([[1.0], [0.5], [0.1], [np.nan]]), "T")
         >>> float(half.as_loop("T").response[0].real), float(half.as_loop("T").deviation[0])
         (1.0, 0.2)

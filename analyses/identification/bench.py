@@ -165,7 +165,8 @@ def _made(
             made = to_design.with_correlations(made, both)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
-        raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
+        message = f"{reasons}; so {error.message}" if reasons else error.message
+        raise InputError(message, error.where) from None
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)

@@ -71,8 +71,6 @@ def limit_cycles(design: Design) -> LimitCycles:
 
     Raises `InputError`: for a drive without a position loop.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> limit_cycles(load_design("fin")).looked_for
     ('play', 'quantisation')

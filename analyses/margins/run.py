@@ -206,8 +206,6 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
 
     Raises `InputError`, `NumericalError`: where loops cannot be assembled as asked, or margins not be found.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> str(margins(load_design("emps")).verdict)
     'met'

@@ -14,6 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
+from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
 from analyses.records.record import Record
@@ -26,7 +27,6 @@ ONE_PHASE = (
     "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
     "between them it is not known, nor whether R or the scale of the current is off"
 )
-ALIKE = 0.9
 OVER = 1.2
 FEW_ROWS = 1e-3  # of a record: single ones; of more the unit is wrong, not the row
 BAD_ROW = "bad rows, take them out of the file"
@@ -83,7 +83,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     """
     design, as_read = record.drive(design), record.as_read or record
     jumps = _jumps(design, as_read)
-    checks = [_rate, _still, _clock, _steps, _reduction, _electrical, _command, _supply]
+    checks = [_rate, _still, _time, _clock, _steps, _reduction, _electrical, _sign, _command, _supply]
     if jumps is not None:
         checks.remove(_steps)
     found = (jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
@@ -114,14 +114,6 @@ def _moving(*signals: Floats) -> Mask:
 def _inner(record: Record) -> slice:
     """Without the twentieth part at both ends, where a filter starts and stops."""
     return slice(len(record) // 20, len(record) - len(record) // 20)
-
-
-def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
-    """Slope of y over x through zero, and how alike they are (cosine); zeros for a flat signal."""
-    xx, yy = float(x @ x), float(y @ y)
-    if xx == 0.0 or yy == 0.0:
-        return 0.0, 0.0
-    return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
 
 
 @dataclass(frozen=True)
@@ -155,12 +147,12 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     first, last = (_smooth(record, values) for values in (record[name][:-1], record[name][1:]))
     speed = 0.5 * (first + last)
     moves = _moving(rate, speed)
-    found, alike = _ratio(speed[moves], rate[moves])
+    found, alike = ratio_of(speed[moves], rate[moves])
     low, high = -inf, inf
     x, y = (_thinned(record, values) for values in (rate, speed))
     if abs(alike) >= ALIKE and found > 0.0 and len(x) >= LEAST_ROWS:
         bent = np.gradient(np.gradient(rate)) / 12.0  # what a straight line between two samples leaves out
-        between = sum(abs(_ratio(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
+        between = sum(abs(ratio_of(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
         low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
         low, high = low - between, high + between
     return RateRatio(place[0], found, alike, low, high, rate, moves)
@@ -239,6 +231,23 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
     return ticks, abs(ticks - round(ticks)) <= TICK_TOLERANCE * ticks
 
 
+def _time(design: Design, record: Record) -> Finding | None:
+    """A unit of the time that the lag behind the command tells."""
+    place = place_of(design, record)
+    told = "" if place is None else wrong_time(design, record, place[1])
+    return Finding("time against the lag behind the command", False, told) if told else None
+
+
+def _sign(design: Design, record: Record) -> Finding | None:
+    """A current that would drive the other way; with a voltage, that says of which signal the sign is."""
+    place = place_of(design, record)
+    if place is None or not {"current"} <= record.signals.keys() or "voltage" in record.signals:
+        return None
+    smooth = (_smooth(record, values) for values in (record["current"], place[1]))
+    told = turned_current(design, record, smooth)
+    return Finding("current against the motion", False, told) if told else None
+
+
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
     if place_of(design, record) is not None and RATES[design.axis] in record.signals:
@@ -313,7 +322,7 @@ def _other(record: Record, name: str, rate: Floats, moves: Mask) -> str:
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):
             continue
-        if abs(_ratio(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
+        if abs(ratio_of(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
             return f"; {other} is: are the columns of {name} and {other} swapped?"
     return ""
 
@@ -324,7 +333,7 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     if not any(np.ptp(record[name]) > 0.0 for name in ("angle", "output_angle")):
         return None
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
-    ratio, alike = _ratio(a, design.total_ratio * b)
+    ratio, alike = ratio_of(a, design.total_ratio * b)
     subject = "angle against output angle"
     if abs(alike) < ALIKE:
         return Finding(subject, False, "they are not alike")
@@ -426,7 +435,7 @@ def _standing_current(design: Design, record: Record) -> str:
     if np.ptp(at) or not at[0] or speed is None or not np.any(speed) or design.motor.resistance_ohm is None:
         return ""
     u, w = (_smooth(record, values - values.mean()) for values in (record["voltage"], speed))
-    moves = float(np.std(u - _ratio(u, w)[0] * w)) / design.motor.resistance_ohm
+    moves = float(np.std(u - ratio_of(u, w)[0] * w)) / design.motor.resistance_ohm
     told = f"the current is {at[0]:.4g} A throughout, the voltage says that it moves by {moves:.2g} A rms"
     return told if moves > 0.5 * abs(at[0]) else ""
 
@@ -482,7 +491,7 @@ def _command(design: Design, record: Record) -> Finding | None:
         a, b = (part - part.mean() for part in (values, record[command]))
         if not np.ptp(record[command]):  # a step that begins with the record tells no ratio
             continue
-        ratio, alike = _ratio(a, b)
+        ratio, alike = ratio_of(a, b)
         subject = f"{answer} against its command"
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")

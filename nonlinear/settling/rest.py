@@ -88,8 +88,6 @@ def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     passes it. None where command, load or supply still change of themselves. Noise is left out: it is no
     cycle.
 
-    Examples
-    --------
     >>> from nonlinear import commands, simulate
     >>> judge(simulate("ilr33-amber", commands.step(0.01), 0.05).running).verdict
     'at rest'

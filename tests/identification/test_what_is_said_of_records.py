@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design
+from actuator_lti.design import load_design, with_values
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.run import Correlation
@@ -79,3 +79,23 @@ def test_one_row_that_no_drive_can_have_is_named(name, value, words, columns, tm
     assert "in line 1235 (1.234 s)" in _wrong(path)
     path.write_text("".join(lines[:1235] + lines[1236:]))
     assert not _wrong(path)
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6, 1e-3])
+def test_a_time_in_another_unit_is_named_by_its_factor(factor: float, columns: Columns) -> None:
+    """The design's inertia and friction are none of the drive's: only the loop's gain tells."""
+    other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 6e-3})
+    record = _record(columns, "reference", "angle", "current", time=factor * columns["time"])
+    (told,) = (one for one in check_record(other, record) if one.subject.startswith("time"))
+    assert told.passed is False
+    assert "factor 1e6 (micro" in told.text if factor == 1e6 else "factor 1000 (milli" in told.text
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed")])
+def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
+    other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 1.5e-3})
+    record = _record(columns, *signals, "current", current=sign * columns["current"])
+    told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
+    assert bool(told) is (sign < 0.0)
+    assert not told or "the sign of the current is turned" in told[0]
