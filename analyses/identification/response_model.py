@@ -65,7 +65,9 @@ def loop_model(
             return stage_blocks(wired, name), wired.period_s(name)
         return point_blocks(wired, name), wired.period_s(wired.producer(name))
 
-    top = 0.5 / blocks(wired)[1]
+    period_s = blocks(wired)[1]
+    measured.refuse_other_period(name, period_s)
+    top = 0.5 / period_s
     if not (last := measured.frequency_hz[-1]) < top:
         raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
     z = np.exp(1j * np.pi * measured.frequency_hz / top)[:, None, None]

@@ -78,6 +78,7 @@ class LoopFigures:
     # Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop as
     # `held_loop` holds it, which is stable
     held: LoopFigures | None = None
+    by_hold: bool = False  # unstable only as a torque over the angle is held over a tick
     locked: LoopFigures | None = None  # of a current loop with a free rotor, where it was asked for: locked
     # What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk
     mean: CommandMean | None = None
@@ -244,11 +245,12 @@ def _with_ticks_told(loops: Loops, figures: dict[str, LoopFigures]) -> dict[str,
     )
     others = all_loop_figures(at_once, step=False, refused=[])
     why = f"if {' and '.join(acting)} acted at every instant, as in the motor"
-    held = "held over a tick, as here and in the simulator, a torque over the angle loses damping"
+    held = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
     for name, other in others.items():
         if name in figures and (said := _differing(figures[name].judged.margins, other.judged.margins)):
-            note = f"{name} loop: {said} {why}; {held}"
-            figures[name] = replace(figures[name], notes=(*figures[name].notes, note))
+            notes = (*figures[name].notes, f"{name} loop: {said} {why}; {held}")
+            by_hold = figures[name].sound is False and other.sound is True
+            figures[name] = replace(figures[name], notes=notes, by_hold=by_hold)
     return figures
 
 

@@ -55,10 +55,10 @@ def words(whole: Correlation) -> str:
     )
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
-    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
-    beyond = far.share_of_motion > limit
+    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_beyond_noise)
+    beyond = far.share_beyond_noise > limit
     side = "Above" if beyond else "Within"
-    parts.append(f"{side} the limit of {100.0 * limit:g} %: {_named(far.name).lower()} {_share(far)}.")
+    parts.append(f"{side} the limit of {100.0 * limit:g} %: {_named(far.name).lower()} {_beyond_noise(far)}.")
     if not (wrong or beyond or apart):
         parts.append("No record contradicts itself or the design.")
     return " ".join(parts)
@@ -66,6 +66,14 @@ def words(whole: Correlation) -> str:
 
 def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
+
+
+def _beyond_noise(signal: SignalComparison) -> str:
+    """What is held against the limit, and what was taken off."""
+    if 100.0 * (signal.share_of_motion - signal.share_beyond_noise) < 0.1:
+        return _share(signal)
+    noise = f"white noise of the record, {show(signal.noise_rms, 'sig:3')} {signal.unit} rms"
+    return f"{show(100.0 * signal.share_beyond_noise, 'sig:3')} % beyond the {noise}"
 
 
 def _summary(whole: Correlation) -> doc.Section:

@@ -67,11 +67,11 @@ def _result(result: BenchResult, axis: str) -> str:
         ]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
-    worst = max(result.resimulated, key=lambda one: one.relative_error)
+    worst = max(result.resimulated, key=lambda one: one.beyond_noise)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
     words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
-    return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    return f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
 
 
 def _intro(result: BenchResult) -> str:

@@ -102,7 +102,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
+    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}{_hold(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
     return [{**made, "result": said + _below_custom(result)}, judged]
@@ -208,6 +208,15 @@ def _cogging(result: Margins) -> str:
     names = ", ".join(LOOPS[name].lower() for name in result.by_cogging)
     away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
     return f" ({names}: by cogging alone, {away})" if names else ""
+
+
+def _hold(result: Margins) -> str:
+    """Loops that are unstable only as a slope over the angle is held over a tick, and what the drive is."""
+    alone = [LOOPS[name].lower() for name, one in result.loops.items() if one.by_hold]
+    whole = result.loops.get(result.design.controller.outermost)
+    drive = "; the drive with all loops closed is stable" if whole is not None and whole.sound else ""
+    held = "only as the slope of a torque over the angle, held over a tick, is slightly active"
+    return f" ({', '.join(alone)}: {held}{drive})" if alone else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:

@@ -9,6 +9,7 @@ import pytest
 from actuator_lti.design import load_design, with_values
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
+from analyses.correlation.compare import compare_signals
 from analyses.correlation.run import Correlation
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
@@ -99,3 +100,25 @@ def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns:
     told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
     assert bool(told) is (sign < 0.0)
     assert not told or "the sign of the current is turned" in told[0]
+
+
+@pytest.mark.parametrize("times", [1.0, 0.7])
+def test_white_noise_of_a_record_is_no_error_of_the_model(times: float) -> None:
+    """A sine with a third of its size of noise: of the model that made it, and of one that is 30 % off."""
+    true = np.sin(np.linspace(0.0, 60.0, 6000))
+    noise = 0.3 * np.sqrt(0.5) * np.random.default_rng(3).standard_normal(6000)
+    found = compare_signals("current", "A", np.arange(6000.0), true + noise, times * true)
+    assert found.share_of_motion > 0.28
+    assert found.noise_rms == pytest.approx(np.std(noise), rel=0.05)
+    known = 0.3 * np.sqrt(8.0 * np.sqrt(5.26 / 6000))  # to eight deviations of s^2 by so many rows
+    size = np.hypot(1.0, 0.3)
+    assert (1.0 - times) / size <= found.share_beyond_noise <= np.hypot(1.0 - times, known) / size
+
+
+@pytest.mark.parametrize("every", [2, 3])
+def test_a_ripple_from_row_to_row_is_an_error_of_the_model(every: int) -> None:
+    """Rows of which each second, or third, is off: white noise has one variance by all orders."""
+    ripple = np.where(np.arange(6000) % every == 0, 0.4, 0.0)
+    true = np.sin(np.linspace(0.0, 60.0, 6000))
+    found = compare_signals("current", "A", np.arange(6000.0), true + ripple, true)
+    assert found.share_beyond_noise == found.share_of_motion > 0.2

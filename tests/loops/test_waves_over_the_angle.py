@@ -14,6 +14,7 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion
@@ -277,3 +278,26 @@ def test_cogging_is_blamed_for_the_loops_alone_that_are_stable_without_it(cli) -
     both = cli.text("margins", "joint", *cogging, *fast, status=1)
     assert "(current loop, velocity loop: by cogging alone" in " ".join(both.split())
     assert "by cogging" not in cli.text("margins", "joint", *fast, status=1)
+
+
+def test_a_loop_that_only_the_hold_of_a_slope_makes_unstable_is_told_so(cli) -> None:
+    """A spring without friction: held over a tick it makes the pole larger by K Ts^2/(4 J N^2), nearly.
+
+    The drive itself, whose outer loops damp it, is stable; at a gain of 6000/s it is not.
+    """
+    settings = {"load.path": "back-drivable", "load.moment_slope": "-1000 N*m/rad",
+                "friction.viscous": "0 N*m*s/rad", "control.current.back_emf_feedforward": "0.5"}  # fmt: skip
+    design = load_design("ilr33-amber").with_values(settings)
+    radius = [
+        np.abs(loops_at(design, Operating(torques_at_once=once)).current.plain_closed.poles()).max()
+        for once in (False, True)
+    ]
+    grown = 1000.0 * design.controller.period_s**2 / (4.0 * design.inertia_kgm2 * design.total_ratio**2)
+    assert radius[0] > 1.0 > radius[1]
+    assert radius[0] - radius[1] == pytest.approx(grown, rel=0.2)  # back-EMF adds to the inertia
+    asked = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+    told = " ".join(cli.text("margins", "ilr33-amber", *asked, status=1).split())
+    assert "(current loop: only as the slope of a torque over the angle, held over a tick, is" in told
+    assert "; the drive with all loops closed is stable)" in told
+    fast = cli.text("margins", "ilr33-amber", *asked, "--set", "control.position.gain=6000 1/s", status=1)
+    assert "slightly active)" in " ".join(fast.split())
