@@ -17,7 +17,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
-from analyses.records.record import Record
+from analyses.records.record import DISORDER, Record
 from analyses.records.single_rows import impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
@@ -28,6 +28,7 @@ ONE_PHASE = (
     "between them it is not known, nor whether R or the scale of the current is off"
 )
 OVER = 1.2
+ROWS = "rows of the file"
 FEW_ROWS = 1e-3  # of a record: single ones; of more the unit is wrong, not the row
 BAD_ROW = "bad rows, take them out of the file"
 SMOOTH_HZ = 20.0
@@ -63,6 +64,11 @@ def wrong_of(findings: Sequence[Finding]) -> str:
     return "; ".join(f"{one.subject}: {one.text}" for one in findings if one.passed is False)
 
 
+def left_out_of(findings: Mapping[str, Sequence[Finding]]) -> list[str]:
+    """Sentences on rows that no result rests on, by record."""
+    return [f"{name}: {one.text}." for name, each in findings.items() for one in each if one.subject == ROWS]
+
+
 @contextmanager
 def because(findings: Mapping[str, Sequence[Finding]]) -> Iterator[None]:
     """What is wrong with the records comes before what is refused inside."""
@@ -86,7 +92,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     checks = [_rate, _still, _time, _clock, _steps, _reduction, _electrical, _sign, _command, _supply]
     if jumps is not None:
         checks.remove(_steps)
-    found = (jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
+    found = (_rows(as_read), jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
     return tuple(result for result in found if result is not None)
 
 
@@ -261,6 +267,16 @@ def _clock(design: Design, record: Record) -> Finding | None:
         return Finding(subject, True, told)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
+
+
+def _rows(record: Record) -> Finding | None:
+    """Rows left out as their time does not increase: more than single ones may be a run of their own."""
+    lost, rows = record.counts.dropped.get(DISORDER, 0), record.counts.rows_in
+    if lost <= FEW_ROWS * rows:
+        return None
+    told = f"{lost} of {rows} rows are left out, as their time does not increase"
+    told += f" ({record.counts.first_dropped[DISORDER]}): another run? It needs a file of its own"
+    return Finding(ROWS, None, told, unproven=True)
 
 
 def _jumps(design: Design, record: Record) -> Finding | None:

@@ -10,6 +10,7 @@ from analyses.identification.design_values import given_constant
 from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
+from analyses.records.consistency import left_out_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import capital
@@ -71,7 +72,8 @@ def _result(result: BenchResult, axis: str) -> str:
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
     words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
-    return f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
+    words = f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
+    return " ".join([*left_out_of(result.findings), words])
 
 
 def _intro(result: BenchResult) -> str:
