@@ -15,7 +15,7 @@ from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
-from tests.identification.bench_records import Columns, bare, motion, record_of, signals_of, write
+from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of, signals_of, write
 
 DRIVE = load_design("ilr33-amber")
 
@@ -192,3 +192,12 @@ def test_the_values_of_a_run_down_are_those_at_the_friction_that_is_kept(tmp_pat
     (tmp_path / "d.toml").write_text(write_design(design))
     said = cli("identify", write(tmp_path / "r.csv", columns), "--design", tmp_path / "d.toml").out
     assert "all at the design's dry friction" in " ".join(said.split())
+
+
+def test_the_table_of_what_was_found_is_whole_on_a_small_screen(browser, identify, tmp_path) -> None:
+    identify(columns_of(motion(2)))
+    page = browser.new_page(viewport={"width": 1200, "height": 900})
+    page.goto((tmp_path / "o" / "identification.html").as_uri())
+    cut = "all => all.filter(e => e.scrollWidth > e.clientWidth).map(e => e.textContent.slice(0, 60))"
+    assert page.eval_on_selector_all(".scroll", cut) == []
+    page.close()
