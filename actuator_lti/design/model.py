@@ -149,8 +149,9 @@ class Design:
         ``inputs``: the signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``,
         ``current``, ``output_angle``, ``output_speed``, ``twist``; by default the system's own input labels.
         ``settings``: ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the
-        stage; ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
-        the same law in continuous time, for the forms without samples.
+        stage, as a design file may write them (8, "8", a table with its source); ``method``: ``"tustin"`` or
+        ``"zoh"``, by which a continuous system is sampled; ``continuous``: the same law in continuous time,
+        for the forms without samples.
 
         >>> from actuator_lti import load_design
         >>> design = load_design("ilr33-amber")

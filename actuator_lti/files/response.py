@@ -27,7 +27,7 @@ from actuator_lti.files.response_columns import (
     unit_of,
 )
 from actuator_lti.files.response_repeats import Repeats
-from actuator_lti.systems.measured_response import GAUSSIAN, MeasuredResponse
+from actuator_lti.measured.response import GAUSSIAN, MeasuredResponse
 from actuator_lti.types import Floats
 
 Loop = Literal["L", "T", "S"]

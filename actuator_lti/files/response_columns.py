@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
-from actuator_lti.systems.measured_response import CONFIDENCE, GAUSSIAN, student
+from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, student
 from actuator_lti.types import Floats, Mask
 
 WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_lti.systems.measured_response import CONFIDENCE, NEIGHBOURS, student
+from actuator_lti.measured.response import CONFIDENCE, NEIGHBOURS, student
 from actuator_lti.types import Floats, Ints
 
 

@@ -13,7 +13,7 @@ from actuator_lti.margins.measured.margins import measured_margins
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
-from actuator_lti.systems.measured_response import is_measured
+from actuator_lti.measured.response import is_measured
 
 MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minutes of 320
 

@@ -118,8 +118,6 @@ def white_noise(measured: Floats, difference: Floats) -> float:
     has by any of them, and no more than the measured signal alone shows, single rows aside (median). Of a
     ripple the variances of higher orders differ beyond chance: no noise then.
 
-    Examples
-    --------
     >>> noise = 0.1 * np.random.default_rng(1).standard_normal(5000)
     >>> slow = np.sin(np.linspace(0.0, 20.0, 5000))
     >>> round(white_noise(slow + noise, 0.5 * slow + noise), 2), white_noise(slow, 0.5 * slow) < 1e-6

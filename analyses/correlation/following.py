@@ -11,6 +11,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.driving import command_of
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding
+from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
 
 
@@ -80,7 +81,7 @@ def followed(
     size = np.linalg.norm(table[:, kept], axis=0)
     solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
     shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
-    alike = float(np.corrcoef(own, model)[0, 1])
+    _, alike = ratio_of(own - own.mean(), model - model.mean())
     return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())
 
 

@@ -19,7 +19,7 @@ class Fixed:
 
     value: float
     reason: str
-    # by how much each value that was found is too large where this one is too small by one
+    # by how much each value that was found grows with this one, where that grows by one
     moves: Mapping[str, float] = field(default_factory=dict)
     std: float = 0.0  # as the records tell it, beside its own tolerance
 

@@ -119,7 +119,9 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
         return Finding(subject=subject, passed=True, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
-    return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
+    return Finding(
+        subject=subject, passed=None, text=f"{text}: taken back by as much before the fit", done="taken back"
+    )
 
 
 def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[Finding], Floats]:
@@ -141,7 +143,9 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
     text = f"{' and '.join(told)}: the intervals hold it"
-    return [Finding(subject="drift along the record", passed=None, text=text)] if told else [], moved
+    return [
+        Finding(subject="drift along the record", passed=None, text=text, done="widened")
+    ] if told else [], moved
 
 
 def flat_tops(values: Floats) -> Mask:
@@ -177,7 +181,7 @@ def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> t
     largest = f"{np.max(np.abs(record[name])):.4g} {KNOWN_UNITS.get(name, '')}".rstrip()
     text = f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
     text += "the other rows say that it was larger: clipped; these rows are left out"
-    return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]
+    return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text, done="left out")]
 
 
 def shifted(design: Design, record: Record, seconds: float) -> Record:

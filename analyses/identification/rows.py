@@ -148,7 +148,7 @@ def record_rows(
     keep = _kept(record, motion, part, recipe)
     return Rows(
         name=record.name,
-        rows_in=len(record),
+        rows_in=record.counts.rows_in,
         used=own.used,
         notes=(*record.notes, own.note),
         names=tuple(names),

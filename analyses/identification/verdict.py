@@ -114,8 +114,11 @@ def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
 
 def sampling_items(record: Record) -> Iterator[Item]:
     """Whether the current is sampled fast enough for its mean between the samples to be known, and when."""
-    if any(note.startswith("resampled") for note in record.notes):
+    if record.as_read is not None:
         told = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
+        if lost := record.as_read.rows_missing:
+            grid = f"a regular grid of {1e3 * record.period_s:.6g} ms"
+            told = f"{lost} rows are missing on {grid}, filled by straight lines"
         label = f"{record.name}: times of the rows"
         yield Item(id=f"times-{record.name}", label=label, passed=None, reason=told)
     x = record.signals.get("current", np.zeros(0))

@@ -13,7 +13,7 @@ from actuator_lti.files.response import Loop as Kind
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
-from actuator_lti.systems.measured_response import MeasuredResponse
+from actuator_lti.measured.response import MeasuredResponse
 from actuator_lti.types import Floats
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures, other_loops
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points

@@ -17,7 +17,7 @@ from analyses.estimation.parameters import own_share
 from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
-from analyses.records.record import Record
+from analyses.records.record import DISORDER, Record
 from analyses.records.single_rows import impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
@@ -28,6 +28,7 @@ ONE_PHASE = (
     "between them it is not known, nor whether R or the scale of the current is off"
 )
 OVER = 1.2
+ROWS = "rows of the file"
 FEW_ROWS = 1e-3  # of a record: single ones; of more the unit is wrong, not the row
 BAD_ROW = "bad rows, take them out of the file"
 SMOOTH_HZ = 20.0
@@ -56,11 +57,17 @@ class Finding:
     passed: bool | None  # whether it agrees; None: not determined
     text: str
     unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
+    done: str = ""  # what was done about it where it does not agree: put right, or held by the intervals
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
     """What contradicts, in words; empty where nothing does."""
     return "; ".join(f"{one.subject}: {one.text}" for one in findings if one.passed is False)
+
+
+def left_out_of(findings: Mapping[str, Sequence[Finding]]) -> list[str]:
+    """Sentences on rows that no result rests on, by record."""
+    return [f"{name}: {one.text}." for name, each in findings.items() for one in each if one.subject == ROWS]
 
 
 @contextmanager
@@ -86,7 +93,7 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     checks = [_rate, _still, _time, _clock, _steps, _reduction, _electrical, _sign, _command, _supply]
     if jumps is not None:
         checks.remove(_steps)
-    found = (jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
+    found = (_rows(as_read), jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
     return tuple(result for result in found if result is not None)
 
 
@@ -197,7 +204,7 @@ def _rate(design: Design, record: Record) -> Finding | None:
     clock = f"{said}: a clock {100.0 * off:+.2g} % off, or the scale of one of them"
     if abs(off) <= RATE_TOLERANCE:
         noise = f"beyond their noise ({ratio.low:.4f} to {ratio.high:.4f})"
-        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it")
+        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it", done="widened")
     named = with_factor(said, ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
     return Finding(subject, False, clock if named == said else named)
 
@@ -261,6 +268,16 @@ def _clock(design: Design, record: Record) -> Finding | None:
         return Finding(subject, True, told)
     text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
+
+
+def _rows(record: Record) -> Finding | None:
+    """Rows left out as their time does not increase: more than single ones may be a run of their own."""
+    lost, rows = record.counts.dropped.get(DISORDER, 0), record.counts.rows_in
+    if lost <= FEW_ROWS * rows:
+        return None
+    told = f"{lost} of {rows} rows are left out, as their time does not increase"
+    told += f" ({record.counts.first_dropped[DISORDER]}): another run? It needs a file of its own"
+    return Finding(ROWS, None, told, unproven=True)
 
 
 def _jumps(design: Design, record: Record) -> Finding | None:

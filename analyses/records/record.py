@@ -15,6 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Mask
 
+DISORDER = "whose time does not increase"
 RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling accepted without being told to
 
 
@@ -111,6 +112,14 @@ class Record:
         steps = np.diff(self.time_s)
         return bool(np.all(np.abs(steps - np.median(steps)) <= 0.01 * np.median(steps)))
 
+    @property
+    def rows_missing(self) -> int | None:
+        """Rows missing on a regular grid on which all others are; None where they are on none."""
+        steps = np.diff(self.time_s) / self.period_s
+        whole = np.round(steps)
+        on_grid = np.all(np.abs(steps - whole) <= 0.01) and np.all(whole >= 1.0)
+        return int(np.sum(whole - 1.0)) if on_grid else None
+
     def slice(self, start: int, stop: int) -> Record:
         """Rows ``start:stop``."""
         cut = {name: values[start:stop] for name, values in self.signals.items()}
@@ -137,7 +146,9 @@ class Record:
         gap = float(steps[widest] / period)
         errors = ((line_error(self.time_s, values, gap), name) for name, values in self.signals.items())
         error, worst = max(errors, key=lambda one: one[0])
-        note = f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
+        lost = self.rows_missing
+        note = f"{lost} rows missing on a regular grid: " if lost else ""
+        note += f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
         note += f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
         note += f"{100.0 * error:.2g} % of the range ({worst})"
         check_error(error, self.resample_tolerance, note, self.name)

@@ -15,8 +15,6 @@ def noise_bound(values: Floats, sure: float) -> float:
 
     Second differences of white noise have six times its variance; the median passes over single bad rows.
 
-    Examples
-    --------
     >>> noise = np.random.default_rng(1).standard_normal(10_000)
     >>> bool(np.max(np.abs(noise)) < noise_bound(noise, 4.0) < 7.0)
     True

@@ -5,6 +5,7 @@ from dataclasses import replace
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
 from analyses.correlation.run import BESIDE, Correlation, SignalSummary, moves_alike, worst_of
+from analyses.records.consistency import left_out_of
 from analyses.records.naming import MEANINGS
 from reports import document as doc
 from reports.charts import style
@@ -42,7 +43,8 @@ def words(whole: Correlation) -> str:
     """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
     results, limit = whole.records, whole.limit
     wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
-    parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
+    parts = left_out_of({one.record: one.findings for one in results})
+    parts += [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
     where = f" ({result.record})" if len(results) > 1 else ""
     beside = [result[name] for name in BESIDE if name in result.signals and name != motion.name]

@@ -6,15 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_lti.design import load_design, with_values
+from actuator_lti.design import load_design, with_values, write_design
 from analyses.correlation.asked import Asked
 from analyses.correlation.closed_loop import correlate_record
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.run import Correlation
+from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
-from tests.identification.bench_records import Columns, motion, record_of, signals_of, write
+from tests.identification.bench_records import Columns, bare, motion, record_of, signals_of, write
 
 DRIVE = load_design("ilr33-amber")
 
@@ -48,7 +49,7 @@ def test_the_model_of_a_record_tells_its_clock(clock: float, columns: Columns) -
 
 
 def _lines(path: Path, columns: Columns, name: str, line: int, value: float) -> None:
-    """A file of 4001 rows below a line of names, one value of which is another."""
+    """A file of 4000 rows below a line of names, one value of which is another."""
     changed = columns[name].copy()
     changed[line - 2] = value
     table = {"time_s": "time", "reference_rad": "reference", "angle_rad": "angle", "current_A": "current"}
@@ -122,3 +123,72 @@ def test_a_ripple_from_row_to_row_is_an_error_of_the_model(every: int) -> None:
     true = np.sin(np.linspace(0.0, 60.0, 6000))
     found = compare_signals("current", "A", np.arange(6000.0), true + ripple, true)
     assert found.share_beyond_noise == found.share_of_motion > 0.2
+
+
+PLAIN = {"time_s": "time", "reference_rad": "reference", "angle_rad": "angle", "current_A": "current"}
+
+
+def _text(columns: Columns, rows: slice = slice(None)) -> str:
+    table = np.column_stack([columns[name][rows] for name in PLAIN.values()])
+    return "".join(",".join(f"{value:.12g}" for value in row) + "\n" for row in table)
+
+
+def test_a_second_run_in_a_file_is_said_first(columns: Columns, tmp_path, cli) -> None:
+    """By the key that is offered alone: the columns are known by their names."""
+    head, path = ",".join(PLAIN) + "\n", tmp_path / "r.csv"
+    path.write_text(head + 2 * _text(columns))
+    refused = cli.refused("correlate", "ilr33-amber", path)
+    assert "a file for each run; or disorder" in refused
+    (tmp_path / "r.toml").write_text('file = "r.csv"\ndisorder = "drop"\n')
+    for asked in (
+        ("correlate", "ilr33-amber", tmp_path / "r.toml"),
+        ("identify", tmp_path / "r.toml", "--design", "ilr33-amber"),
+    ):
+        text = " ".join(cli(*asked).out.split())
+        assert text.index("4000 of 8000 rows are left out") < 200
+        assert "4000 rows in" not in text
+    path.write_text(head + _text(columns, slice(2000)) + head + _text(columns, slice(2000, None)))
+    refused = cli.refused("correlate", "ilr33-amber", path)
+    assert (
+        'r.csv:2002: the line of column names once more; allowed: rows of numbers, or bad_rows = "drop"'
+        in refused
+    )
+    (tmp_path / "r.toml").write_text('file = "r.csv"\nbad_rows = "drop"\n')
+    assert len(open_record(tmp_path / "r.toml")) == 4000
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "cp1252"])
+def test_a_header_in_windows_1252_is_read_by_name_and_with_a_record_file(encoding, columns, tmp_path) -> None:
+    head = "Time [s],Reference [°],Angle [°],Current [A]\n"
+    (tmp_path / "r.csv").write_bytes((head + _text(columns)).encode(encoding))
+    names = 'time = { column = "Time [s]" }\nsignals.angle = { column = "Angle [°]", unit = "deg" }\n'
+    (tmp_path / "r.toml").write_text('file = "r.csv"\n' + names, encoding="utf-8")
+    records = [open_record(tmp_path / name) for name in ("r.csv", "r.toml")]
+    for one in records:
+        assert one["angle"] == pytest.approx(np.radians(columns["angle"]), rel=1e-9, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("jitter_s", "words"), [(0.0, "3 rows are missing on a regular grid of 1 ms"), (3e-5, "jitter")]
+)
+def test_rows_missing_on_a_grid_are_no_jitter(jitter_s: float, words: str, columns: Columns) -> None:
+    kept = np.delete(np.arange(len(columns["time"])), [900, 901, 2100])
+    jitter = jitter_s * np.random.default_rng(1).uniform(-1.0, 1.0, len(kept))
+    less = {name: values[kept] for name, values in columns.items()}
+    record = prepared(_record(less, "angle", "current", time=less["time"] + jitter))
+    (item,) = (one for one in sampling_items(record) if one.id.startswith("times"))
+    assert words in item.reason
+
+
+def test_the_values_of_a_run_down_are_those_at_the_friction_that_is_kept(tmp_path, cli) -> None:
+    """No torque of a motor: J, Cv and C0 show as ratios alone, C0 is the design's, and J with it."""
+    design = with_values(bare("ilr33-amber"), {"limits.speed": 2000.0})
+    J, C0, Cv = design.inertia_kgm2, design.friction.dry_torque_Nm, design.friction.viscous_Nms_rad
+    time, fall = np.arange(0.0, 3.0, 1e-3), Cv / J
+    speed = np.maximum((900.0 + C0 / Cv) * np.exp(-fall * time) - C0 / Cv, 0.0)
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) * 1e-3])
+    noise = 1e-3 * np.random.default_rng(1).standard_normal(len(time))
+    columns = {"time_s": time, "angle_rad": angle, "speed_rad_s": speed, "current_A": noise}
+    (tmp_path / "d.toml").write_text(write_design(design))
+    said = cli("identify", write(tmp_path / "r.csv", columns), "--design", tmp_path / "d.toml").out
+    assert "all at the design's dry friction" in " ".join(said.split())

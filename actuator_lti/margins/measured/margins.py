@@ -12,8 +12,6 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds, distance_ranges
-from actuator_lti.margins.measured.local_fit import averaged
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import (
     Agreement,
@@ -23,7 +21,9 @@ from actuator_lti.margins.single import (
     between_text,
     frequency_text,
 )
-from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
+from actuator_lti.measured.bounds import Bounds, Strip, bounds, distance_ranges
+from actuator_lti.measured.local_fit import averaged
+from actuator_lti.measured.response import MeasuredResponse, measured_response
 from actuator_lti.types import Complex, Real
 
 _MOST_UNRESOLVED = 0.5

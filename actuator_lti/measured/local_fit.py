@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_lti.margins.measured.bounds import CURVATURE, bend, unresolved_intervals
-from actuator_lti.systems.measured_response import GAUSSIAN
+from actuator_lti.measured.bounds import CURVATURE, bend, unresolved_intervals
+from actuator_lti.measured.response import GAUSSIAN
 from actuator_lti.types import Complex, Ints, Mask, Real
 
 _QUANTILE = 2.326  # of the normal distribution, 99 %

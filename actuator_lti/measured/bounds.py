@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.margins.single import between_text
-from actuator_lti.systems.measured_response import at_once
+from actuator_lti.measured.response import at_once
 from actuator_lti.types import Complex, Ints, Mask, Real
 
 _LARGE_TURN = np.radians(60.0)
