@@ -10,8 +10,8 @@ import pytest
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins import MeasuredResponse, StabilityMargins, stability_margins
-from actuator_lti.margins.measured.local_fit import averaged
-from actuator_lti.systems.measured_response import GAUSSIAN
+from actuator_lti.measured.local_fit import averaged
+from actuator_lti.measured.response import GAUSSIAN
 
 A1 = control.tf([25], [1, 10, 10, 10])
 
