@@ -24,6 +24,9 @@ from analyses.records.record import Record
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
+PLACES = {"angle", "output_angle", "position"}
+ROUNDING = 1e-6  # of a position in a file
+OFF_COUNT = 0.05  # of a count
 SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
@@ -164,7 +167,28 @@ def _with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals, _ = model_signals(design, record, {name: record[name] for name in names})
+    signals |= {n: in_counts(signals[n], record[n]) for n in PLACES & signals.keys()}
     return replace(record, signals={**record.signals, **signals})
+
+
+def in_counts(values: Floats, recorded: Floats) -> Floats:
+    """A position as the encoder of a recorded one shows it: at its counts, where all of it is at such.
+
+    Examples
+    --------
+    >>> in_counts(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.25, 0.5, 1.0])).tolist()
+    [0.0, 0.0, 0.25]
+    """
+    levels = np.unique(recorded)
+    steps = np.diff(levels)
+    steps = steps[steps > ROUNDING * np.max(np.abs(levels))]  # of the file
+    if not len(steps):
+        return values
+    count = float(np.mean(steps[steps < 1.5 * np.min(steps)]))
+    many = steps / count
+    if np.any(np.abs(many - np.round(many)) > OFF_COUNT):
+        return values
+    return np.asarray(levels[0] + count * np.floor((values - levels[0]) / count + ROUNDING))
 
 
 def _sizes(model: JointModel) -> np.ndarray:
