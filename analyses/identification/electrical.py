@@ -33,6 +33,7 @@ class ElectricalFit(Fit):
     """``u = R i + kE w + L di/dt + offset`` (equation 1); fixed is what the records do not show."""
 
     relative_residual: float
+    columns: tuple[str, ...]  # of the fit; an inductance that takes up a lag is not among the names
     at_once: Floats  # what a voltage that acts at once would change of the values
     bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
 
@@ -63,9 +64,9 @@ def fit_electrical(
     if value > SHOWN * std:  # it takes up the lag, which leaves the others right
         told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
         fit = whole.renamed({name: name for name in rest})
-        kept = [whole.names.index(name) for name in rest]
+        others = [whole.names.index(name) for name in rest]
         again = replace(
-            whole, names=rest, values=fit.values, covariance=fit.covariance, at_once=whole.at_once[kept]
+            whole, names=rest, values=fit.values, covariance=fit.covariance, at_once=whole.at_once[others]
         )
     else:
         again = _fitted(late, early, rest)
@@ -90,6 +91,7 @@ def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ..
         covariance=covariance_of([events_of(*each) for each in told]) + np.outer(moved, moved) / 3.0,
         fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
+        columns=names,
         at_once=moved,
     )
 
@@ -139,25 +141,26 @@ def without_own_bias(
     """
     if not simulated:
         return fit
-    control, names, motor = start.controller, fit.names, start.effective_motor
+    control, columns, motor = start.controller, fit.columns, start.effective_motor
     shift = control.computing_delay_s + 0.5 * control.period_s
     own, other = ([_rows(start, one, recipe, shift) for one in these] for these in (records, simulated))
     truth = motor.resistance_ohm, motor.back_emf_constant_Vs_rad, motor.inductance_H, 0.0
     known = {name: value or 0.0 for name, value in zip(NAMES, truth, strict=True)}
-    again = scaled_lstsq(*_columns(other, names))
-    bias = again - np.array([known[name] for name in names])
+    values, again = (scaled_lstsq(*_columns(tables, columns)) for tables in (own, other))
+    picked = [columns.index(name) for name in fit.names]
+    bias = again[picked] - np.array([known[name] for name in fit.names])
     if np.any(np.abs(bias) > LARGEST_BIAS * np.abs(fit.values) + fit.standard_errors):
         return replace(fit, covariance=fit.covariance + np.outer(bias, bias))
     told = []
     for measured, model in zip(own, other, strict=True):
-        (w, rest), (_, like) = _residual(measured, names, fit.values), _residual(model, names, again)
+        (w, rest), (_, like) = _residual(measured, columns, values), _residual(model, columns, again)
         count = min(len(rest), len(like))  # of a long record the first part is simulated
         told.append(events_of(w, rest[:count] - like[:count]))
     return replace(
         fit,
         values=fit.values - bias,
-        covariance=covariance_of(told) + np.outer(fit.at_once, fit.at_once) / 3.0,
-        bias=dict(zip(names, bias.tolist(), strict=True)),
+        covariance=covariance_of(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
+        bias=dict(zip(fit.names, bias.tolist(), strict=True)),
     )
 
 

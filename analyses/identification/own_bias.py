@@ -13,7 +13,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
-from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
+from analyses.estimation.least_squares import covariance_of, events_of, information_of, scaled_lstsq
 from analyses.estimation.parameters import default_value
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
@@ -39,7 +39,7 @@ def without_bias(
     simulated records as by the measured ones; what the fit makes of them is known there (bias correction by
     indirect inference; Gourieroux, Monfort, Renault, 1993). It is taken off, and found again with the
     design that then comes of it. What the simulated records leave of a residual has no chance in it: the
-    errors are those of the difference of the two residuals, with its own autocorrelation. A record without
+    errors are those of the difference of the two residuals, block by block (`events_of`). A record without
     a command is simulated with one that moves the drive as recorded; of a long one the first part is. That
     of the EMPS benchmark, with published figures, is left as it is. ``make`` gives the design that comes of
     a model.
@@ -94,7 +94,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     less = replace(
         model,
         values=model.values - bias,
-        covariance=covariance_of([information_of(*each) for each in weighed]) + np.outer(moved, moved),
+        covariance=covariance_of([events_of(*each) for each in weighed]) + np.outer(moved, moved),
         records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
@@ -185,9 +185,10 @@ def in_counts(values: Floats, recorded: Floats) -> Floats:
     if not len(steps):
         return values
     count = float(np.mean(steps[steps < 1.5 * np.min(steps)]))
-    many = steps / count
-    if np.any(np.abs(many - np.round(many)) > OFF_COUNT):
+    many = np.round(steps / count)
+    if np.any(np.abs(steps / count - many) > OFF_COUNT):
         return values
+    count = float(np.sum(steps) / np.sum(many))
     return np.asarray(levels[0] + count * np.floor((values - levels[0]) / count + ROUNDING))
 
 
