@@ -31,8 +31,6 @@ class Bound:
 
         ``where``: the file; ``name``: the option or key in this place, where it is not the usual one.
 
-        Examples
-        --------
         >>> TONES.check(20_000)
         Traceback (most recent call last):
         ...
@@ -133,8 +131,6 @@ def table() -> dict[str, Bound]:
 def markdown() -> str:
     """The table of the documentation.
 
-    Examples
-    --------
     >>> markdown().splitlines()[4].startswith("| ")
     True
     """

@@ -81,8 +81,6 @@ class TooManyTicks(NumericalError):
 def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI") -> float:
     """An argument that is one finite real number; anything else is refused with what is allowed.
 
-    Examples
-    --------
     >>> finite_number("load_Nm", "4 N*m")
     Traceback (most recent call last):
     actuator_lti.errors.InputError: load_Nm = '4 N*m': must be a finite number, in SI
@@ -107,8 +105,6 @@ def delay_number(delay_s: Any) -> float:
 def whole_number(name: str, value: Any, least: int = 1) -> int:
     """An argument that is a whole number from ``least`` on.
 
-    Examples
-    --------
     >>> whole_number("cycles", 2.5)
     Traceback (most recent call last):
     actuator_lti.errors.InputError: cycles = 2.5: must be a whole number, at least 1

@@ -3,8 +3,6 @@
 The public names are loaded on first use. Packages of one question each (``stiffness``, ``monte_carlo``,
 ``friction_effects``, ``specification``) hold a function of their own name.
 
-Examples
---------
 >>> import analyses
 >>> "survey_loops" in dir(analyses)
 True

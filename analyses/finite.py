@@ -6,8 +6,6 @@ from math import isfinite
 def finite(value: float | None) -> float | None:
     """The value as a plain number; ``None`` for NaN, infinities and nothing.
 
-    Examples
-    --------
     >>> finite(2.0), finite(float("nan"))
     (2.0, None)
     """

@@ -35,8 +35,6 @@ _shown: list[Missing] = []
 def isolated() -> Iterator[list[Missing]]:
     """Collect what fails inside; an outer collection gets it, too, and in the end `drain`.
 
-    Examples
-    --------
     >>> with isolated() as missing:
     ...     attempt("a ratio", lambda: 1 / 0, None)
     >>> missing[0].part, missing[0].why

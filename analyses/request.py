@@ -36,8 +36,6 @@ class Option:
 def options(request: type | None) -> dict[str, tuple[Any, Option]]:
     """Type and option of every field of a request, by field; nothing where nothing is asked.
 
-    Examples
-    --------
     >>> from analyses.duty.asked import Asked
     >>> {name: option.flag or flag(name) for name, (_, option) in options(Asked).items()}["amplitude_rad"]
     'amplitude'

@@ -9,8 +9,6 @@ def slug(name: str) -> str:
 
     Texts that lose characters on the way get a digest, so that different names stay different.
 
-    Examples
-    --------
     >>> slug("Gear 66:1")
     'gear-66-1-d47910'
     >>> slug("slow"), ".." in slug("../../etc/passwd")
@@ -23,8 +21,6 @@ def slug(name: str) -> str:
 def hashed(name: str, longest: int = 40, digits: int = 10) -> str:
     """As `slug`, always with so many digits of its hash: names of different texts are never alike.
 
-    Examples
-    --------
     >>> hashed("../../etc/passwd"), hashed("é")[:-10]
     ('etc-passwd-3754d6cb3a', 'design-')
     """

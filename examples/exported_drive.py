@@ -19,14 +19,7 @@ from nonlinear.export import c_export
 
 
 class ExportedDrive:
-    """A drive that runs the exported C.
-
-    Parameters
-    ----------
-    design : Design
-    folder : Path
-        Where the shared library is put.
-    """
+    """A drive that runs the exported C, whose shared library is put into a folder."""
 
     def __init__(self, design: Design, folder: Path) -> None:
         texts = c_export(design)
@@ -52,10 +45,7 @@ class ExportedDrive:
     def step(self, command: float, moment: float = 0.0) -> float:
         """One tick; returns the output at its end: rad, or m of a linear axis.
 
-        Raises
-        ------
-        RuntimeError
-            Where the tick fails.
+        Raises `RuntimeError`: where the tick fails.
         """
         self._io[layout.IN_COMMAND], self._io[layout.IN_LOAD] = command, moment
         if self._c.drive_tick(_at(self._p), _at(self._s), _at(self._io)) != layout.OK:

@@ -68,12 +68,8 @@ def fit_step(records: Sequence[Record], estimator_rad_s: float = ESTIMATOR_RAD_S
     errors hold the correlation in time of what is left and, with several records, the scatter between those
     fitted alone.
 
-    Raises
-    ------
-    InputError
-        If a record holds no step from zero.
-    NumericalError
-        If the fit does not converge.
+    Raises `InputError`: if a record holds no step from zero. Raises `NumericalError`: if the fit does not
+    converge.
     """
     steps = [_Step.of(record) for record in records]
     if not steps:
@@ -204,10 +200,7 @@ class ChirpPrediction:
 def find_chirp(time_s: Floats, signal: Floats) -> ChirpLaw:
     """Fit the law to the well-sampled beginning and follow it on as long as the samples agree.
 
-    Raises
-    ------
-    InputError
-        If the beginning is no exponential chirp, to 1 % of its amplitude.
+    Raises `InputError`: if the beginning is no exponential chirp, to 1 % of its amplitude.
     """
 
     on = np.flatnonzero(signal != 0.0)

@@ -46,22 +46,11 @@ UNEVEN = 1.5  # times the usual interval: a longer one is a hole
 class Command:
     """A signal of time; built by the functions of this module.
 
-    Attributes
-    ----------
-    kind : str
-        Name of the function that built it.
-    code : int
-        Kind as the kernel knows it.
-    numbers : tuple of float
-        Amplitude, start time and what the kind needs (see ``_kernels.signals``).
-    highest_hz : float
-        Highest frequency asked for, 0 where that has no meaning.
-    end_s : float
-        When it is over; inf where it goes on.
-    samples : ndarray or None
-        Times (s) and values of a tabulated command, shape (2, m); zero before the first of them.
-    held : bool
-        Whether each tabulated value holds until the next; else linear between them.
+    ``kind``: name of that function; ``code``: kind as the kernel knows it; ``numbers``: amplitude, start time
+    and what the kind needs (see ``_kernels.signals``); ``highest_hz``: highest frequency asked for, 0 where
+    that has no meaning; ``end_s``: when it is over, inf where it goes on; ``samples``: times (s) and values
+    of a tabulated command, shape (2, m), zero before the first of them; ``held``: whether each tabulated
+    value holds until the next; else linear between them.
     """
 
     kind: str
@@ -77,8 +66,6 @@ class Command:
 
         Raises `InputError`: for a start before zero or not finite, or a command that has a start of its own.
 
-        Examples
-        --------
         >>> sampled([0.0, 0.001, 0.002], [1.0, 2.0, 3.0]).later(0.001).values(1e-3, 4).tolist()
         [0.0, 1.0, 2.0, 3.0]
         """
@@ -349,8 +336,6 @@ def events(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "event 
 
     Raises `InputError`: as `sampled`, but for holes.
 
-    Examples
-    --------
     >>> events([0.0, 0.002, 0.0021], [1.0, 2.0, 3.0]).values(1e-3, 4).tolist()
     [1.0, 1.0, 2.0, 3.0]
     """
@@ -372,8 +357,6 @@ def sampled(time_s: npt.ArrayLike, angle_rad: npt.ArrayLike, where: str = "recor
 def on_its_clock(time_s: npt.ArrayLike, values: npt.ArrayLike, where: str = "series") -> Command:
     """A series whose times count from the beginning of the run; zero before its first row.
 
-    Examples
-    --------
     >>> on_its_clock([0.002, 0.003], [5.0, 7.0]).values(1e-3, 5).tolist()
     [0.0, 0.0, 5.0, 7.0, 7.0]
     """

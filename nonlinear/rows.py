@@ -42,15 +42,7 @@ POINTS = at.POINTS
 
 @dataclass(frozen=True)
 class Rows:
-    """n runs of one design; see the module.
-
-    Attributes
-    ----------
-    design : Design
-    values : ndarray, shape (n, columns)
-    tables : Tables
-        Time series that the rows refer to.
-    """
+    """n runs of one design, see the module: values, shape (n, columns), and time series they refer to."""
 
     design: Design
     values: Floats

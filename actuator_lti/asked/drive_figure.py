@@ -18,8 +18,6 @@ _CHUNK = 64  # designs at once: a stiffness takes a matrix for each of its frequ
 def drive_figure(design: Design, name: str, load_Nm: float = 0.0) -> Any:
     """A figure in its unit, a float or, of stacked designs, an array; NaN where the drive has none.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> f"{drive_figure(load_design('fin'), 'lost_motion'):.4f} deg"
     '0.1375 deg'

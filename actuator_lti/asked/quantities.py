@@ -29,8 +29,6 @@ def shown_unit(unit: str) -> tuple[str, float]:
 def with_unit(value: float, unit: str, format: str = "g") -> str:
     """A figure or limit as reports write it.
 
-    Examples
-    --------
     >>> with_unit(0.0123, "s"), with_unit(-0.5, "1")
     ('12.3 ms', '-0.5')
     """
@@ -200,8 +198,6 @@ MOST_RESONANCE_DB = 100.0
 def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:
     """Every figure of the whole drive with the loads at which it is told: stiffness at none.
 
-    Examples
-    --------
     >>> [case for case in drive_cases((0.0, 8.0)) if case[0] in ("output_rate", "lost_motion")]
     [('output_rate', 0.0), ('output_rate', 8.0), ('lost_motion', 0.0)]
     """
@@ -216,8 +212,6 @@ def drive_cases(loads_Nm: Iterable[float]) -> tuple[tuple[str, float], ...]:
 def judged_loops(loop: str | None, present: Iterable[str]) -> tuple[str, ...]:
     """The loops that a requirement on a figure of loops holds for: the one that it names, else every one.
 
-    Examples
-    --------
     >>> judged_loops(None, ("velocity", "position")), judged_loops("position", ("velocity", "position"))
     (('velocity', 'position'), ('position',))
     """
@@ -227,8 +221,6 @@ def judged_loops(loop: str | None, present: Iterable[str]) -> tuple[str, ...]:
 def distance_from_minus_one(quantity: str, value: float) -> float | None:
     """How far from -1 a margin keeps L: ``1 - 1/g``, ``2 sin(phi/2)``, the modulus; ``None`` for others.
 
-    Examples
-    --------
     >>> [round(distance_from_minus_one(name, limit), 3) for name, limit in CUSTOMARY.items()]
     [0.499, 0.518, 0.5]
     """
@@ -247,8 +239,6 @@ def reserve(quantity: str, value: float, limit: float, distance: float) -> float
 
     ``distance`` to the limit is positive on the good side.
 
-    Examples
-    --------
     >>> round(reserve("gain_margin", 12.0, 6.0, 6.0), 2), round(reserve("phase_margin", 60.0, 30.0, 30.0), 2)
     (0.5, 0.93)
     >>> reserve("bandwidth", 12.0, 10.0, 2.0), reserve("overshoot", 12.0, 10.0, -2.0)

@@ -19,8 +19,6 @@ Role = Literal["pass", "fail", "warn", "info"]
 class Verdict(StrEnum):
     """One of the three words; equal to its text.
 
-    Examples
-    --------
     >>> Verdict.of(None), Verdict.of(True) == "met", str(Verdict.NOT_MET)
     (<Verdict.NOT_PROVEN: 'not proven'>, True, 'not met')
     """
@@ -51,8 +49,6 @@ class Verdict(StrEnum):
 class Tally:
     """Verdicts counted; ``waived`` are those not proven that are waived, and not among ``not_proven``.
 
-    Examples
-    --------
     >>> Tally.of([Verdict.MET, Verdict.NOT_PROVEN]).words("requirements")
     '1 of 2 requirements met, 1 not proven'
     >>> Tally.of([]).passes, Tally.of([]).role, Tally.of([]).words("requirements")

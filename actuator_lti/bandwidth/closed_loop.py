@@ -24,9 +24,9 @@ from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
+from actuator_lti.measured.response import is_measured
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
 from actuator_lti.systems.exact_response import dc_noise, shown
-from actuator_lti.systems.measured_response import is_measured
 from actuator_lti.systems.plain_system import PlainSystem
 from actuator_lti.systems.rest_mode import without_rest_mode
 

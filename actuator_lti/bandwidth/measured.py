@@ -8,7 +8,6 @@ import numpy as np
 
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
 from actuator_lti.errors import InputError
-from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds
 from actuator_lti.margins.measured.margins import (
     between,
     measured_points,
@@ -17,7 +16,8 @@ from actuator_lti.margins.measured.margins import (
     single_passages,
 )
 from actuator_lti.margins.single import frequency_text
-from actuator_lti.systems.measured_response import MeasuredResponse, at_once, measured_response
+from actuator_lti.measured.bounds import Bounds, Strip, bounds
+from actuator_lti.measured.response import MeasuredResponse, at_once, measured_response
 from actuator_lti.types import Complex, Real
 
 

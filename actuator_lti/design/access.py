@@ -50,8 +50,6 @@ def parameter_value(design: Design, path: str) -> float:
 
     An InputError if the key is unknown, or this design has no value for it.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> parameter_value(load_design("ilr33-amber"), "motor.resistance")
     0.055
@@ -71,8 +69,6 @@ def with_values(design: Design, values: Mapping[str, float], *, check: bool = Tr
 
     An InputError as :func:`actuator_lti.design.load_design`.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> with_values(load_design("ilr33-amber"), {"motor.resistance": 0.06}).motor.resistance_ohm
     0.06

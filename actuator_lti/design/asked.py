@@ -154,8 +154,6 @@ class Parameter:
 class FrozenMap(Mapping[str, Any]):
     """A mapping that stays as it is and can be sent to a worker; equal to any with the same items.
 
-    Examples
-    --------
     >>> FrozenMap({"a": 1}) == {"a": 1}
     True
     """

@@ -119,8 +119,6 @@ class Filter:
         An InputError for other than one to three numbers in ``b``, more than two in ``a``, or a pole on or
         outside the unit circle.
 
-        Examples
-        --------
         >>> Filter(kind="biquad", b=(0.5,), a=(-0.5, 0.0)).polynomials
         ((0.5, 0.0), (1.0, -0.5))
         """
@@ -145,7 +143,8 @@ class CurrentLoop:
     integral_time_s: Annotated[float | None, positive("integral time of the current PI; without it a P "
         "controller", "Tn_i", example="150 us")] = None
     back_emf_feedforward: Annotated[float, quantity("share of the back-EMF kE w added to the voltage; w as "
-        "measured in the last update of the velocity stage, if there is one",
+        "measured in the last update of the velocity stage, behind its filters of the speed; without one in "
+        "every tick",
         low=0.0, high=2.0, example="1")] = 0.0
     resistance_feedforward: Annotated[float, quantity("share of R i_ref added to the voltage", low=0.0,
         high=2.0, example="1")] = 0.0

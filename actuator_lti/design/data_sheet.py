@@ -5,7 +5,9 @@ Read into the keys of ``[friction]`` that follow from them, which is what a desi
 
 import re
 from collections.abc import Collection, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from math import prod
 from typing import Any
 
@@ -13,7 +15,9 @@ from actuator_lti.design import model
 from actuator_lti.design.field import Field, Structure, positive, quantity
 from actuator_lti.design.fields import FIELDS
 from actuator_lti.design.mistakes import UNREAD, Refusal, readable
+from actuator_lti.design.stated import Frame
 from actuator_lti.design.units import si_text
+from actuator_lti.errors import InputError
 from actuator_lti.files.tree import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
@@ -42,6 +46,20 @@ _TAKEN = {
 def sheet_fields(template: str) -> tuple[Field, ...]:
     """Those of a table such as ``"gear.*"``."""
     return tuple(field for field in SHEET if field.section == template)
+
+
+def stated_in(design: model.Design) -> Iterator[tuple[str, str, str]]:
+    """What a design's friction was read from, each once: dotted key, as written, as read in SI."""
+    travel_m_rad = None if design.screw is None else design.screw.travel_m_rad
+    frame = Frame(Structure.of(design), design.motor.constants, travel_m_rad)
+    sources = (item.source for item in design.parameters.values() if item.source.startswith(FROM))
+    said = (source.removeprefix(FROM).partition("; ")[0].split(", ") for source in sources)
+    for word in filter(None, map(_WORD.fullmatch, dict.fromkeys(chain.from_iterable(said)))):
+        field = next(one for one in SHEET if one.key == word["key"])
+        with suppress(InputError):  # of a source that a user wrote
+            value = frame.quantity(word["text"], field)
+            read = si_text(float(f"{value:.9g}"), field.unit(frame.structure))
+            yield f"{word['table']}.{word['key']}", word["text"], read
 
 
 def as_stated(tree: Tree, changed: Collection[str]) -> None:

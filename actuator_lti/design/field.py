@@ -97,8 +97,6 @@ class Field:
     def travel_power(self) -> int:
         """n, where a value in rotary units becomes one in linear units times p^n, p the travel per radian.
 
-        Examples
-        --------
         >>> from actuator_lti.design.fields import FIELDS
         >>> FIELDS["motor.rotor_inertia"].travel_power(), FIELDS["limits.speed"].travel_power()
         (-2, 1)

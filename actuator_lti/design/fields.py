@@ -125,8 +125,6 @@ def children(path: str) -> tuple[Section, ...]:
 def template_of(path: str) -> str:
     """The registered form of a dotted path: names and numbers of repeated tables become ``*``.
 
-    Examples
-    --------
     >>> template_of("gear.worm.ratio"), template_of("control.velocity.filter.1.depth")
     ('gear.*.ratio', 'control.velocity.filter.*.depth')
     """

@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated
 
-from actuator_lti.design.data_sheet import SHEET
+from actuator_lti.design.data_sheet import SHEET, stated_in
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
@@ -30,8 +30,6 @@ class KeyEntry:
 def key_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
     """All keys in the order of a design file, with the units of a full cascade on this axis.
 
-    Examples
-    --------
     >>> entry = next(key for key in key_reference() if key.path == "control.velocity.every")
     >>> entry.default, entry.allowed
     ('1', 'at least 1 and at most 1000')
@@ -93,8 +91,6 @@ class Explained:
 def explained(design: Design) -> tuple[Explained, ...]:
     """Every number that stands in the file of a design, in its order.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> items = {item.path: item for item in explained(load_design("ballscrew"))}
     >>> one = items["motor.torque_constant"]
@@ -111,4 +107,6 @@ def explained(design: Design) -> tuple[Explained, ...]:
         result.append(
             Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}")
         )
-    return tuple(result)
+    sheet = (Explained(*stated, "friction, below") for stated in stated_in(design))
+    at = next((k for k, one in enumerate(result) if one.path.startswith("friction.")), len(result))
+    return (*result[:at], *sheet, *result[at:])

@@ -94,7 +94,8 @@ class Law(StateSpace):
     inputs: Annotated[tuple[LawInput, ...], names("the signals that it takes, a column of B and D each "
         "(state feedback: D alone), in SI: output_angle and output_speed of the output shaft, twist of the "
         "coupling by both angles, the others of the motor; the speed is held between updates of a velocity "
-        "stage")]
+        "stage, without one measured in every tick; error is command minus the stage's own signal, of the "
+        "position the counted angle of the motor (sensor = output: N times that of the output)")]
     file: Annotated[str, text("a .mat or .json file with A, B, C, D and Ts, beside the design file; read in "
         "their place. L, gain and inputs may stand in it or here")] = ""
     L: Annotated[tuple[float, ...], quantities("anti-windup: n numbers that the states take of u - v; zeros "

@@ -70,14 +70,16 @@ def _from_mat(data: bytes) -> Tree:
 
 def _real(name: str, given: Any) -> np.ndarray:
     """An array of finite real numbers; text, truth and what has an imaginary part are none."""
+    must = "real"
     try:
         values = np.array(given.toarray() if hasattr(given, "toarray") else given, dtype=object)
         numbers = [one.real for one in values.flat if isinstance(one, Complex) and one.imag == 0]
         if len(numbers) == values.size and bool not in map(type, values.flat):
+            must = "finite"
             return np.asarray_chkfinite(numbers, dtype=float).reshape(values.shape)
     except (ValueError, TypeError):
         pass
-    raise InputError(f"{name}: must be real; allowed: finite real numbers")
+    raise InputError(f"{name}: must be {must}; allowed: finite real numbers")
 
 
 def _number(name: str, given: Any) -> float:

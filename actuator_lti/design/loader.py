@@ -23,8 +23,6 @@ SHIPPED = Path(__file__).parent / "shipped"
 def shipped_designs() -> tuple[str, ...]:
     """Names of the shipped designs, the baseline first.
 
-    Examples
-    --------
     >>> shipped_designs()[0]
     'ilr33-amber'
     """

@@ -76,8 +76,6 @@ UNREAD: Any = _Unread()
 def readable(items: Iterable[T]) -> Iterator[T]:
     """The items up to the one that asks for a value that could not be read.
 
-    Examples
-    --------
     >>> list(readable(x for x in (1, 2 * UNREAD, 3) if x > 0))
     [1]
     """
@@ -162,8 +160,6 @@ def lines_of(text: str, tree: Tree) -> dict[str, int]:
 
     A repeated table stands by its name or id, by its number and as ``gear[1]``.
 
-    Examples
-    --------
     >>> text = '[[gear]]\\nname = "worm"\\nratio = 3'
     >>> lines_of(text, {"gear": [{"name": "worm", "ratio": 3}]})["gear.worm.ratio"]
     3

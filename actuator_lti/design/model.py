@@ -125,8 +125,6 @@ class Design:
         ``stage``: the stage whose filter it is, ``"velocity"``.
         ``keys``: ``kind`` and its keys as a design file has them: text with units, or numbers in SI.
 
-        Examples
-        --------
         >>> from actuator_lti import load_design
         >>> notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz", "depth": 0.1}
         >>> load_design("ilr33-amber").add_filter("velocity", **notch).controller.velocity.filters[0].kind
@@ -151,11 +149,10 @@ class Design:
         ``inputs``: the signals that it takes, in order: ``command``, ``error``, ``speed``, ``angle``,
         ``current``, ``output_angle``, ``output_speed``, ``twist``; by default the system's own input labels.
         ``settings``: ``L``: anti-windup, n numbers; ``gain``: factor on the law; ``every``: ticks of the
-        stage; ``method``: ``"tustin"`` or ``"zoh"``, by which a continuous system is sampled; ``continuous``:
-        the same law in continuous time, for the forms without samples.
+        stage, as a design file may write them (8, "8", a table with its source); ``method``: ``"tustin"`` or
+        ``"zoh"``, by which a continuous system is sampled; ``continuous``: the same law in continuous time,
+        for the forms without samples.
 
-        Examples
-        --------
         >>> from actuator_lti import load_design
         >>> design = load_design("ilr33-amber")
         >>> mine = design.with_law("position", ([], [], [], [[60.0]], design.controller.period_s), ["error"])

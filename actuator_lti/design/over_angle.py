@@ -26,8 +26,6 @@ class Wave:
 class OverAngle:
     """``slope angle`` plus `Wave` terms, in N m; the one answer to what a torque is over its angle.
 
-    Examples
-    --------
     >>> pendulum = OverAngle(waves=(Wave(2.0, 1.0, 0.0),))
     >>> pendulum.bends, float(pendulum.at(0.0)), float(pendulum.slope_at(0.0))
     (True, 0.0, 2.0)

@@ -46,7 +46,7 @@ class Motor:
         "phase) that the motor makes by itself", example="5 mN*m")] = 0.0
     cogging_periods: Annotated[float, positive("periods of the cogging per revolution of the motor (linear "
         "axis: rad per m)", "Z", unit="rad/{angle}",
-        most=lambda design: _most_order(design, design.motor.cogging_Nm, 1.0), example="84")] = 1.0
+        most=lambda design: _most_order(design, design.motor.over_angle.waves[0], 1.0), example="84")] = 1.0
     cogging_phase_rad: Annotated[float, quantity("phase of the cogging at motor angle zero; 180 deg: it "
         "holds there, 0: it pushes the motor away", unit="rad", low=-7.0, high=7.0, example="180 deg")] = 0.0
     constants: Annotated[MotorConstants, choice("how the data sheet gives kM, kE, R and L: dc (phase-phase; "
@@ -145,8 +145,6 @@ class Coupling:
     def stretch_rad(self, torque_Nm: Any) -> Any:
         """Twist without play that carries a torque at its own shaft, with the sign of the torque.
 
-        Examples
-        --------
         >>> strain_wave = Coupling(stiffness_Nm_rad=10.0, torque_1_Nm=2.0, stiffness_2_Nm_rad=20.0)
         >>> strain_wave.stretch_rad(-6.0), strain_wave.stiffness_at(0.25)
         (-0.4, 20.0)
@@ -221,16 +219,19 @@ def torque_per_command(design: "Design") -> Any:
     return kM if design.controller.current is not None else kM / motor.resistance_ohm
 
 
-def _most_order(design: "Design", peak_Nm: float, ratio: float) -> tuple[float, str]:
+def _most_order(design: "Design", wave: Wave, ratio: float) -> tuple[float, str]:
     """Largest order of a wave over an angle that turns at the top speed of the motor over ``ratio``."""
-    if not peak_Nm:
+    if not wave.peak_Nm:
         return inf, ""
     speed, Ts = reachable_speed(design) / ratio, design.controller.period_s
     if speed == inf:
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)
-    passed = f"{speed:.4g} {unit_on(design.axis, '{angle}/s')} passes more than {MOST_PHASE_rad} rad of it"
-    return most, f"held over a tick, in which {passed} (a lower limits.speed or control.period takes more)"
+    unit, share = unit_on(design.axis, "{angle}/s"), 0.9995 * most / wave.order  # within it in four digits
+    late = f"{0.5 * wave.order * speed * Ts:.3g} rad at {speed:.4g} {unit}, more than {MOST_PHASE_rad / 2}"
+    slower = f"limits.speed = {share * speed * ratio:.4g} {unit}"
+    takes = f"control.period = {1e6 * share * Ts:.4g} us or {slower} takes {wave.order:.4g}"
+    return most, f"held over a tick, it is late by {late}; {takes}"
 
 
 def _largest_damping(design: "Design") -> tuple[float, str]:
@@ -266,7 +267,7 @@ class Load:
         "sin(n angle + phase)", "A", example="0.1 N*m")] = 0.0
     gear_error_periods: Annotated[float, positive("periods of the gear error per revolution of the output "
         "(linear axis: rad per m)", "n", unit="rad/{angle}",
-        most=lambda design: _most_order(design, design.load.gear_error_Nm, design.total_ratio),
+        most=lambda design: _most_order(design, design.load.over_angle.waves[0], design.total_ratio),
         example="2")] = 1.0
     gear_error_phase_rad: Annotated[float, quantity("phase of the gear error at output angle zero",
         unit="rad", low=-7.0, high=7.0, example="0 deg")] = 0.0

@@ -196,8 +196,6 @@ def key_for(table: str, word: str, known: Iterable[str] = ()) -> str:
 
     Of a word in several parts also what its end stands for, or which of the keys that are ``known`` it is.
 
-    Examples
-    --------
     >>> key_for("motor", "Kt"), key_for("control.position", "Kv"), key_for("gear.worm", "i")
     ('torque_constant', 'gain', 'ratio, which takes "60/20" too')
     >>> key_for("motor", "rotor_moment_of_inertia"), key_for("gear.worm", "reduction ratio", ["ratio"])

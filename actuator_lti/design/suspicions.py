@@ -15,8 +15,6 @@ GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" betwe
 def warnings_of(design: Design) -> tuple[str, ...]:
     """Everything suspicious in a design, each as one line that begins with the key.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> warnings_of(load_design("ilr33-amber"))
     ()

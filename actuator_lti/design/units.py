@@ -39,10 +39,11 @@ _DERIVED = {
     "percent": ("0.01", "1"),
     "ppm": ("0.000001", "1"),
     "g gram gm": ("0.001", "kg"),
-    "in inch": ("0.0254", "m"),
+    "in inch inches": ("0.0254", "m"),
     "ft foot": ("0.3048", "m"),
     "lb lbm pound": ("0.45359237", "kg"),
     "mil": ("0.0000254", "m"),
+    "micron": ("0.000001", "m"),
     "oz ounce": ("0.028349523125", "kg"),
     "min minute": ("60", "s"),
     "h hour": ("3600", "s"),
@@ -98,6 +99,8 @@ _ASIDE = {
         "is no unit; every takes ticks of control.period without one, a time is so many of that period",
     ),
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
+    **dict.fromkeys(("step", "steps", "edges"), 'of an encoder are written "counts"'),
+    "degf": "is no unit here; F degrees Fahrenheit are (F - 32)/1.8 degC",
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
     "db": "is no unit here; a ratio is 10^(dB/20): -20 dB is 0.1",
@@ -232,8 +235,6 @@ def _unknown(name: str, units: Units) -> str:
 def scaled(number: float, factor: float) -> float:
     """``number * factor``, rounded once where the factor is a whole fraction (milli, micro).
 
-    Examples
-    --------
     >>> scaled(5.9, 1e-3)
     0.0059
     """
@@ -342,8 +343,6 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     A bare number stands for itself only where ``unit``, an SI unit without prefix, is dimensionless.
     An InputError if it is no number, not finite, has an unknown unit or the wrong dimension.
 
-    Examples
-    --------
     >>> parse_quantity("9.2 g*cm^2", "kg*m^2")
     9.2e-07
     >>> round(parse_quantity("9000 rpm", "rad/s"), 3)
@@ -373,8 +372,6 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
 def si_text(value: float, unit: str) -> str:
     """A value in its own SI unit as text.
 
-    Examples
-    --------
     >>> si_text(0.06, "ohm"), si_text(66.0, "1")
     ('0.06 ohm', '66.0')
     """
@@ -384,8 +381,6 @@ def si_text(value: float, unit: str) -> str:
 def ampere_unit(path: str, unit: str, constants: str) -> str:
     """The unit of a limit or gain as a file has to say it: of an AC motor (``constants``), which amperes.
 
-    Examples
-    --------
     >>> ampere_unit("limits.peak_current", "A", "rms-line"), ampere_unit("limits.peak_current", "A", "dc")
     ('A dc', 'A')
     """
@@ -396,8 +391,6 @@ def ampere_unit(path: str, unit: str, constants: str) -> str:
 def parse_limit(text: str | float | int, unit: str) -> float:
     """A limit as written, in the unit in which its quantity is reported.
 
-    Examples
-    --------
     >>> parse_limit("6 dB", "dB"), parse_limit("90 rpm", "Hz")
     (6.0, 1.5)
     """

@@ -1,6 +1,7 @@
 """A system of python-control or scipy as a law of one's own of a design."""
 
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,14 @@ SETTINGS: dict[str, Any] = {"L": (), "gain": 1.0, "every": None, "method": None,
 """What may be said of a law besides, and what holds where it is not."""
 
 
+def _proper(made: Callable[..., Any], *given: Any) -> Any:
+    """A state space made of transfer functions; one of more zeros than poles is an InputError."""
+    try:
+        return made(*given)
+    except ValueError as error:
+        raise InputError("system: improper; allowed: no more zeros than poles") from error
+
+
 def _columns(system: Any) -> tuple[Any, ...]:
     """Of a transfer function of python-control: one output, its columns side by side."""
     from scipy.linalg import block_diag
@@ -27,10 +36,8 @@ def _columns(system: Any) -> tuple[Any, ...]:
 
     if len(system.num) != 1:
         raise InputError(f"system: {len(system.num)} outputs; allowed: one, that of the stage")
-    try:
-        A, B, C, D = zip(*map(tf2ss, system.num[0], system.den[0]), strict=True)
-    except ValueError as error:
-        raise InputError("system: improper; allowed: no more zeros than poles") from error
+    columns = [_proper(tf2ss, *one) for one in zip(system.num[0], system.den[0], strict=True)]
+    A, B, C, D = zip(*columns, strict=True)
     return block_diag(*A), block_diag(*B), np.hstack(C), np.hstack(D)
 
 
@@ -41,7 +48,7 @@ def _state_space(system: Any, name: str = "system") -> tuple[Any, Any, Any, Any,
     dt = getattr(system, "dt", None)
     if type(system).__module__.startswith("scipy.signal"):
         dt = 0 if dt is None else dt
-        system = system.to_ss()
+        system = _proper(system.to_ss)
     elif hasattr(system, "num") and hasattr(system, "den"):
         return (*_columns(system), dt)
     if not all(hasattr(system, part) for part in PARTS):
@@ -80,8 +87,8 @@ def with_law(
         raise InputError(f"stage = {shown(stage)}: {gains}; allowed: {', '.join(present)}")
     table = {key: value for key, value in control.get(stage, {}).items() if key in BESIDE_A_LAW}
     table |= {} if every is None else {"every": every}
-    ticks = 1 if stage == "current" else table.get("every", 1)
-    period_s = design.controller.period_s * (ticks if isinstance(ticks, int) and ticks > 0 else 1)
+    unit = {"inputs": ["error"], "D": [1.0]}  # whatever the law will be, the stage's period is this one's
+    period_s = _staged(design, stage, table, unit).controller.period_of(stage)
     A, B, C, D, dt = _state_space(system)
     if method is not None:
         continuous, (A, B, C, D), dt = (A, B, C, D), _sampled((A, B, C, D), dt, period_s, method), period_s
@@ -97,11 +104,17 @@ def with_law(
         if step:
             raise InputError(f"continuous: sampled, dt = {step}; allowed: a continuous system")
         law["continuous"] = law_tree(*parts)
+    return _staged(design, stage, table, law)
+
+
+def _staged(design: Design, stage: str, table: Mapping[str, Any], law: Mapping[str, Any]) -> Design:
+    """The design with a law at a stage, and what stands beside it."""
     return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
 
 
 def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> tuple[Any, ...]:
     """A continuous system sampled by a stated method."""
+    from scipy.linalg import LinAlgError, LinAlgWarning
     from scipy.signal import cont2discrete
 
     if not isinstance(method, str) or method not in METHODS:
@@ -118,5 +131,11 @@ def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> t
         return A, B, C, D
     t = balance(A, B, C)  # what is sampled is well scaled; its states stay those of the system
     scaled = A * t / t[:, None], B / t[:, None], (C * t)[None], D[None]
-    A, B, C, D = cont2discrete(scaled, period_s, METHODS[method])[:4]
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", LinAlgWarning)  # singular to rounding
+            A, B, C, D = cont2discrete(scaled, period_s, METHODS[method])[:4]
+    except (LinAlgError, LinAlgWarning) as error:
+        told = f"a pole at 2/T = {2.0 / period_s:g} 1/s, where Tustin's form is infinite"
+        raise InputError(f"system: {told}; allowed: none there, or method = zoh") from error
     return A / t * t[:, None], B * t[:, None], C / t, D

@@ -10,8 +10,6 @@ from typing import Any
 def draw(name: str, *arguments: Any, **options: Any) -> Any:
     """What the function of that name in `drawing.plotting`, or in `drawing.notebook`, makes of a result.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> draw("design_html", load_design("emps")).startswith("<table")
     True

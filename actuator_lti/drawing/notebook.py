@@ -13,8 +13,6 @@ from actuator_lti.margins.results import StabilityMargins
 def html_table(head: str, columns: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
     """A table with a caption; every text is escaped.
 
-    Examples
-    --------
     >>> html_table("a < b", [], [["1"]])
     '<table><caption>a &lt; b</caption><thead><tr></tr></thead><tbody><tr><td>1</td></tr></tbody></table>'
     """

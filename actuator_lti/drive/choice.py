@@ -13,8 +13,6 @@ import numpy as np
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` where the condition holds, else ``no``; both are worked out before.
 
-    Examples
-    --------
     >>> where(2.0 > 1.0, 5.0, 7.0), where(np.array([True, False]), 5.0, 7.0).tolist()
     (5.0, [5.0, 7.0])
     """

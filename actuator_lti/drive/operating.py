@@ -40,6 +40,8 @@ class Operating:
     ``twist_rad``: twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A
     spring that bends has the stiffness of this twist; without one, of that under ``load_Nm``.
     ``torques_held``: whether torques that depend on the angle are taken as they stand, without their slopes.
+    ``torques_at_once``: whether they act at every instant, as they do on a motor, where model.md section 11
+    (and so the simulator) holds them over a tick.
     """
 
     point: OperatingPoint = "sliding"
@@ -51,6 +53,7 @@ class Operating:
     angle_rad: float = 0.0
     twist_rad: float = 0.0
     torques_held: bool = False
+    torques_at_once: bool = False
 
     def __post_init__(self) -> None:
         """Refuse what is no operating point."""
@@ -142,8 +145,6 @@ def described_dry(dry_Nm: Any, speed_amplitude_rad_s: Any) -> Any:
 def dead_zone(x: float) -> float:
     """Describing function of a dead zone of half width x times the amplitude (model.md section 9).
 
-    Examples
-    --------
     >>> dead_zone(0.0), dead_zone(1.0), round(dead_zone(0.5), 6)
     (1.0, 0.0, 0.391002)
     """

@@ -6,7 +6,7 @@ Coefficients may be arrays of shape (K,) stacked over designs: then the matrices
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,8 +76,6 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
     Raises `InputError`: for an operating point that the design does not have, or a locked rotor without a
     current.
 
-    Examples
-    --------
     >>> from actuator_lti.design.model import Controller, Design, Limits, Motor, PositionLoop, Validation
     >>> from actuator_lti.design.model import Friction
     >>> design = Design(
@@ -100,7 +98,18 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
         return Plant(
             names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, {}, {}, {}
         )
-    return _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
+    plant = _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
+    return _at_once(plant) if at.torques_at_once else plant
+
+
+def _at_once(plant: Plant) -> Plant:
+    """The same with its own torques in A, not held."""
+    A = plant.A.copy()
+    for own, B in ((plant.torque, plant.B_T), (plant.moment, plant.B_M)):
+        for name, gain in own.items():
+            for state, share in plant.rows.get(name, {name: 1.0}).items():
+                A[..., plant.states.index(state)] += B * (gain * share)
+    return replace(plant, A=A, torque={}, moment={})
 
 
 def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:

@@ -19,8 +19,6 @@ class SheetFigure:
 def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
     """Time constants, stall, no-load speed and inertia at the motor, at the design's temperature and supply.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> for one in sheet_figures(load_design("ilr33-amber"))[:2]:
     ...     print(f"{one.name}: {one.value:.4g} {one.unit}")

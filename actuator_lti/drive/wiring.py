@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 ERRORS = {"current": "e_i", "velocity": "e_w", "position": "e_th"}
 MEASURED = {"current": "i", "velocity": "w_meas", "position": "th"}
+LAW_OUTPUT = "law"
+"""What a law of one's own gives, before feed-forward and limits."""
 COMMANDS = {"voltage": "u", "current": "i_ref", "velocity": "w_ref", "position": "th_ref"}
 
 
@@ -59,7 +61,7 @@ class Drive:
         plant, control = self.plant, self.design.controller
         B = np.stack(np.broadcast_arrays(plant.B_T, plant.B_M), axis=-1)
         hold = delayed_hold(plant.A, plant.B_u[..., None], B, control.period_s, control.computing_delay_s)
-        if "th" in plant.states:
+        if "th" in plant.states and not self.operating.torques_at_once:
             hold.Phi[..., :, plant.states.index("th")] = np.eye(len(plant.states))[plant.states.index("th")]
         return hold
 
@@ -74,9 +76,9 @@ class Drive:
         return self.design.total_ratio
 
     def has_own_law(self, stage: str) -> bool:
-        """Whether a stage has a law of one's own, so that its loop is cut at what it drives."""
+        """Whether a stage has a law of one's own, so that its loop is cut at what that gives."""
         own = self.design.controller.own_law
-        return own is not None and own[0] == stage
+        return own is not None and own[0] == stage and stage in self.stages
 
     def around(self, place: str) -> tuple[str, str]:
         """Signals behind and in front of where the loop of a stage, or at a break point, is broken."""
@@ -88,11 +90,13 @@ class Drive:
     def cut_of(self, place: str) -> tuple[str, str, Any]:
         """Where the loop of a stage, or at a break point, is cut, what comes back there, and its factor.
 
-        With a law of one's own it is cut at what the stage drives: one loop, whatever the law takes.
+        With a law of one's own it is cut at what the law gives, whatever it takes: what feed-forward adds to
+        that stays closed, as with gains.
         """
-        if place not in self.stages or self.has_own_law(place):
-            point = self.target.get(place, place)
-            return point, point, -1.0
+        if self.has_own_law(place):
+            return LAW_OUTPUT, LAW_OUTPUT, -1.0
+        if place not in self.stages:
+            return place, place, -1.0
         if place == "position":
             return ERRORS[place], "output", self.ratio
         return ERRORS[place], MEASURED[place], 1.0

@@ -45,8 +45,6 @@ def read_mat5(data: bytes) -> MatContent:
 
     An InputError says, without the file's name, what is wrong, and at which byte.
 
-    Examples
-    --------
     >>> read_mat5(b"MATLAB")
     Traceback (most recent call last):
     ...

@@ -15,6 +15,7 @@ from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
 from actuator_lti.files.response_columns import (
+    PERIOD,
     SI,
     TABLE,
     WHAT,
@@ -25,7 +26,8 @@ from actuator_lti.files.response_columns import (
     taken_as,
     unit_of,
 )
-from actuator_lti.systems.measured_response import GAUSSIAN, MeasuredResponse
+from actuator_lti.files.response_repeats import Repeats
+from actuator_lti.measured.response import GAUSSIAN, MeasuredResponse
 from actuator_lti.types import Floats
 
 Loop = Literal["L", "T", "S"]
@@ -47,7 +49,8 @@ class RecordedResponse:
     ``left_out``: rows without numbers, without coherence, or at 0 Hz.
     ``radius``, shape (m,): of the circle about each value that holds the true one in 99 of 100 cases, over
     the size of the value; not a number where the noise is not known. ``noise``: where it is from.
-    ``read_as``: how the columns of a file were taken.
+    ``read_as``: how the columns of a file were taken. ``period_s``: sampling period of which it says that it
+    is; None where it says none.
     """
 
     frequency_hz: Floats
@@ -59,12 +62,17 @@ class RecordedResponse:
     radius: Floats = field(default_factory=lambda: np.array(np.nan))
     noise: str = ""
     read_as: str = ""
+    period_s: float | None = None
+
+    def refuse_other_period(self, loop: str, period_s: float | None) -> None:
+        """Refuse data that say another sampling period than that of the loop, s."""
+        if self.period_s and period_s is not None and abs(self.period_s - period_s) > 1e-6 * period_s:
+            allowed = f"{period_s:g} s, of the {loop} loop, or none"
+            raise InputError(f"{self.name}: dt = {self.period_s:g} s; allowed: {allowed}")
 
     def as_loop(self, of: Loop) -> RecordedResponse:
         """The open loop L = T/(1 - T) = 1/S - 1 of a closed loop or a sensitivity, its deviation with it.
 
-        Examples
-        --------
         >>> half = RecordedResponse(*np.array([[1.0], [0.5], [0.1], [np.nan]]), "T")
         >>> float(half.as_loop("T").response[0].real), float(half.as_loop("T").deviation[0])
         (1.0, 0.2)
@@ -92,8 +100,11 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     A table in text has its columns parted by comma, semicolon (then with decimal comma, too), tab or space,
     and says in its heading what they are: ``frequency_hz,gain_db,phase_deg``, ``f,real,imag,coherence``,
     ``omega,ratio...``; without a heading they are Hz, dB, deg and perhaps coherence. A .mat file has arrays
-    of such names, or a complex one. What a name leaves open (dB or ratio, deg or rad) and the numbers do
-    not decide is refused, as are two columns that say the same and contradict.
+    of such names, or a complex one. ``Ts`` or ``dt`` of one value is the sampling period. What a name leaves
+    open (dB or ratio, deg or rad) and the numbers do not decide is refused, as are two columns that say the
+    same and contradict.
+
+    Rows at the same frequency are repeats: their mean is taken, and where no noise is told their scatter.
 
     A deviation without unit, or in per cent, is the root mean square of the complex error over the size of
     the value. In dB it is that of the gain alone, in deg or rad of the phase alone: of one part of the error,
@@ -108,11 +119,15 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     if hasattr(source, "frdata") and hasattr(source, "omega"):
         values = np.asarray(source.frdata).ravel()
         columns = {"f_hz": np.asarray(source.omega) / (2.0 * np.pi), "re": values.real, "im": values.imag}
+        dt = getattr(source, "dt", None)
+        dt = None if dt is True else dt
         if not isinstance(source, MeasuredResponse) or not source.noise_known:
-            return replace(_response(columns, "measured response", averages), read_as="")
+            read = _response(columns, "measured response", averages)
+            return replace(read, read_as="", period_s=dt)
         with np.errstate(divide="ignore", invalid="ignore"):
             columns["deviation"] = source.radius / np.abs(values) / GAUSSIAN
-        return replace(_response(columns, "measured response", averages), noise=source.source, read_as="")
+        read = _response(columns, "measured response", averages)
+        return replace(read, noise=source.source, read_as="", period_s=dt)
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
     with in_file(shown_path(source)):
@@ -178,16 +193,21 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
         raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
     order = f.argsort(kind="stable")
-    if (np.diff(f[order]) == 0.0).any():
-        raise InputError("a frequency is given twice")
     z, coherence = complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
-    if not (np.isnan(coherence) | ((coherence > 0.0) & (coherence <= 1.0))).all():
-        raise InputError("a coherence outside 0 to 1")
+    if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
+        per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())
+        raise InputError(f"a coherence of {odd[0]:g}; allowed: 0 to 1{per_cent}")
     if not np.isfinite(z).all() or (z == 0.0).any():
         raise InputError("a value that is 0 or beyond the range of floats")
     refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
     deviation, radius, noise = noise_of(table, units, averages)
+    every = Repeats(f[order], z[order], deviation[order], coherence[order], radius[order], noise)
+    read, told = every.averaged(), taken_as(columns, found, units, known=bool(noise))
+    if read.f.size < 2:
+        raise InputError(f"every row is at {read.f[0]:.6g} Hz; allowed: two frequencies or more")
+    if twice := f.size - read.f.size:
+        told += f"; rows that repeat a frequency are averaged ({twice})"
     return RecordedResponse(
-        f[order], z[order], deviation[order], coherence[order], name, count - int(good.sum()),
-        radius[order], noise, taken_as(columns, found, units, known=bool(noise)),
+        read.f, read.z, read.deviation, read.coherence, name, count - int(good.sum()),
+        read.radius, read.noise, told, float(table[PERIOD][0]) if PERIOD in table else None,
     )  # fmt: skip

@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown
-from actuator_lti.systems.measured_response import CONFIDENCE, GAUSSIAN, student
+from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, student
 from actuator_lti.types import Floats, Mask
 
 WHAT = "frequency response: CSV or .mat (up to -v7) with frequency, dB and deg or real and imaginary part"
 HEADS = "f_hz,gain_db,phase_deg or f_hz,real,imag"
 TABLE = f"{WHAT}: a heading such as {HEADS}, then a row of numbers for each frequency"
 
+PERIOD = "sampling period in s"
 _ERROR = re.compile(r"std|dev|sigma|spread|uncert|err", re.I)
 _DEVIATION = (
     re.compile(r"^(?!re|im|f)(.*[_ ])?(std|dev|sigma|spread|uncert)", re.I),
@@ -25,6 +26,7 @@ _DEVIATION = (
 _UNITS: dict[str, tuple[re.Pattern[str], dict[str, str]]] = {
     "coherence": (re.compile(r"coh|gamma", re.I), {}),
     "averages": (re.compile(r"^n?_?av(g|erages?)\b", re.I), {}),
+    PERIOD: (re.compile(r"^(ts|dt|(sampl(e|ing)[_ ]?)?period|sampl(e|ing)[_ ]?time)([_ ]s)?$", re.I), {}),
     "deviation": _DEVIATION,
     "deviation beside it": _DEVIATION,
     "frequency": (
@@ -55,6 +57,8 @@ def roles(columns: Mapping[str, Floats]) -> dict[str, str]:
             found[role] = named
     if "coherence" not in found:
         found.pop("averages", None)
+    if PERIOD in found and np.ptp(columns[found[PERIOD]]) != 0.0:  # something else, or not a number
+        found.pop(PERIOD)
     parts = {"real", "imaginary"} <= set(found)
     wanted = ("frequency", "real", "imaginary") if "real" in found else ("frequency", "size", "phase")
     if missing := [role for role in wanted if role not in found]:

@@ -28,51 +28,33 @@ def assemble_loops(
 ) -> Loops:
     """All loops of a design as named python-control systems (model.md section 3).
 
-    Parameters
-    ----------
-    design : Design, str or path
-        A design, a shipped name, or the path of a design file.
-    form : {"sampled", "continuous", "ideal"}
-        ``sampled``: exact hold, exact computing delay, PI in z, slower loops held (state spaces with dt).
-        ``continuous``: PI in s and exact delays (`DelaySystem`, no Pade; see `actuator_lti.loops.flow` for
-        which loop carries which delay). ``ideal``: continuous without any delay, the paper's own model.
-    operating_point : {"sliding", "rest", "describing-function", "driving", "driven", "gap"}
-        Slope of the friction and contact of the coupling, see `actuator_lti.drive.operating.Operating`.
-    load_Nm : float
-        Load torque at the output shaft in N m: more dry friction.
-    speed_amplitude_rad_s : float, optional
-        Amplitude (peak, motor side) for the describing function.
-    direction : {1, -1}
-        Direction of motion for asymmetric friction.
-    rotor : {"free", "locked"}
-        Locked: only the current loop, without back-EMF, so that its closed loop starts at 0 dB.
-    inner_loops : {"closed", "open"}
-        Open: `Loops.velocity` and `Loops.position` with the feedback of the loops inside them taken away, the
-        inner controllers still in the path. Break points, limiters and the response to the command are those
-        of the closed drive in any case.
-    speed_rad_s, angle_rad, twist_rad : float
-        Motor speed at which the slope of a friction map is taken, output angle (and twist of the coupling) at
-        which torques that bend with the angle are made linear.
+    ``design``: a design, a shipped name, or the path of a design file.
+    ``form``: "sampled": exact hold, exact computing delay, PI in z, slower loops held (state spaces with dt);
+    "continuous": PI in s and exact delays (`DelaySystem`, no Pade; see `actuator_lti.loops.flow` for which
+    loop carries which delay); "ideal": continuous without any delay, the paper's own model.
+    ``operating_point``: slope of the friction and contact of the coupling: "sliding", "rest",
+    "describing-function", "driving", "driven" or "gap", see `actuator_lti.drive.operating.Operating`.
+    ``load_Nm``: load torque at the output shaft: more dry friction.
+    ``speed_amplitude_rad_s``: amplitude (peak, motor side) for the describing function.
+    ``direction``: direction of motion for asymmetric friction, 1 or -1.
+    ``rotor``: "free", or "locked": only the current loop, without back-EMF, so that its closed loop starts at
+    0 dB.
+    ``inner_loops``: "closed", or "open": `Loops.velocity` and `Loops.position` with the feedback of the loops
+    inside them taken away, the inner controllers still in the path. Break points, limiters and the response
+    to the command are those of the closed drive in any case.
+    ``speed_rad_s``, ``angle_rad``, ``twist_rad``: motor speed at which the slope of a friction map is taken,
+    output angle (and twist of the coupling) at which torques that bend with the angle are made linear.
 
-    Returns
-    -------
-    Loops
+    With the rotor free, back-EMF gives the current loop a finite gain at DC although its controller
+    integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them. A
+    load torque proportional to the angle acts through a back-drivable path as a stiffness.
 
-    Raises
-    ------
-    InputError
-        For an unknown form or operating point, or a design without the stage asked for.
+    Raises `InputError`: for an unknown form or operating point, or a design without the stage asked for.
 
     Examples
     --------
     >>> assemble_loops("ilr33-amber")
     Loops(ilr33-amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)
-
-    Notes
-    -----
-    With the rotor free, back-EMF gives the current loop a finite gain at DC although its controller
-    integrates. The motor angle is an integrator that the inner loops do not see; it is no state of them.
-    A load torque proportional to the angle acts through a back-drivable path as a stiffness.
     """
     at = Operating(
         point=operating_point,

@@ -41,36 +41,24 @@ def plant(
 ) -> control.StateSpace | DelaySystem:
     """The drive without its velocity and position controller, as a python-control system.
 
-    Parameters
-    ----------
-    design : Design, str or path
-        A design, a shipped name, or the path of a design file.
-    form : {"sampled", "continuous", "ideal"}
-        ``sampled``: exact, at the base period Ts, behind the hold and the computing delay d. ``continuous``:
-        the command late by exactly d + Ts/2 (a `DelaySystem`). ``ideal``: without delay.
-    rotor : {"free", "locked"}
-        Locked: only the electrical part.
-    command : {"u", "i_ref"}
-        The first input: the voltage in V (of an ideal source its drive signal), or the current command in A
-        of the design's own current loop.
-    operating_point : str
-        Slope of the friction and contact of the coupling, see `actuator_lti.drive.operating.Operating`.
-    load_Nm : float
-        Load torque at the output shaft in N m: more dry friction.
+    ``design``: a design, a shipped name, or the path of a design file.
+    ``form``: "sampled": exact, at the base period Ts, behind the hold and the computing delay d;
+    "continuous": the command late by exactly d + Ts/2 (a `DelaySystem`, else a `control.StateSpace`);
+    "ideal": without delay.
+    ``rotor``: "free", or "locked": only the electrical part.
+    ``command``: the first input: "u", the voltage in V (of an ideal source its drive signal), or "i_ref", the
+    current command in A of the design's own current loop.
+    ``operating_point``: slope of the friction and contact of the coupling, see
+    `actuator_lti.drive.operating.Operating`.
+    ``load_Nm``: load torque at the output shaft: more dry friction.
 
-    Returns
-    -------
-    control.StateSpace or DelaySystem
-        Inputs: ``command``, and ``load_torque`` in N m, which pushes the output shaft forward (held over the
-        tick; without effect where the load path locks itself). Outputs, those that the drive has:
-        ``current`` in A, ``speed`` and ``angle`` of the motor in rad/s and rad, ``output_angle`` in rad,
-        ``twist`` of the coupling in rad at its own shaft, ``output_speed`` in rad/s (linear axis: m for rad,
-        N for N m): the signals that a law of one's own takes, see `Design.with_law`.
+    Inputs of the system: ``command``, and ``load_torque`` in N m, which pushes the output shaft forward (held
+    over the tick; without effect where the load path locks itself). Outputs, those that the drive has:
+    ``current`` in A, ``speed`` and ``angle`` of the motor in rad/s and rad, ``output_angle`` in rad,
+    ``twist`` of the coupling in rad at its own shaft, ``output_speed`` in rad/s (linear axis: m for rad, N
+    for N m): the signals that a law of one's own takes, see `Design.with_law`.
 
-    Raises
-    ------
-    InputError
-        For an unknown form or input, or a design that has no current loop.
+    Raises `InputError`: for an unknown form or input, or a design that has no current loop.
 
     Examples
     --------

@@ -77,19 +77,11 @@ def delay_budget(
 ) -> DelayBudget:
     """Degrees spent by each part of a loop at a frequency, usually its crossover.
 
-    Parameters
-    ----------
-    loop_name : {"current", "velocity", "position"}
-        The loop broken at its own error, inner loops closed.
-    frequency_rad_s : float
-        Positive, below the Nyquist frequency of this loop.
-    rotor, torques_held
-        As in `Operating`: how a loop is held that is unstable by itself.
+    ``loop_name``: "current", "velocity" or "position", broken at its own error, inner loops closed.
+    ``frequency_rad_s``: positive, below the Nyquist frequency of this loop.
+    ``rotor``, ``torques_held``: as in `Operating`: how a loop is held that is unstable by itself.
 
-    Raises
-    ------
-    InputError
-        For a loop that the design does not have, or a frequency out of range.
+    Raises `InputError`: for a loop that the design does not have, or a frequency out of range.
     """
     design = as_design(design)
     wired = wire(

@@ -56,15 +56,9 @@ class LimiterPath:
     def onset_amplitude_rad(self, omega_rad_s: Any, bias: float = 0.0) -> np.ndarray:
         """Command amplitude A_k(w) (peak; rad, rad/s, A or V, see the module) at which the limit is reached.
 
-        Parameters
-        ----------
-        omega_rad_s : array_like, shape (K,)
-        bias : float
-            Constant value of the quantity on top of which the sinusoid acts (in `unit`), e.g. the motor speed
-            of a superposed ramp; what it uses up of the limit is no longer there.
+        Shape (K,), as ``omega_rad_s``. ``bias``: constant part of the quantity (in `unit`), e.g. the motor
+        speed of a superposed ramp; what it uses up of the limit is no longer there.
 
-        Notes
-        -----
         A mean square (time constant tau) of a sinusoid of amplitude I tends to I^2/2 with a ripple of the
         double frequency, so that its highest value is (I^2/2) (1 + 1/sqrt(1 + (2 w tau)^2)); a constant adds
         its square and, by the product of both, a ripple of the single frequency, bounded by its amplitude.

@@ -228,10 +228,7 @@ def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -
 
     Found by stepping outwards (1.0233 in gain, a quarter tick in delay) to the first border and polishing it.
 
-    Raises
-    ------
-    InputError
-        If the loops are not sampled, or have no such break point.
+    Raises `InputError`: if the loops are not sampled, or have no such break point.
     """
     if loops.form != "sampled":
         raise InputError(f"form = {loops.form!r}: exact_margins needs form='sampled'")

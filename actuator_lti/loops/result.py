@@ -30,25 +30,17 @@ class Loop:
 
     With e the error there, y what comes back: ``y = L e``, ``e = r - y``.
 
-    Attributes
-    ----------
-    name : str
-        ``"current"``, ``"velocity"``, ``"position"``, or the break point with all other loops closed.
-    break_point : str
-        Where it is cut: ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``. Cutting a loop at its own error
-        gives the same L, as all is in series.
-    plain_open, plain_closed, plain_sensitivity : PlainSystem or PlainDelaySystem
-        What `open_loop`, `closed_loop` and `sensitivity` are made of when they are first asked for; all
-        figures take these as well.
-    period_s : float or None
-        Sampling period of this loop; ``None`` where not sampled.
-    unit_in, unit_out : str
-        Units of e and y (the same).
-    periodic : bool
-        True where faster ticks inside slower loops make the loop periodically time-varying: then S and T are
-        the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
-    rotor : {"free", "locked"}
-        How the rotor stands: with a locked one there is a current loop alone.
+    ``name``: "current", "velocity", "position", or the break point with all other loops closed.
+    ``break_point``: where it is cut: "u", "i_ref", "w_ref", "output". Cutting a loop at its own error gives
+    the same L, as all is in series.
+    ``plain_open``, ``plain_closed``, ``plain_sensitivity``: the `PlainSystem` or `PlainDelaySystem` that
+    `open_loop`, `closed_loop` and `sensitivity` are made of when they are first asked for; all figures take
+    these as well.
+    ``period_s``: sampling period of this loop; None where not sampled.
+    ``unit_in``, ``unit_out``: units of e and y (the same).
+    ``periodic``: whether faster ticks inside slower loops make the loop periodically time-varying: then S and
+    T are the fundamental responses of the exact loop and L = T/S, see `actuator_lti.loops.periodic`.
+    ``rotor``: "free" or "locked"; with a locked one there is a current loop alone.
     """
 
     name: str
@@ -137,27 +129,17 @@ def loop_of(
 class Loops:
     """All loops of a design in one form at one operating point.
 
-    Attributes
-    ----------
-    current, velocity, position : Loop or None
-        Each broken at its own error, with the loops inside it closed (or open, see `inner_loops`) and those
-        outside it open; motor side;
-        ``None`` where the design has no such loop.
-    break_points : mapping of str to Loop
-        ``"u"``, ``"i_ref"``, ``"w_ref"``, ``"output"``, as far as they exist: the loop seen there, all other
-        loops closed. ``"output"`` is the angle fed back to the position controller (output shaft); a speed
-        estimated from the angle stays closed.
-    limiters : mapping of str to LimiterPath
-        By the names of `actuator_lti.drive.signals.LIMITERS`, as far as they exist: from the command to what
-        each limiter sees.
-    plain_response : PlainSystem, PlainDelaySystem or None
-        What `reference_to_output` is made of when it is first asked for.
-    moment_system : callable or None
-        Makes `moment_to_output`.
-    tick_system : TickSystem or None
-        The whole sampled closed loop, tick by tick (form ``"sampled"``).
-    period_s : float or None
-        Base period Ts; ``None`` where not sampled.
+    ``current``, ``velocity``, ``position``: each broken at its own error, with the loops inside it closed (or
+    open, see ``inner_loops``) and those outside it open; motor side; None where the design has no such loop.
+    ``break_points``: "u", "i_ref", "w_ref", "output", as far as they exist: the loop seen there, all other
+    loops closed. "output" is the angle fed back to the position controller (output shaft); a speed estimated
+    from the angle stays closed.
+    ``limiters``: a `LimiterPath` from the command to what each limiter sees, by the names of
+    `actuator_lti.drive.signals.LIMITERS`, as far as they exist.
+    ``plain_response``, ``moment_system``: what `reference_to_output` is made of when it is first asked for
+    (as of a `Loop`), and what makes `moment_to_output`.
+    ``tick_system``: the whole sampled closed loop, tick by tick (form "sampled").
+    ``period_s``: base period Ts; None where not sampled.
     """
 
     design: Design

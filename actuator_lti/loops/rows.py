@@ -13,8 +13,6 @@ class Row:
 
     A name that is not there has no influence, by structure and not by chance.
 
-    Examples
-    --------
     >>> e = Row.of("ref") - Row.of("th")
     >>> (2.0 * e + Row.of("th")).terms
     {'ref': 2.0, 'th': -1.0}

@@ -173,8 +173,6 @@ class Compliance:
 def compliance(design: Design, at: Operating | None = None) -> Compliance:
     """The compliance of a design, or of stacked designs, at an operating point (default: sliding).
 
-    Examples
-    --------
     >>> import numpy as np
     >>> from actuator_lti.design import load_design
     >>> fin = compliance(load_design("fin"))

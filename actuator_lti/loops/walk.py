@@ -19,7 +19,7 @@ from actuator_lti.design.law import Law, Matrices, twist_of
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block, Realisation
 from actuator_lti.drive.steady import standing_gain
-from actuator_lti.drive.wiring import ERRORS, Drive, present
+from actuator_lti.drive.wiring import ERRORS, LAW_OUTPUT, Drive, present
 from actuator_lti.loops.rows import Row, total
 
 INPUTS = ("ref", "torque", "moment", "cut")
@@ -35,8 +35,9 @@ class Program:
     drive: Drive
     # Outermost stage that runs; its reference is the input ``ref`` (of the position at the output shaft)
     outer: str
-    # A break point (``u``, ``i_ref``, ``w_ref``, ``output``) or an error (``e_i``, ``e_w``, ``e_th``) that is
-    # replaced by the input ``cut`` where it is updated; what arrives is the signal of that name
+    # A break point (``u``, ``i_ref``, ``w_ref``, ``output``), an error (``e_i``, ``e_w``, ``e_th``) or what a
+    # law of one's own gives (``law``) that is replaced by the input ``cut`` where it is updated; what arrives
+    # is the signal of that name
     cut: str | None = None
     opened: tuple[str, ...] = ()  # stages whose feedback is taken away; their controllers stay in the path
 
@@ -283,7 +284,8 @@ class Walk(ABC):
                 e["speed"] = self.speed_in_use(stage)
         inputs = [e.get(name, Row()) for name in law.inputs]
         matrices, names = self.own_matrices(law), [f"{stage}.x{k}" for k in range(1, len(law.A) + 1)]
-        return law.gain * self.linear(names, matrices.A, matrices.B, matrices.C, matrices.D, inputs)
+        value = law.gain * self.linear(names, matrices.A, matrices.B, matrices.C, matrices.D, inputs)
+        return self.at_cut(LAW_OUTPUT, value)
 
     def speed_in_use(self, stage: str) -> Row:
         """The measured speed as a stage has it."""

@@ -9,7 +9,7 @@ a measurement: `measured`.
 from actuator_lti.margins.engine import stability_margins
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement, DelayMargin, DiskMargin, GainMargin, PhaseMargin
-from actuator_lti.systems.measured_response import MeasuredResponse
+from actuator_lti.measured.response import MeasuredResponse
 
 __all__ = [
     "Agreement",

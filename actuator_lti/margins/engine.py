@@ -13,9 +13,9 @@ from actuator_lti.margins.measured.margins import measured_margins
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import Agreement
 from actuator_lti.margins.trust import Doubtful
-from actuator_lti.systems.measured_response import is_measured
+from actuator_lti.measured.response import is_measured
 
-MOST_STATES = 120  # of a loop for exact arithmetic, which takes the fifth power of their number
+MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minutes of 320
 
 
 def stability_margins(
@@ -33,43 +33,32 @@ def stability_margins(
     the exact polynomials where double precision does not place them. Stability is found twice where it can
     be, from closed-loop poles (behind a delay, from those without it) and from the Nyquist curve. Delays
     inside, and what double precision cannot check in this way, are worked out in exact arithmetic;
-    ``.evidence`` says how the answer is known. Quoted are, see
-    `StabilityMargins`: the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the
-    smallest delay margin (0 for an unstable loop), the smallest distance to -1.
+    ``.evidence`` says how the answer is known. Quoted are, see `StabilityMargins` (printing it shows units):
+    the gain margin nearest to 0 dB, the phase margin nearest to 0 deg with its sign, the smallest delay
+    margin (0 for an unstable loop), the smallest distance to -1.
 
-    Parameters
-    ----------
-    system : StateSpace, TransferFunction, DelaySystem or FrequencyResponseData
-        The open loop L, one input and one output, continuous or sampled. With ``dt=True`` the period counts
-        as 1 s. Measured data give bounds between neighbouring points and no verdict.
-    delay_s : float, optional
-        Exact extra delay in series, s. In a sampled loop whole samples become states; part of a sample is the
-        factor exp(-j w delay) up to the Nyquist frequency, where L jumps to its conjugate by way of the mean
-        of both, which may lie on the negative real axis and be a gain margin. The verdict is then that of the
-        Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
-    band_rad_s : tuple of float, optional
-        Where margins are listed. Default: everywhere, gain margins within 200 dB; under a delay, whose phase
-        crossovers never end, up to where the gain stays below -40 dB and for four turns of the delay, farther
-        where the nearest margin lies beyond, or nearer where that would be more than 1e5 turns
-        (``.band_rad_s`` of the result, and a note). The verdict, the modulus and the disk margin are those of
-        the whole axis in any case.
-    certify : bool, optional
-        Exact arithmetic in any case: rational loops, sampled ones with whole samples of delay, continuous
-        ones with exact delays. A fraction of a sample, measured data and state spaces of more than 120
-        states stay as they are.
+    ``system``: the open loop L, one input and one output, continuous or sampled: StateSpace,
+    TransferFunction, `DelaySystem` or FrequencyResponseData. With ``dt=True`` the period counts as 1 s.
+    Measured data give bounds between neighbouring points and no verdict.
 
-    Returns
-    -------
-    StabilityMargins
-        Printing it shows units.
+    ``delay_s``: exact extra delay in series. In a sampled loop whole samples become states; part of a sample
+    is the factor exp(-j w delay) up to the Nyquist frequency, where L jumps to its conjugate by way of the
+    mean of both, which may lie on the negative real axis and be a gain margin. The verdict is then that of
+    the Nyquist curve alone. As the part goes to 0 or 1 everything goes to what whole samples give.
 
-    Raises
-    ------
-    InputError
-        Not SISO, not finite, improper or not well posed (1 + L(inf) = 0), a direct feed-through of one or
-        more behind a delay (neutral type), data too coarse.
-    NumericalError
-        ``|L|`` is one at every frequency, or a search was not settled to its accuracy.
+    ``band_rad_s``: where margins are listed. Default: everywhere, gain margins within 200 dB; under a delay,
+    whose phase crossovers never end, up to where the gain stays below -40 dB and for four turns of the delay,
+    farther where the nearest margin lies beyond, or nearer where that would be more than 1e5 turns
+    (``.band_rad_s`` of the result, and a note). The verdict, the modulus and the disk margin are those of the
+    whole axis in any case.
+
+    ``certify``: exact arithmetic in any case: rational loops, sampled ones with whole samples of delay,
+    continuous ones with exact delays. A fraction of a sample, measured data and state spaces of more than 200
+    states stay as they are.
+
+    Raises `InputError`: for a loop that is not SISO, not finite, improper or not well posed (1 + L(inf) = 0),
+    a direct feed-through of one or more behind a delay (neutral type), data too coarse. Raises
+    `NumericalError`: if ``|L|`` is one at every frequency, or a search was not settled to its accuracy.
 
     Examples
     --------

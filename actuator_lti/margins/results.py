@@ -51,35 +51,18 @@ class StabilityMargins:
     - ``"withheld"``: 8 ulp of the entries change the verdict or the crossings, so the data do not determine
       them, or a search came to its end. The reason says which.
 
-    Attributes
-    ----------
-    stable : bool or None
-        Whether the closed loop is stable; a pole on the stability boundary is not stable.
-    verdict : str
-        ``"stable"``, ``"unstable"``, ``"on the border"`` or ``"undecided"``.
-    gain_margins, phase_margins, delay_margins : tuple
-        Every one in the band, in order of frequency.
-    period_s : float or None
-        Sampling period; ``None`` for a continuous loop.
-    delay_s : float
-        The extra delay that was asked for.
-    band_rad_s : tuple of float
-        Where the lists are complete: (0, inf), (0, Nyquist), or a stated band under delay.
-    method : str
-        How the crossings were found.
-    agreement : Agreement
-        The two ways to stability.
-    notes : tuple of str
-        What else has to be known to read the figures.
-    evidence : str
-        ``"certified"``, ``"checked"`` or ``"withheld"``.
-    evidence_reason : str
-        Why it is that: one line.
-    modulus_range : tuple of float or None
-        Measured data: where the modulus margin lies between the points and within the noise.
-    hidden_border_modes : int
-        Integrators and undamped modes that the loop neither drives nor sees: ``stable`` and the margins are
-        those of what is seen, `internally_stable` counts them.
+    ``stable``: whether the closed loop is stable; a pole on the stability boundary is not stable.
+    ``verdict``: "stable", "unstable", "on the border" or "undecided".
+    ``gain_margins``, ``phase_margins``, ``delay_margins``: every one in the band, in order of frequency.
+    ``period_s``: sampling period; None for a continuous loop.
+    ``delay_s``: the extra delay that was asked for.
+    ``band_rad_s``: where the lists are complete: (0, inf), (0, Nyquist), or a stated band under delay.
+    ``method``, ``agreement``: how the crossings were found, and the two ways to stability.
+    ``notes``: what else has to be known to read the figures.
+    ``evidence_reason``: why the evidence is what it is: one line.
+    ``modulus_range``: where the modulus margin of measured data lies between the points and within noise.
+    ``hidden_border_modes``: integrators and undamped modes that the loop neither drives nor sees: `stable`
+    and the margins are those of what is seen, `internally_stable` counts them.
     """
 
     stable: bool | None

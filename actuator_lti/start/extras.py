@@ -9,8 +9,6 @@ from actuator_lti.errors import InputError
 def need(module: str, extra: str, what: str) -> ModuleType:
     """Import a module of an extra of pyproject.toml; the refusal says that ``what`` needs it.
 
-    Examples
-    --------
     >>> need("math", "pdf", "a PDF").pi > 3
     True
     >>> need("no_such_module", "pdf", "a PDF")

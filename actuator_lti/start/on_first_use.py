@@ -13,8 +13,6 @@ def on_first_use(
 
     ``modules`` are modules of the package that are public themselves.
 
-    Examples
-    --------
     >>> load, _ = on_first_use("math_of_mine", {"sqrt": "math"})
     >>> load("sqrt")(9.0)
     3.0

@@ -8,11 +8,11 @@ import numpy as np
 
 from actuator_lti.margins.given import ULP
 from actuator_lti.margins.loop import RationalLoop, rational_loop
+from actuator_lti.measured.response import refuse_measured
 from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
 from actuator_lti.systems.delay_response import plain_behind_delay
-from actuator_lti.systems.measured_response import refuse_measured
 from actuator_lti.types import Real
 
 _SHOWN = 2000

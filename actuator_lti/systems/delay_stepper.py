@@ -43,8 +43,6 @@ MOST_PIECES = 400_000
 class DelayStepper:
     """Walks a system with delays forward in time from a state and an input; nothing moved before the start.
 
-    Examples
-    --------
     A step through 1/s behind a delay of 1 s: nothing, then a ramp.
 
     >>> from actuator_lti.systems.delay_system import DelaySystem

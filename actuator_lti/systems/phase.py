@@ -13,11 +13,11 @@ from actuator_lti.margins.exact.loop import exact_loop
 from actuator_lti.margins.factored import factored
 from actuator_lti.margins.given import Given, given_of
 from actuator_lti.margins.loop import RationalLoop, loop_of
-from actuator_lti.margins.measured.bounds import bounds
 from actuator_lti.margins.measured.margins import measured_points
 from actuator_lti.margins.trust import Doubtful
+from actuator_lti.measured.bounds import bounds
+from actuator_lti.measured.response import is_measured, measured_response
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
-from actuator_lti.systems.measured_response import is_measured, measured_response
 from actuator_lti.types import Real
 
 _AT_REST = 1e-10  # of the median: a root this near to zero is one at zero, beside which the side is rounding

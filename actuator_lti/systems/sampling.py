@@ -19,8 +19,6 @@ _MILD = 64.0  # norm up to which an exponential is squared seven times at most
 def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     """Whole ticks q and fraction f in [0, 1) of a delay d = (q + f) Ts; arrays for arrays.
 
-    Examples
-    --------
     >>> split_delay(3e-4, 1e-4), split_delay(1.5e-4, 1e-4)
     ((3, 0.0), (1, 0.5))
     """
@@ -122,8 +120,6 @@ class DelayedHold:
 def delayed_hold(A: np.ndarray, B: np.ndarray, B_T: np.ndarray, period_s: Any, delay_s: Any) -> DelayedHold:
     """Sample a plant exactly, its first input behind a hold with a delay, its second merely held.
 
-    Examples
-    --------
     An integrator with 1.25 ticks of delay: u two ticks ago acts for a quarter of the tick.
 
     >>> import numpy as np

@@ -72,8 +72,6 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
     analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are left out: not proven, but for
     those on the margins at the corners themselves.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> [corner.name for corner in corners(load_design("fin")).corners]
     ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']

@@ -14,10 +14,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.correlation import driving
 from analyses.correlation.compare import SignalComparison, compare_signals
+from analyses.correlation.following import followed, following_finding
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.differentiation import filtered_motion
 from analyses.records.inputs import InputUse, account
-from analyses.records.naming import KNOWN_UNITS
+from analyses.records.naming import KNOWN_UNITS, LOADS
 from analyses.records.record import Record, prepared
 from nonlinear import State, Trajectory, commands, simulate
 
@@ -92,10 +93,11 @@ def correlate_record(
         raise InputError(f"nothing to compare; known signals: {known}", where=record.name)
     with because({record.name: findings}):
         modelled, limits = model_signals(design, record, measured, notes, progress, command=command)
+    if (follows := followed(design, record, modelled, command)) is not None:
+        findings += (following_finding(design, follows),)
     driven = driving.needed_command(design, record, command)
     outermost = driven.stage == design.controller.outermost
-    load = driving.LOADS[design.axis]
-    used = dict.fromkeys(measured, "compared") | {load: "load", "enable": "enabled part"}
+    used = dict.fromkeys(measured, "compared") | {LOADS[design.axis]: "load", "enable": "enabled part"}
     used[driven.signal] = "command" if outermost else f"{driven.stage} command"
     if design.effective_motor.source_gain_Nm_V is None:
         used["supply"] = "supply"

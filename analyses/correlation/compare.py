@@ -1,13 +1,21 @@
 """One signal, measured and modelled: the figures that say how alike they are."""
 
 from dataclasses import dataclass, field
-from math import isnan
+from math import comb, isnan
 
 import numpy as np
 
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import best_lag
+from analyses.records.consistency import SURE
+from analyses.records.single_rows import NORMAL
+
+ORDERS = (1, 2, 4)  # of the differences in which noise shows
+LEAST_ROWS = 100
+CHANCE = (
+    5.26  # variance of s^2 by the fourth differences of n rows, times n over s^4: 2 sum (C(8, 4+k)/C(8, 4))^2
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,6 +27,7 @@ class SignalComparison:
     absolute difference, at ``max_error_time_s``; ``mean_error`` the mean of the absolute difference,
     ``rms_error`` its root mean square. ``delay_s`` is by how much the measured signal comes later
     than the model (negative: earlier), the shift that fits best; None where the signal does not tell.
+    ``noise_rms`` is the white noise that the measured signal shows from row to row, 0 where it shows none.
     """
 
     name: str
@@ -31,6 +40,7 @@ class SignalComparison:
     max_error: float
     max_error_time_s: float
     delay_s: float | None
+    noise_rms: float
     time_s: Floats = field(repr=False)
     measured: Floats = field(repr=False)
     modelled: Floats = field(repr=False)
@@ -39,6 +49,22 @@ class SignalComparison:
     def share_of_motion(self) -> float:
         """Norm of the difference over that of the measured about its mean; of a flat signal over its norm."""
         return self.relative_error if isnan(self.fit_percent) else 1.0 - self.fit_percent / 100.0
+
+    @property
+    def left_by_noise(self) -> float:
+        """The part of each error that the measured signal's own white noise does not explain, 0 to 1.
+
+        As much of the noise counts as there surely is, by chance in so many samples.
+        """
+        if not self.noise_rms:
+            return 1.0
+        sure = max(1.0 - SURE * np.sqrt(CHANCE / self.samples), 0.0)
+        return float(np.sqrt(max(1.0 - sure * (self.noise_rms / self.rms_error) ** 2, 0.0)))
+
+    @property
+    def share_beyond_noise(self) -> float:
+        """The share of the motion without that noise, which no model can have."""
+        return self.left_by_noise * self.share_of_motion
 
 
 def compare_signals(
@@ -49,8 +75,6 @@ def compare_signals(
     Raises `InputError`: for signals of different shape, fewer than two samples, values that are not finite,
     or a measured signal that is zero throughout.
 
-    Examples
-    --------
     >>> t = np.linspace(0.0, 1.0, 1001)
     >>> c = compare_signals("speed", "rad/s", t, np.sin(6.0 * (t - 0.01)), np.sin(6.0 * t))
     >>> round(c.delay_s, 4)
@@ -79,10 +103,35 @@ def compare_signals(
         max_error=float(abs(difference[worst])),
         max_error_time_s=float(time_s[worst]),
         delay_s=delay_between(time_s, measured, modelled),
+        noise_rms=white_noise(measured, difference),
         time_s=time_s,
         measured=measured,
         modelled=modelled,
     )
+
+
+def white_noise(measured: Floats, difference: Floats) -> float:
+    """The rms of the white noise in a measured signal; 0 where what changes from row to row is not white.
+
+    The k-th differences of white noise of variance s^2 have the variance C(2k, k) s^2, those of anything
+    slower less the higher k is (von Neumann, 1941). The noise is the least that the difference to the model
+    has by any of them, and no more than the measured signal alone shows, single rows aside (median). Of a
+    ripple the variances of higher orders differ beyond chance: no noise then.
+
+    >>> noise = 0.1 * np.random.default_rng(1).standard_normal(5000)
+    >>> slow = np.sin(np.linspace(0.0, 20.0, 5000))
+    >>> round(white_noise(slow + noise, 0.5 * slow + noise), 2), white_noise(slow, 0.5 * slow) < 1e-6
+    (0.1, True)
+    """
+    if len(difference) < LEAST_ROWS or not np.any(difference):
+        return 0.0
+    each = [float(np.mean(np.diff(difference, k) ** 2)) / comb(2 * k, k) for k in ORDERS]
+    spread = NORMAL * float(np.median(np.abs(np.diff(measured, ORDERS[-1]))))
+    own = spread**2 / comb(2 * ORDERS[-1], ORDERS[-1])
+    first, second, last = each
+    chance = SURE * np.sqrt(CHANCE / len(difference))
+    white = abs(last - second) <= chance * second and max(second, last) <= (1.0 + chance) * first
+    return float(np.sqrt(min(*each, own))) if white else 0.0
 
 
 def delay_between(time_s: Floats, measured: Floats, modelled: Floats) -> float | None:

@@ -15,11 +15,11 @@ from actuator_lti.drive.steady import steady_voltage_V
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
+from analyses.records.naming import LOADS
 from analyses.records.record import Record
 from nonlinear import State, commands, loads
 from nonlinear.loads import LoadMoment
 
-LOADS = {"rotary": "torque", "linear": "load_force"}
 STAGES = ("position", "velocity", "current", "voltage")
 COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
     ("rotary", "position"): ("reference",),
@@ -141,8 +141,6 @@ def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
 def steps_at(values: Floats, together: int = 1) -> Ints:
     """The first row behind each jump of the values, of at most so many ``together``, between standstills.
 
-    Examples
-    --------
     >>> values = np.array([0.0, 0.0, 1.0, 1.0, 1.0, 1.5, 2.0, 2.0])
     >>> steps_at(values).tolist(), steps_at(values, 2).tolist()
     ([2], [2, 5, 6])

@@ -66,7 +66,7 @@ def worst_of(results: Sequence[CorrelationResult]) -> tuple[CorrelationResult, S
 def moves_alike(result: CorrelationResult) -> bool:
     """Whether the model's motion, speed and drive each fit better than the measured mean: above 0 %."""
     told = [worst_of([result])[1], *(result[name] for name in BESIDE if name in result.signals)]
-    return all(signal.share_of_motion <= 1.0 for signal in told)
+    return all(signal.share_beyond_noise <= 1.0 for signal in told)
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Correlation:
         if any(finding.passed is False for one in self.records for finding in one.findings):
             return False
         signals = [signal for one in self.records for signal in one.signals.values()]
-        within = all(signal.share_of_motion <= self.limit for signal in signals)
+        within = all(signal.share_beyond_noise <= self.limit for signal in signals)
         return within and all(moves_alike(one) for one in self.records)
 
 

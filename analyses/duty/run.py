@@ -80,8 +80,6 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
 
     Raises `InputError`: for a drive without motor current or position loop, or a period of too many ticks.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> result = duty(load_design("joint"))
     >>> result.rms_A <= result.peak_A

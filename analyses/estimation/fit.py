@@ -19,7 +19,7 @@ class Fixed:
 
     value: float
     reason: str
-    # by how much each value that was found is too large where this one is too small by one
+    # by how much each value that was found grows with this one, where that grows by one
     moves: Mapping[str, float] = field(default_factory=dict)
     std: float = 0.0  # as the records tell it, beside its own tolerance
 
@@ -91,8 +91,6 @@ class Fit:
 
         A value that is not given is the sum of slopes times values.
 
-        Examples
-        --------
         >>> one = Fit(names=("a", "b"), values=np.array([1.0, 2.0]), covariance=np.diag([0.01, 0.04]))
         >>> both = one.mapped({"sum": {"a": 1.0, "b": 1.0}, "shifted": {"a": 10.0}}, {"shifted": 7.0})
         >>> both.values.tolist(), both.covariance.round(6).tolist()
@@ -107,8 +105,6 @@ class Fit:
     def refined(self, own: Fit) -> Fit:
         """The fit where some values were found anew, at all the others: with the error of these as well.
 
-        Examples
-        --------
         >>> wide = np.array([[0.04, 0.02], [0.02, 0.01]])
         >>> both = Fit(names=("a", "b"), values=np.array([1.0, 2.0]), covariance=wide)
         >>> again = Fit(names=("a",), values=np.array([1.1]), covariance=np.array([[0.01]]))

@@ -43,8 +43,6 @@ def told_apart(
 ) -> tuple[tuple[int, ...], tuple[NotTold, ...]]:
     """Which columns can be told apart (a share above ``least`` their own), the first named first.
 
-    Examples
-    --------
     >>> w = np.column_stack([np.arange(4.0), np.ones(4), np.ones(4), np.zeros(4)])
     >>> kept, left = told_apart(w, ("viscous", "dry", "offset", "load"))
     >>> kept, [f"{one.name} {one}" for one in left]
@@ -157,8 +155,6 @@ def autoregressive(values: Floats) -> tuple[Floats, float]:
 
     The order is that of the lowest information criterion of Akaike, up to ``10 log10 n``.
 
-    Examples
-    --------
     >>> rng = np.random.default_rng(1)
     >>> a, variance = autoregressive(lfilter([1.0], [1.0, -0.8], rng.standard_normal(20_000)))
     >>> round(float(a[1]), 1), round(variance, 1)
@@ -185,8 +181,6 @@ def between_records(values: Sequence[float], stds: Sequence[float] | Floats) -> 
 
     The scatter with which ``sum((x - mean)^2 / (std^2 + scatter^2))`` is one less than the number of records.
 
-    Examples
-    --------
     >>> round(between_records([1.0, 3.0], [1e-6, 1e-6]), 6)
     1.414214
     >>> between_records([1.0, 1.1], [1.0, 1.0])

@@ -63,8 +63,6 @@ PARAMETERS = {
 def parameter(name: str, axis: str = "rotary") -> Parameter:
     """A parameter by its name, with label and unit as an axis has them; a key of a design is its own label.
 
-    Examples
-    --------
     >>> parameter("inertia", "linear").label, parameter("dry", "linear").unit, parameter("map_0").key
     ('Mass', 'N', 'friction.point.1.torque')
     """

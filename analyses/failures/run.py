@@ -68,8 +68,6 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
     Raises `InputError`: for a drive whose closed loop is not stable, or a time of too many ticks. Raises
     `NumericalError`: if a run fails.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> result = failures(load_design("ilr33-amber"))
     >>> result.case("jam").at_detection_rad < result.case("hard-over").at_detection_rad

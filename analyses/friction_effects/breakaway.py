@@ -63,8 +63,6 @@ class StaticThreshold:
 def static_threshold(design: Design, load_Nm: float = 0.0) -> StaticThreshold:
     """Find the smallest command that moves the output at once.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> result = static_threshold(load_design("emps"))
     >>> round(1e6 * result.backward_rad, 3)  # um: (Fc - |offset|) and (Fc + |offset|) over the stiffness

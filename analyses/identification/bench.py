@@ -111,7 +111,7 @@ def identify_bench(
     made, refined = _made(start, right, both, settings, items, progress)
     again = tuple(resimulate(made, record, model.form) for record in (*right.records, *unseen))
     items += _unseen_items(start, model, unseen, limit)
-    items += [verdict.simulated_item(one.record, one.relative_error, limit, one.how) for one in again]
+    items += [verdict.simulated_item(one.record, one.beyond_noise, limit, one.how) for one in again]
     return BenchResult(
         records=right.records,
         validation=unseen,
@@ -221,7 +221,8 @@ def _made(
             made = to_design.with_correlations(made, both)
     except InputError as error:
         reasons = "; ".join(item.reason for item in items if item.passed is False)
-        raise InputError(f"{error.message} ({reasons})" if reasons else error.message, error.where) from None
+        message = f"{reasons}; so {error.message}" if reasons else error.message
+        raise InputError(message, error.where) from None
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)
@@ -279,6 +280,8 @@ def _items(
     model, records = right.model, right.records
     for name, result in findings.items():
         yield verdict.inputs_item(name, result)
+    for name, one in right.followed.items():  # before what comes of it
+        yield verdict.following_item(name, one)
     loaded = any(is_loaded(record) for record in records)
     yield verdict.size_item(design, compared, kept_constants=not settings.electrical, loaded=loaded)
     rows, least = model.rows_used, verdict.ROWS_EACH * len(model.names)
@@ -290,8 +293,6 @@ def _items(
     yield from verdict.lag_items(right.late_s, max(record.period_s for record in records))
     for record in records:
         yield from verdict.sampling_items(record)
-    for name, one in right.followed.items():
-        yield verdict.following_item(name, one)
 
 
 def _unseen_items(

@@ -17,7 +17,7 @@ from actuator_lti.design.units import ampere_unit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.parameters import default_value, own_share, parameter
+from analyses.estimation.parameters import default_value, own_share, own_std, parameter
 from analyses.identification.electrical import fit_electrical, without_own_bias
 from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
@@ -54,6 +54,7 @@ class DesignValue:
     ratio: float  # found over design's
     error: float  # standard error of that
     allowed: float  # relative standard deviation of the design's own number
+    assumed: bool = False  # the design states none
 
     @property
     def agrees(self) -> bool:
@@ -109,7 +110,8 @@ def _gravity_value(design: Design, model: JointModel) -> DesignValue | None:
         return None
     along = {name: share / size for name, share in slopes.items()}  # of one term alone: that over its share
     one = design_value(design, model.mapped({"gravity": along}), "gravity", gravity.peak_Nm)
-    return one and replace(one, allowed=own_share(design, "load.gravity.mass"))
+    key = "load.gravity.mass"
+    return one and replace(one, allowed=own_share(design, key), assumed=not own_std(design, key))
 
 
 def design_value(
@@ -126,6 +128,7 @@ def design_value(
         ratio=found / before,
         error=fit.std(name) / before,
         allowed=own_share(design, parameter(name).key, before),
+        assumed=not own_std(design, parameter(name).key),
     )
 
 
@@ -136,8 +139,6 @@ def cause(values: Sequence[DesignValue]) -> tuple[str, float, float] | None:
     chi-square says whether the rest is chance. None where chance explains all, no one cause does, or fewer
     than two of the values that it moves are off by themselves.
 
-    Examples
-    --------
     >>> names = ("inertia", "dry", "viscous")
     >>> off = [
     ...     DesignValue(name=n, design=1.0, found=0.8, ratio=0.8, error=0.01, allowed=0.05) for n in names
@@ -208,14 +209,14 @@ def kept_constant(design: Design, name: str, fit: Fit, shares: Floats, told: str
     if not each:
         return {}
     words = " and ".join(f"{part} of {', '.join(of)}" for part, of in each.items())
-    if len(each) == 1 and sum(map(len, each.values())) == len(fit.names):
+    if len(each) == 1 and sum(map(len, each.values())) == len(fit.names) > 1:
         words = f"{next(iter(each))} of every value"
     constants: MotorConstants = "peak-phase" if design.motor.constants == "peak-phase" else "rms-line"
     read = f"{constants.partition('-')[0]} read as DC: {1.0 / DC_PER_A[constants]:.2f} times"
     scale = f", nor the scale of the current ({read})" * (name == "torque_constant")
     value = parameter_value(design, parameter(name).key)
     reason = told or f"these records do not tell it{scale}: values and intervals are those at the design's"
-    moves = {n: -part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
+    moves = {n: part * fit[n] / value for n, part in zip(fit.names, shares.tolist(), strict=True)}
     in_model = getattr(design.effective_motor, CONSTANTS.get(name, ""), value)  # an AC motor's: A dc
     reason = f"{reason}; {100.0 * STEP:+.2g} % of it is {words}"
     return {name: Fixed(value=in_model, reason=reason, moves=moves)}

@@ -4,19 +4,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
-from analyses.correlation.driving import command_of
+from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.estimation.parameters import Parameter, parameter
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
-from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.consistency import SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
 
@@ -36,21 +35,6 @@ class Lag:
     @property
     def is_sure(self) -> bool:
         return abs(self.seconds) > SURE * self.standard_error
-
-
-@dataclass(frozen=True)
-class Followed:
-    """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it."""
-
-    stage: str  # that is commanded; behind a speed clock and scale are one
-    alike: float  # correlation of the recorded motion with the simulated one
-    clock: float  # of the following error, recorded over simulated
-    off: float = 0.0  # of what the position has too much of the motion
-
-    @property
-    def fails(self) -> bool:
-        """Whether they are off by more than an interval can hold."""
-        return self.alike < ALIKE or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +78,7 @@ def diagnosed(
             share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure])
             model = _widened(model, np.sqrt(share) * (model.values - before.values))
     pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
-    seen = {record.name: followed(start, record, like) for record, like in pairs}
+    seen = {record.name: followed(start, record, like.signals) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
         if not is_benchmark(record):
@@ -135,7 +119,9 @@ def _of_lag(signal: str, lag: Lag) -> Finding:
         return Finding(subject=subject, passed=True, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
-    return Finding(subject=subject, passed=None, text=f"{text}: taken back by as much before the fit")
+    return Finding(
+        subject=subject, passed=None, text=f"{text}: taken back by as much before the fit", done="taken back"
+    )
 
 
 def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[Finding], Floats]:
@@ -157,14 +143,14 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
         if "offset" in model.names:
             moved[model.names.index("offset"), model.names.index("offset")] += shift**2 / 3.0
     text = f"{' and '.join(told)}: the intervals hold it"
-    return [Finding(subject="drift along the record", passed=None, text=text)] if told else [], moved
+    return [
+        Finding(subject="drift along the record", passed=None, text=text, done="widened")
+    ] if told else [], moved
 
 
 def flat_tops(values: Floats) -> Mask:
     """Where a signal stands at its largest or smallest value for three samples or more.
 
-    Examples
-    --------
     >>> flat_tops(np.array([0.0, 2.0, 2.0, 2.0, 1.0, 1.0, 1.0, 0.0])).astype(int).tolist()
     [0, 1, 1, 1, 0, 0, 0, 0]
     """
@@ -195,7 +181,7 @@ def without_flat_tops(start: Design, record: Record, recipe: Recipe | None) -> t
     largest = f"{np.max(np.abs(record[name])):.4g} {KNOWN_UNITS.get(name, '')}".rstrip()
     text = f"{share:.2g} % of its samples stand at the largest value, {largest}, where "
     text += "the other rows say that it was larger: clipped; these rows are left out"
-    return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text)]
+    return without, [Finding(subject=f"{name} without flat tops", passed=None, text=text, done="left out")]
 
 
 def shifted(design: Design, record: Record, seconds: float) -> Record:
@@ -254,38 +240,3 @@ def _step(z: Floats, table: Floats, y: Floats) -> tuple[float, float]:
     gram, back = z.T @ z, np.linalg.inv(slopes)
     noise = gram @ covariance_of([information_of(z, y - table @ found)]) @ gram
     return float(found[-1] / size[-1]), float(np.sqrt((back @ noise @ back.T)[-1, -1]) / size[-1])
-
-
-def followed(design: Design, record: Record, simulated: Record) -> Followed | None:
-    """The motion behind a command as a clock: the loops' gains are per second, whatever the drive's torque.
-
-    Inertia, friction and gravity of a record whose clock runs wrong agree with each other, as its torque is
-    right and its motion only stretched. But a position loop T over a velocity loop lags by ``(v + i/Kp)/Kv``
-    (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
-    factor changes Kv by it, so the motion by ``T (command - motion)``; a scale of the position by a part of
-    the motion. Both are regressed together. A speed is followed one to one: there clock and scale are one.
-    Noise is in the recorded position alone. None where no such loop acts, or the motion does not tell.
-    """
-    design = record.drive(design)
-    control, driven = design.controller, command_of(design, record)
-    if driven is None or control.velocity is None or driven.stage not in ("position", "velocity"):
-        return None
-    at_output = driven.stage == "position" and control.position and control.position.sensor != "motor"
-    place = "position" if design.axis == "linear" else "output_angle" if at_output else "angle"
-    if place not in simulated.signals:
-        return None
-    own, model = record[place][: len(simulated)], simulated[place]  # of a long one the first part
-    columns = [model]
-    if driven.stage == "position" and control.position:
-        factor, lag = design.total_ratio if place == "angle" else 1.0, control.position.gain * record.period_s
-        error = factor * driven.values[: len(model)] - model
-        columns = [-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error), model]
-    table = np.column_stack([values - values.mean() for values in columns])
-    kept, _ = told_apart(table, ("clock", "motion")[-len(columns) :])
-    if 0 not in kept or not np.ptp(own):
-        return None
-    size = np.linalg.norm(table[:, kept], axis=0)
-    solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
-    shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
-    alike = float(np.corrcoef(own, model)[0, 1])
-    return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())

@@ -103,9 +103,10 @@ def _fitted(
     problem = _Problem(blocks, [name for name in names if name not in fixed], fixed)
     kept, left = told_apart(problem.columns(problem.free), problem.free)
     for one in left:
-        moved = " and ".join(f"{name} by {-factor:.3g} times it" for name, factor in one.moves.items())
+        moves = {name: -factor for name, factor in one.moves.items()}
+        moved = " and ".join(f"{name} by {factor:.3g} times it" for name, factor in moves.items())
         why = f"{one}: the design's value kept" + (f"; an error of it moves {moved}" if moved else "")
-        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=why, moves=one.moves)
+        fixed[one.name] = Fixed(value=default_value(design, one.name), reason=why, moves=moves)
     problem = _Problem(blocks, [problem.free[k] for k in kept], fixed)
     if not problem.free:
         raise InputError("nothing is left to fit: all parameters are fixed", where=blocks[0].name)
@@ -126,7 +127,7 @@ def _said(design: Design, problem: _Problem, negative: Mapping[str, float], mode
     """The model that says why some values are the design's, and holds what their errors move."""
     said = {}
     for name, value in negative.items():
-        moves = np.linalg.lstsq(problem.columns(model.names), problem.columns([name])[:, 0], rcond=None)[0]
+        moves = -np.linalg.lstsq(problem.columns(model.names), problem.columns([name])[:, 0], rcond=None)[0]
         said[name] = Fixed(
             value=model[name],
             reason="would come out negative: not determined, the design's value kept",

@@ -61,8 +61,6 @@ def friction_columns(
 def linear_basis(speed: Floats, knots: Sequence[float]) -> Floats:
     """Piecewise linear functions, one for each knot: 1 there and 0 at the others; the last slope continues.
 
-    Examples
-    --------
     >>> linear_basis(np.array([0.0, 1.0, 4.0]), (0.0, 2.0, 3.0)).tolist()
     [[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, -1.0, 2.0]]
     """

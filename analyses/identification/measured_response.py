@@ -182,7 +182,7 @@ def _hanging(start: Design, fit: ResponseFit, given: Mapping[str, Fixed], keys: 
     moves = moves.reshape(len(fit.names), len(kept))
     std = np.array([own_share(start, key, given[key].value) * given[key].value for key in kept])
     own = np.outer(std, std) * correlation_of(start, kept)
-    beside, more = -moves @ own, np.array([given[key].value for key in kept])
+    beside, more = moves @ own, np.array([given[key].value for key in kept])
     covariance = np.block([[fit.covariance + moves @ own @ moves.T, beside], [beside.T, own]])
     return Fit(names=(*fit.names, *kept), values=np.append(fit.values, more), covariance=covariance)
 

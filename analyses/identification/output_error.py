@@ -63,6 +63,7 @@ class Resimulated:
     record: str
     signal: str
     relative_error: float
+    beyond_noise: float  # the same without the white noise that the record itself shows
     how: str
 
 
@@ -217,7 +218,11 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
             error = signal.relative_error
             first = "" if len(part) == len(record) else f"its first {len(part)} rows "
             how = f"{name}, {first}simulated"
-            return Resimulated(record=record.name, signal=name, relative_error=error, how=how)
+            beyond = signal.left_by_noise * error
+            how += f", {100.0 * error:.3g} % with its white noise" if error - beyond > 1e-3 else ""
+            return Resimulated(
+                record=record.name, signal=name, relative_error=error, beyond_noise=beyond, how=how
+            )
         except InputError as refusal:  # a part that the simulator does not have
             why = f" ({refusal.message})"
     knots = [point.speed_rad_s for point in design.friction.map(1)] or None
@@ -225,7 +230,7 @@ def resimulate(design: Design, record: Record, form: FrictionForm) -> Resimulate
     rest = rows.y - rows.explained({name: default_value(design, name) for name in rows.names}, rows.names)
     error = float(np.linalg.norm(rest) / np.linalg.norm(rows.y))
     how = f"torque needed for its motion{why}"
-    return Resimulated(record=record.name, signal="drive", relative_error=error, how=how)
+    return Resimulated(record=record.name, signal="drive", relative_error=error, beyond_noise=error, how=how)
 
 
 def simulated_part(design: Design, record: Record) -> Record:

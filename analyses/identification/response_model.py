@@ -59,14 +59,15 @@ def loop_model(
     def blocks(wired: Drive) -> tuple[list[Block], Any]:
         if of == "closed":
             _, signal, every, _ = whole_path(wired)
-            return phase_blocks(
-                TickProgram(wired, wired.outermost), every, "ref", signal
-            ), every * wired.tick_s
+            program = TickProgram(wired, wired.outermost)
+            return phase_blocks(program, every, "ref", signal), every * wired.tick_s
         if name in wired.stages:
             return stage_blocks(wired, name), wired.period_s(name)
         return point_blocks(wired, name), wired.period_s(wired.producer(name))
 
-    top = 0.5 / blocks(wired)[1]
+    period_s = blocks(wired)[1]
+    measured.refuse_other_period(name, period_s)
+    top = 0.5 / period_s
     if not (last := measured.frequency_hz[-1]) < top:
         raise InputError(f"{last:g} Hz: the loop is sampled; allowed: below {top:g} Hz", measured.name)
     z = np.exp(1j * np.pi * measured.frequency_hz / top)[:, None, None]

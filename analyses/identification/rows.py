@@ -1,7 +1,7 @@
 """The rows of the regression that one record gives: motion, drive torque, load, rest left out."""
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -16,6 +16,7 @@ from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import place_of
 from analyses.records.differentiation import Motion, decimated
+from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record, lasting, period_of, prepared
 
 REST_SHARE = 0.005
@@ -52,7 +53,7 @@ def is_benchmark(record: Record) -> bool:
 
 def is_loaded(record: Record) -> bool:
     """Whether a record holds the load."""
-    return bool({"load_force", "torque"} & set(record.signals))
+    return any(name in record.signals for name in LOADS.values())
 
 
 def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
@@ -82,10 +83,9 @@ def drive_of(design: Design, record: Record) -> tuple[Floats, str, str, bool]:
 def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, str]:
     """Position, speed and acceleration at the motor, from the position or, without one, from the speed."""
     period = period_of(record)
-    place = place_of(design, record)
-    if place is not None:
+    if (place := place_of(design, record)) is not None:
         return recipe.motion(place[1], period), place[0]
-    rate = "velocity" if design.axis == "linear" else "speed"
+    rate = RATES[design.axis]
     if rate not in record.signals:
         wanted = "position or velocity" if design.axis == "linear" else "angle, output_angle or speed"
         raise InputError(f"no motion: {wanted} is needed", where=record.name)
@@ -102,7 +102,7 @@ def moment_of(
     Without a recorded one, that of the design's own moments and (with ``gravity``) pendulum at the recorded
     angle; the signal is then empty.
     """
-    name = "load_force" if design.axis == "linear" else "torque"
+    name = LOADS[design.axis]
     if name in record.signals:
         return record[name], name
     load = design.load if gravity else replace(design.load, gravity=None)
@@ -127,10 +127,61 @@ def record_rows(
     take the place of the form's dry and viscous friction.
     """
     record, shared = prepared(record), design
-    design = record.drive(shared)
-    period, free = period_of(record), design.load.path == "back-drivable"
-    _check(record, gravity and not free)
+    design, period = record.drive(shared), period_of(record)
+    _check(record, gravity and design.load.path != "back-drivable")
     recipe = recipe_for(record) if recipe is None else recipe
+    own = _balance(design, record, recipe, gravity=gravity)
+    motion, angle = own.motion, own.angle
+    names, columns = friction_columns(motion, form, knots_rad_s)
+    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
+    part = _part(motion, recipe)
+    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
+    sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
+    w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
+    names.append("load_coefficient")
+    if gravity:
+        names += ["gravity_sin", "gravity_cos"]
+        w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
+    table = np.column_stack(w)
+    if record.settings:  # the values looked for are those of the shared design
+        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
+    keep = _kept(record, motion, part, recipe)
+    return Rows(
+        name=record.name,
+        rows_in=record.counts.rows_in,
+        used=own.used,
+        notes=(*record.notes, own.note),
+        names=tuple(names),
+        w=table[keep],
+        y=y[keep],
+        sine=sine,
+        cosine=cosine,
+        speed=speed[keep],
+        acceleration=rows[keep, 0],
+        step_s=period * recipe.decimation,
+        keep=keep,
+        recipe=recipe,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Balance:
+    """The torques of a record's drive at every sample, less what the design knows of them."""
+
+    motion: Motion  # at the motor
+    angle: Floats  # of the output
+    drive: Floats  # at the motor
+    known: Floats  # moment at the output that the gears' friction takes a share of
+    used: Mapping[str, str]
+    note: str
+
+
+def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -> _Balance:
+    """The drive torque less known moments, cogging and what the load side takes.
+
+    ``gravity``: the pendulum is looked for, and not known.
+    """
+    free = design.load.path == "back-drivable"
     motion, place = motion_of(design, record, recipe)
     angle, sides = np.asarray(motion.position / design.total_ratio), None
     if design.coupling is not None:
@@ -152,43 +203,26 @@ def record_rows(
         own = design.load_side_inertia_kgm2 / ratio * sides.motor.acceleration / ratio
         drive = drive - (np.asarray(sides.torque / ratio - own) if free else 0.0)
         told, used = f"{told}, {sides.told}", {**sides.used, **used}
-    names, columns = friction_columns(motion, form, knots_rad_s)
-    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), known, drive]
+    return _Balance(
+        motion=motion, angle=angle, drive=drive, known=known, used=used, note=f"{place} and {told}"
+    )
+
+
+def _part(motion: Motion, recipe: Recipe) -> slice:
+    """The samples without those dropped at the start, and at the end of a record that ends in motion."""
     pace, skip = np.abs(motion.velocity), recipe.skip_end_samples
     in_motion = float(pace[-1]) > END_SHARE * float(np.max(pace)) and len(pace) > 4 * skip
-    part = slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
-    rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
-    sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
-    w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
-    names.append("load_coefficient")
-    if gravity:
-        names += ["gravity_sin", "gravity_cos"]
-        w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
-    table = np.column_stack(w)
-    if record.settings:  # the values looked for are those of the shared design
-        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
-    moving = ~_at_rest(motion.velocity, period)
+    return slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
+
+
+def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
+    """Which decimated rows are used: no sample at rest, or left out, lies close by."""
+    moving = ~_at_rest(motion.velocity, period_of(record))
     if record.left_out is not None:
         moving &= ~record.left_out
     near = 2 * recipe.decimation + 1
     apart = minimum_filter1d(moving[part].astype(np.uint8), near, mode="constant", cval=1) > 0
-    keep = apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]  # no sample at rest lies close by
-    return Rows(
-        name=record.name,
-        rows_in=len(record),
-        used=used,
-        notes=(*record.notes, f"{place} and {told}"),
-        names=tuple(names),
-        w=table[keep],
-        y=y[keep],
-        sine=sine,
-        cosine=cosine,
-        speed=speed[keep],
-        acceleration=rows[keep, 0],
-        step_s=period * recipe.decimation,
-        keep=keep,
-        recipe=recipe,
-    )
+    return apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]
 
 
 def _check(record: Record, locked: bool) -> None:

@@ -81,8 +81,6 @@ def find_steady_window(
 def moving_slope(time_s: Floats, values: Floats, samples: int) -> Floats:
     """Slope of the least-squares line over every ``samples`` neighbours, shape (n - samples + 1,).
 
-    Examples
-    --------
     >>> t = np.array([0.0, 0.1, 0.25, 0.3, 0.45, 0.5])
     >>> moving_slope(t, 3.0 * t + 1.0, 4).round(12).tolist()
     [3.0, 3.0, 3.0]

@@ -243,8 +243,6 @@ def contributions(
 
     By default at the paper's largest load and speed; ``values`` are C0 (N m), Cv (N m s/rad), CM.
 
-    Examples
-    --------
     >>> table = contributions(np.array([2.25e-3, 5.25e-6, 1.34e-3]))
     >>> [round(100.0 * term.share, 1) for term in table]
     [12.6, 27.6, 59.8]

@@ -12,10 +12,10 @@ from scipy.stats import chi2
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
+from analyses.correlation.following import Followed
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
-from analyses.identification.diagnosis import Followed
 from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
@@ -114,8 +114,11 @@ def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
 
 def sampling_items(record: Record) -> Iterator[Item]:
     """Whether the current is sampled fast enough for its mean between the samples to be known, and when."""
-    if any(note.startswith("resampled") for note in record.notes):
+    if record.as_read is not None:
         told = "irregular, assumed to be right: with jitter of the stamps the inertia comes out too small"
+        if lost := record.as_read.rows_missing:
+            grid = f"a regular grid of {1e3 * record.period_s:.6g} ms"
+            told = f"{lost} rows are missing on {grid}, filled by straight lines"
         label = f"{record.name}: times of the rows"
         yield Item(id=f"times-{record.name}", label=label, passed=None, reason=told)
     x = record.signals.get("current", np.zeros(0))
@@ -186,17 +189,7 @@ def offset_items(design: Design, fit: Fit) -> Iterator[Item]:
 def following_item(record: str, followed: Followed) -> Item:
     """Whether the record follows its command as the design's loops do at this motion."""
     label = f"{record}: the command is followed as by the design's loops"
-    id, clock, off = f"following-{record}", followed.clock, followed.off
+    id = f"following-{record}"
     if followed.alike < ALIKE:
-        return Item.of(id, label, f"the motion is not that of the command (correlation {followed.alike:.2f})")
-    scale = "counts a revolution, the reduction, or a unit"
-    what, ratio, of = "motion", 1.0 + clock, "which the loops make of the commanded speed"
-    cause = f"the clock, {scale}"
-    if abs(off) > RATE_TOLERANCE:
-        what, ratio, of = "recorded position", 1.0 + off, "which the loops follow the command with"
-        cause = scale
-    elif followed.stage == "position":
-        what, of = "following error", "of the design's loops at this motion"
-        cause = f"a clock about {100.0 * clock:+.2g} % off, a command logged early or late, or another gain"
-    reason = f"the {what} is {ratio:.4g} times that {of}: {cause}"
-    return share_item(id, label, max(abs(clock), abs(off)), RATE_TOLERANCE, reason)
+        return Item.of(id, label, followed.words)
+    return share_item(id, label, max(abs(followed.clock), abs(followed.off)), RATE_TOLERANCE, followed.words)

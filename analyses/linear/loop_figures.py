@@ -18,6 +18,7 @@ from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.bandwidth import Bandwidth, Peaks, closed_loop_bandwidth, peaks
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.operating import RotorState, pushes_away
+from actuator_lti.drive.plant import motor_plant
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import Loop, Loops
@@ -77,6 +78,7 @@ class LoopFigures:
     # Of an inner loop that is unstable only by itself, in a drive that is stable as a whole: the same loop as
     # `held_loop` holds it, which is stable
     held: LoopFigures | None = None
+    by_hold: bool = False  # unstable only as a torque over the angle is held over a tick
     locked: LoopFigures | None = None  # of a current loop with a free rotor, where it was asked for: locked
     # What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk
     mean: CommandMean | None = None
@@ -226,7 +228,43 @@ def all_loop_figures(
                 found = partial(loop_figures, kept, step=step, certify=certify)
                 held = one.locked or _if_there_is(found, [])
                 result[name] = replace(one, held=held if held is not None and held.stable else None)
-    return result
+    return _with_ticks_told(loops, result) if certify and locked else result
+
+
+MATTERS = 0.01  # of a margin
+
+
+def _with_ticks_told(loops: Loops, figures: dict[str, LoopFigures]) -> dict[str, LoopFigures]:
+    """The same with a note where the drive's own torques, held over a tick (model.md section 6), matter."""
+    plant = motor_plant(loops.design, loops.operating)
+    acting = [word for word, own in (("cogging", plant.torque), ("load torque", plant.moment)) if own]
+    if loops.form != "sampled" or not acting:
+        return figures
+    at_once = loops_at(
+        loops.design, replace(loops.operating, torques_at_once=True), loops.form, loops.inner_loops
+    )
+    others = all_loop_figures(at_once, step=False, refused=[])
+    why = f"if {' and '.join(acting)} acted at every instant, as in the motor"
+    held = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
+    for name, other in others.items():
+        if name in figures and (said := _differing(figures[name].judged.margins, other.judged.margins)):
+            notes = (*figures[name].notes, f"{name} loop: {said} {why}; {held}")
+            by_hold = figures[name].sound is False and other.sound is True
+            figures[name] = replace(figures[name], notes=notes, by_hold=by_hold)
+    return figures
+
+
+def _differing(margins: StabilityMargins, other: StabilityMargins) -> str:
+    """What matters of other margins."""
+    if other.stable is not margins.stable:
+        return "stable" if other.stable else "not stable"
+    words = {"gain margin": ("gain_margin_db", "dB"), "phase margin": ("phase_margin_deg", "deg")}
+    said = []
+    for what, (key, unit) in words.items():
+        here, there = getattr(margins, key), getattr(other, key)
+        if here is not None and there is not None and abs(there - here) > MATTERS * abs(there):
+            said.append(f"{what} {there:.4g} {unit}")
+    return " and ".join(said)
 
 
 def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures:

@@ -196,20 +196,23 @@ def operating_points(
     top = drive_figures(design).output_rate_rad_s * design.total_ratio
     speeds = [share * top for share in DESCRIBED_FRACTIONS] if described and 0.0 < top < np.inf else []
     for load in dict.fromkeys(design.validation.loads_Nm):
-        points.append(point(_at_rest(design), load, "rest"))
+        points.append(point(at_rest(design), load, "rest"))
         for speed in speeds:
             label = f"speed amplitude {speed:.3g} {'m/s' if linear else 'rad/s'}"
             points.append(point(label, load, "describing-function", speed))
     return tuple(points)
 
 
-def _at_rest(design: Design) -> str:
+AT_REST = "at rest"
+
+
+def at_rest(design: Design) -> str:
     """Rest in words: a stick has no slope, so its margins go with the speed that one is made over."""
     friction = design.friction
     if friction.law == "tanh" or not rubs(design):
-        return "at rest"
+        return AT_REST
     unit = "m/s" if design.axis == "linear" else "rad/s"
-    return f"at rest, dry friction over {friction.smoothing_speed_rad_s:.3g} {unit}"
+    return f"{AT_REST}, dry friction over {friction.smoothing_speed_rad_s:.3g} {unit}"
 
 
 def _budgets(design: Design, figures: Mapping[str, LoopFigures]) -> dict[str, DelayBudget]:

@@ -51,8 +51,6 @@ def loop_around(loops: Loops, outer: OuterLoop) -> Loop:
     Raises `InputError`: for a sampled system around continuous loops, one without a sampling period around
     sampled ones, or a period that is no whole multiple of that of the drive's outermost loop.
 
-    Examples
-    --------
     >>> import control
     >>> from actuator_lti import assemble_loops
     >>> airframe = control.ss([[-2.0]], [[60.0]], [[0.5]], [[0.0]])

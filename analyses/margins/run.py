@@ -13,7 +13,7 @@ from actuator_lti.files.response import Loop as Kind
 from actuator_lti.files.response import RecordedResponse, read_response
 from actuator_lti.loops import Loops, assemble_loops
 from actuator_lti.margins import StabilityMargins, stability_margins
-from actuator_lti.systems.measured_response import MeasuredResponse
+from actuator_lti.measured.response import MeasuredResponse
 from actuator_lti.types import Floats
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures, other_loops
 from analyses.linear.loop_survey import OperatingPointFigures, operating_points
@@ -62,9 +62,13 @@ class Measured:
 
     @property
     def nearer(self) -> tuple[str, float] | None:
-        """L, T or S of the model, where another one is less than half as far off, and how far in dB (rms)."""
-        models = _closed(self.open_model).items()
-        apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models}
+        """L, T or S of the model, where another one is less than half as far off, and how far in dB (rms).
+
+        Or what was measured with the other sign, ``-`` in front.
+        """
+        models = _closed(self.open_model)
+        models[f"-{self.of}"] = -models[self.of]
+        apart = {of: np.sqrt(np.mean(np.abs(np.log(self.measured / one)) ** 2)) for of, one in models.items()}
         best = min(apart, key=lambda of: apart[of])
         decibel = float(20.0 / np.log(10.0) * apart[best])
         return (best, decibel) if apart[best] < 0.5 * apart[self.of] else None
@@ -111,7 +115,7 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
         allowed = f"{', '.join(every)}, each with :T (closed loop) or :S (sensitivity) behind it, or without"
         raise InputError(f"--response-of {place}: allowed: {allowed}")
     loop, read = every[name], read_response(source, averages)
-    _refuse_other_period(source, name, loop.period_s)
+    read.refuse_other_period(name, loop.period_s)
     below = np.full(read.frequency_hz.size, True)
     if loop.period_s is not None:
         below = read.frequency_hz < 0.5 / loop.period_s
@@ -149,17 +153,6 @@ def measured_over(loops: Loops, source: Any, place: str = "", averages: int | No
 def _closed(L: np.ndarray) -> dict[str, np.ndarray]:
     """What may be measured of a loop, of its open loop: that, T and S."""
     return {"L": L, "T": L / (1.0 + L), "S": 1.0 / (1.0 + L)}
-
-
-def _refuse_other_period(source: Any, name: str, period_s: float | None) -> None:
-    """Refuse data that say another sampling period than that of the loop."""
-    said = getattr(source, "dt", None)
-    if said is None or said is True or said == 0 or period_s is None:
-        return
-    if abs(said - period_s) > 1e-6 * period_s:
-        raise InputError(
-            f"measured response: dt = {said:g} s; allowed: {period_s:g} s, of the {name} loop, or none"
-        )
 
 
 def _with_spread(omega: Floats, read: RecordedResponse, period_s: float | None) -> MeasuredResponse:
@@ -206,8 +199,6 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
 
     Raises `InputError`, `NumericalError`: where loops cannot be assembled as asked, or margins not be found.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> str(margins(load_design("emps")).verdict)
     'met'

@@ -75,8 +75,6 @@ def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
     passes scatters less than that of independent trials, so they are on the safe side. Clopper and Pearson
     1934, one-sided.
 
-    Examples
-    --------
     >>> round(clopper_pearson(300, 300)[0], 5)  # 0.05^(1/300)
     0.99006
     """
@@ -90,8 +88,6 @@ def clopper_pearson(passed: int, count: int) -> tuple[float, float]:
 def samples_needed(probability: float) -> float:
     """How many samples prove a probability if all pass: p^n <= 5 %; infinitely many for certainty.
 
-    Examples
-    --------
     >>> samples_needed(0.95), samples_needed(0.99), samples_needed(1.0)
     (59, 299, inf)
     """

@@ -7,6 +7,7 @@ import numpy as np
 
 from actuator_lti.bounds import TONES
 from actuator_lti.design.model import Design
+from actuator_lti.drive.operating import straight
 from actuator_lti.errors import InputError, whole_number
 from actuator_lti.types import Progress
 from analyses.motion.asked import KINDS, USUAL_CYCLES, Asked
@@ -30,8 +31,17 @@ class Motion:
 
     @cached_property
     def ended(self) -> Conduct:
-        """What it ends in."""
-        return conduct(self.run, self.design.validation.full_deflection_rad, self._passing_hz())
+        """What it ends in; of a drive that turns, without the torques that pass as well where it swings."""
+        passing = self._passing_hz()
+        own = conduct(self.run, self.design.validation.full_deflection_rad, passing)
+        if own.status != "limit cycle" or not passing:
+            return own
+        bare = motion(straight(self.design), replace(self.asked, csv=None, parquet=None)).ended
+        names = " and ".join(passing)
+        if bare.status == "becomes steady":
+            often = " and ".join(f"{hertz:.3g} Hz" for hertz in passing.values())
+            return replace(own, status="ripple", detail=f"{own.detail}, of the {names}, passing at {often}")
+        return replace(own, detail=f"{own.detail}; without the {names} {bare.status}, {bare.said}")
 
     def _passing_hz(self) -> dict[str, float]:
         """How often a period of each torque that bends with the angle passes at the commanded speed."""

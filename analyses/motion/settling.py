@@ -64,8 +64,6 @@ def counted(rest: Rest, full_deflection_rad: float) -> Rest:
 def settle(design: Design, load_Nm: float, step_rad: float) -> Settling:
     """Step and wait; the command is of the position loop.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> settle(load_design("ilr33-amber"), 8.0, 0.01).rest.verdict
     'at rest'
@@ -191,8 +189,6 @@ def ending_of(design: Design, swing: Settling) -> str:
 def words(rest: Rest, factor: float, unit: str) -> str:
     """Say what a motion ended in; ``factor`` takes the command's SI unit to ``unit``.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> words(settle(load_design("ilr33-amber"), 0.0, 0.01).rest, 57.3, "deg")
     'comes to rest'
@@ -264,8 +260,6 @@ def conduct(
     Swings that are too small beside full deflection (m on a linear axis) are rest. One as often as something
     passes at the commanded speed, cogging say, is its ripple.
 
-    Examples
-    --------
     >>> from nonlinear import commands, simulate
     >>> conduct(simulate("ilr33-amber", commands.step(0.01), duration_s=0.2)).status
     'comes to rest'

@@ -114,8 +114,6 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
     The plateau is the 95 % point of the magnitude, its floor the 1 % point. None where there is no rise: a
     flat signal, or one that is up from the beginning.
 
-    Examples
-    --------
     >>> t = np.arange(0.0, 10.0, 0.1)
     >>> start, lasts = motion_events(t, np.clip(t - 2.0, 0.0, 1.0))
     >>> round(start, 6), lasts

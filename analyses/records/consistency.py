@@ -14,8 +14,11 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
+from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
 from analyses.records.factors import explaining, named_factor, with_factor
-from analyses.records.record import Record
+from analyses.records.naming import RATES
+from analyses.records.record import DISORDER, Record
+from analyses.records.single_rows import impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
@@ -24,8 +27,10 @@ ONE_PHASE = (
     "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
     "between them it is not known, nor whether R or the scale of the current is off"
 )
-ALIKE = 0.9
 OVER = 1.2
+ROWS = "rows of the file"
+FEW_ROWS = 1e-3  # of a record: single ones; of more the unit is wrong, not the row
+BAD_ROW = "bad rows, take them out of the file"
 SMOOTH_HZ = 20.0
 IN_MOTION = 0.05
 LEAST_ROWS = 10  # smoothed and thinned, of a comparison
@@ -52,11 +57,17 @@ class Finding:
     passed: bool | None  # whether it agrees; None: not determined
     text: str
     unproven: bool = field(default=False, repr=False)  # not determined, so that it is open whether it agrees
+    done: str = ""  # what was done about it where it does not agree: put right, or held by the intervals
 
 
 def wrong_of(findings: Sequence[Finding]) -> str:
     """What contradicts, in words; empty where nothing does."""
     return "; ".join(f"{one.subject}: {one.text}" for one in findings if one.passed is False)
+
+
+def left_out_of(findings: Mapping[str, Sequence[Finding]]) -> list[str]:
+    """Sentences on rows that no result rests on, by record."""
+    return [f"{name}: {one.text}." for name, each in findings.items() for one in each if one.subject == ROWS]
 
 
 @contextmanager
@@ -77,25 +88,21 @@ def check_record(design: Design, record: Record) -> tuple[Finding, ...]:
     followed it, and current, speed, voltage, supply and load against the design's limits. A ratio that a
     known factor explains is named.
     """
-    checks = (_rate, _still, _clock, _steps, _reduction, _electrical, _command, _supply)
-    design = record.drive(design)
-    found = (*(check(design, record) for check in checks), *_limits(design, record))
+    design, as_read = record.drive(design), record.as_read or record
+    jumps = _jumps(design, as_read)
+    checks = [_rate, _still, _time, _clock, _steps, _reduction, _electrical, _sign, _command, _supply]
+    if jumps is not None:
+        checks.remove(_steps)
+    found = (_rows(as_read), jumps, *(check(design, record) for check in checks), *_limits(design, as_read))
     return tuple(result for result in found if result is not None)
 
 
 def place_of(design: Design, record: Record) -> tuple[str, Floats] | None:
     """The position at the motor and the signal that it comes from; None where none is recorded."""
-    if design.axis == "linear":
-        return ("position", record["position"]) if "position" in record.signals else None
-    if "angle" in record.signals:
-        return "angle", record["angle"]
-    if "output_angle" in record.signals:
-        return "output_angle", design.total_ratio * record["output_angle"]
+    for name in ("position",) if design.axis == "linear" else ("angle", "output_angle"):
+        if name in record.signals:
+            return name, record[name] * (design.total_ratio if name == "output_angle" else 1.0)
     return None
-
-
-def _rate_name(design: Design) -> str:
-    return "velocity" if design.axis == "linear" else "speed"
 
 
 def _smooth(record: Record, values: Floats) -> Floats:
@@ -114,14 +121,6 @@ def _moving(*signals: Floats) -> Mask:
 def _inner(record: Record) -> slice:
     """Without the twentieth part at both ends, where a filter starts and stops."""
     return slice(len(record) // 20, len(record) - len(record) // 20)
-
-
-def _ratio(y: Floats, x: Floats) -> tuple[float, float]:
-    """Slope of y over x through zero, and how alike they are (cosine); zeros for a flat signal."""
-    xx, yy = float(x @ x), float(y @ y)
-    if xx == 0.0 or yy == 0.0:
-        return 0.0, 0.0
-    return float(x @ y) / xx, float(x @ y) / np.sqrt(xx * yy)
 
 
 @dataclass(frozen=True)
@@ -144,7 +143,7 @@ class RateRatio:
 
 def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     """Speed against the rate of the position; None where one of them is not recorded, or nothing moves."""
-    place, name = place_of(design, record), _rate_name(design)
+    place, name = place_of(design, record), RATES[design.axis]
     if place is None or name not in record.signals:
         return None
     # over each interval the same filter on both, the slope first: they agree up to the ends, and a motion
@@ -155,12 +154,12 @@ def rate_ratio(design: Design, record: Record) -> RateRatio | None:
     first, last = (_smooth(record, values) for values in (record[name][:-1], record[name][1:]))
     speed = 0.5 * (first + last)
     moves = _moving(rate, speed)
-    found, alike = _ratio(speed[moves], rate[moves])
+    found, alike = ratio_of(speed[moves], rate[moves])
     low, high = -inf, inf
     x, y = (_thinned(record, values) for values in (rate, speed))
     if abs(alike) >= ALIKE and found > 0.0 and len(x) >= LEAST_ROWS:
         bent = np.gradient(np.gradient(rate)) / 12.0  # what a straight line between two samples leaves out
-        between = sum(abs(_ratio(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
+        between = sum(abs(ratio_of(off[moves], rate[moves])[0]) for off in (0.5 * (last - first), bent))
         low, high = _bounds(y, x, np.gradient(x), np.gradient(y))
         low, high = low - between, high + between
     return RateRatio(place[0], found, alike, low, high, rate, moves)
@@ -192,7 +191,7 @@ def _bounds(y: Floats, x: Floats, beside_x: Floats, beside_y: Floats) -> tuple[f
 
 
 def _rate(design: Design, record: Record) -> Finding | None:
-    ratio, name = rate_ratio(design, record), _rate_name(design)
+    ratio, name = rate_ratio(design, record), RATES[design.axis]
     if ratio is None:
         return None
     subject, off = f"{name} against the rate of the {ratio.place}", ratio.found - 1.0
@@ -205,14 +204,14 @@ def _rate(design: Design, record: Record) -> Finding | None:
     clock = f"{said}: a clock {100.0 * off:+.2g} % off, or the scale of one of them"
     if abs(off) <= RATE_TOLERANCE:
         noise = f"beyond their noise ({ratio.low:.4f} to {ratio.high:.4f})"
-        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it")
+        return Finding(subject, None, f"{clock}, {noise}: the intervals hold it", done="widened")
     named = with_factor(said, ratio.found, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
     return Finding(subject, False, clock if named == said else named)
 
 
 def _still(design: Design, record: Record) -> Finding | None:
     """A position that stands still while the speed says, beyond its noise, that it moves."""
-    place, name = place_of(design, record), _rate_name(design)
+    place, name = place_of(design, record), RATES[design.axis]
     if place is None or name not in record.signals or np.ptp(place[1]):
         return None
     speed, unit = record[name], "m" if design.axis == "linear" else "rad"
@@ -239,9 +238,26 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
     return ticks, abs(ticks - round(ticks)) <= TICK_TOLERANCE * ticks
 
 
+def _time(design: Design, record: Record) -> Finding | None:
+    """A unit of the time that the lag behind the command tells."""
+    place = place_of(design, record)
+    told = "" if place is None else wrong_time(design, record, place[1])
+    return Finding("time against the lag behind the command", False, told) if told else None
+
+
+def _sign(design: Design, record: Record) -> Finding | None:
+    """A current that would drive the other way; with a voltage, that says of which signal the sign is."""
+    place = place_of(design, record)
+    if place is None or not {"current"} <= record.signals.keys() or "voltage" in record.signals:
+        return None
+    smooth = (_smooth(record, values) for values in (record["current"], place[1]))
+    told = turned_current(design, record, smooth)
+    return Finding("current against the motion", False, told) if told else None
+
+
 def _clock(design: Design, record: Record) -> Finding | None:
     """Where no speed is recorded beside the position, only the tick tells of a clock that is off."""
-    if place_of(design, record) is not None and _rate_name(design) in record.signals:
+    if place_of(design, record) is not None and RATES[design.axis] in record.signals:
         return None
     ticks, whole = _ticks_a_row(design, record)
     if ticks < 1.0 - TICK_TOLERANCE or record.averaged > 1:
@@ -250,8 +266,36 @@ def _clock(design: Design, record: Record) -> Finding | None:
     if whole:
         told = f"{round(ticks)} tick(s); a clock that is off by a whole number of them is not seen here"
         return Finding(subject, True, told)
-    text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off; nothing else here tells"
+    text = f"{ticks:.5g} ticks: another recorder's clock, or one that is off"
     return Finding(subject, None, text + ": the intervals hold it" * bool(clock_doubt(design, record)))
+
+
+def _rows(record: Record) -> Finding | None:
+    """Rows left out as their time does not increase: more than single ones may be a run of their own."""
+    lost, rows = record.counts.dropped.get(DISORDER, 0), record.counts.rows_in
+    if lost <= FEW_ROWS * rows:
+        return None
+    told = f"{lost} of {rows} rows are left out, as their time does not increase"
+    told += f" ({record.counts.first_dropped[DISORDER]}): another run? It needs a file of its own"
+    return Finding(ROWS, None, told, unproven=True)
+
+
+def _jumps(design: Design, record: Record) -> Finding | None:
+    """Steps of the position that no speed within the limit makes in their time."""
+    place, rate = place_of(design, record), OVER * reachable_speed(design)
+    if place is None or not isfinite(rate) or record.averaged > 1:
+        return None
+    rows = impossible_steps(record, place[1], rate, SURE)
+    if not len(rows):
+        return None
+    unit = "m" if design.axis == "linear" else "rad"
+    jumps, few = named_rows(record, rows, place[0], unit, jumps=True), len(rows) <= FEW_ROWS * len(record)
+    told = (
+        f"the {place[0]} jumps {jumps}: more than the speed limit, {reachable_speed(design):.4g} {unit}/s at "
+    )
+    told += "the motor, allows in that time: "
+    told += BAD_ROW if few else "is the unit of the position or of the time right?"
+    return Finding(f"steps of the {place[0]} from row to row", False, told)
 
 
 def _steps(design: Design, record: Record) -> Finding | None:
@@ -295,7 +339,7 @@ def _other(record: Record, name: str, rate: Floats, moves: Mask) -> str:
     for other, values in record.signals.items():
         if other in (name, "angle", "output_angle", "position"):
             continue
-        if abs(_ratio(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
+        if abs(ratio_of(_smooth(record, values[1:])[moves], rate[moves])[1]) > 0.97:
             return f"; {other} is: are the columns of {name} and {other} swapped?"
     return ""
 
@@ -306,7 +350,7 @@ def _reduction(design: Design, record: Record) -> Finding | None:
     if not any(np.ptp(record[name]) > 0.0 for name in ("angle", "output_angle")):
         return None
     a, b = (record[name] - record[name].mean() for name in ("angle", "output_angle"))
-    ratio, alike = _ratio(a, design.total_ratio * b)
+    ratio, alike = ratio_of(a, design.total_ratio * b)
     subject = "angle against output angle"
     if abs(alike) < ALIKE:
         return Finding(subject, False, "they are not alike")
@@ -408,7 +452,7 @@ def _standing_current(design: Design, record: Record) -> str:
     if np.ptp(at) or not at[0] or speed is None or not np.any(speed) or design.motor.resistance_ohm is None:
         return ""
     u, w = (_smooth(record, values - values.mean()) for values in (record["voltage"], speed))
-    moves = float(np.std(u - _ratio(u, w)[0] * w)) / design.motor.resistance_ohm
+    moves = float(np.std(u - ratio_of(u, w)[0] * w)) / design.motor.resistance_ohm
     told = f"the current is {at[0]:.4g} A throughout, the voltage says that it moves by {moves:.2g} A rms"
     return told if moves > 0.5 * abs(at[0]) else ""
 
@@ -464,7 +508,7 @@ def _command(design: Design, record: Record) -> Finding | None:
         a, b = (part - part.mean() for part in (values, record[command]))
         if not np.ptp(record[command]):  # a step that begins with the record tells no ratio
             continue
-        ratio, alike = _ratio(a, b)
+        ratio, alike = ratio_of(a, b)
         subject = f"{answer} against its command"
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")
@@ -479,12 +523,16 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     """The largest value of a signal against a limit of the design."""
     if what not in record.signals or not isfinite(limit) or limit <= 0.0:
         return None
-    result = float(np.quantile(np.abs(record[what]), 0.999))
-    passed = result <= OVER * limit
-    text = f"{subject.partition(' ')[0]} up to {result:.4g} {unit}, the design's limit is {limit:.4g} {unit}"
+    size = np.abs(record[what])
+    most, usual = float(np.max(size)), float(np.quantile(size, 1.0 - FEW_ROWS))
+    rows = np.flatnonzero(size > OVER * limit + noise_bound(record[what], SURE))
+    passed, allowed = usual <= OVER * limit, f"the design's limit is {limit:.4g} {unit}"
+    if passed and len(rows):
+        return Finding(subject, False, f"{named_rows(record, rows, what, unit)}, {allowed}: {BAD_ROW}")
+    text = f"{subject.partition(' ')[0]} up to {most if passed else usual:.4g} {unit}, {allowed}"
     if not passed:
-        factor = explaining(result / limit, unit)
-        text += f", {result / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
+        factor = explaining(usual / limit, unit)
+        text += f", {usual / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
     return Finding(subject, passed, text)
 
 

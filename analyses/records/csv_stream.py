@@ -27,6 +27,8 @@ from analyses.records.spec import MISSING_TEXTS, CsvFormat, RecordSpec
 from analyses.records.table_record import Block, SiRows, record_of_rows
 
 BLOCK_BYTES = 1 << 22
+UTF_8 = CsvFormat().encoding
+BAD_ROWS = 'allowed: rows of numbers, or bad_rows = "drop" in a record file'
 _RUN_OF_BLANKS = re.compile(rb"[ \t]+")
 STAMP = re.compile(rb"(\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:?\d\d)?")
 """A time stamp of ISO 8601: to the second, its fraction, its zone."""
@@ -110,8 +112,8 @@ class _File:
             else:
                 counts.header += 1
                 try:
-                    cells = next(csv.reader([head.decode(layout.encoding)], delimiter=_separator(layout)))
-                except (UnicodeDecodeError, LookupError, csv.Error, StopIteration) as error:
+                    cells = next(csv.reader([text_of(head, layout.encoding)], delimiter=_separator(layout)))
+                except (LookupError, csv.Error, StopIteration) as error:
                     told = f"the line of column names cannot be read: {error}"
                     raise InputError(told, where=f"{self.origin}:{line}") from None
                 return tuple(cell.strip() for cell in cells), rest, line + 1
@@ -150,7 +152,7 @@ class _File:
     def _careful_rows(self, data: bytes, first_line: int) -> Block:
         """A cleaned block line by line: comments and blanks counted, every faulty row named or dropped."""
         layout, counts, header = self.spec.format, self.counts, self.counts.columns
-        text = data.decode(layout.encoding, errors="replace")
+        text = text_of(data, layout.encoding)
         rows, numbers = [], []
         for number, line in enumerate(text.removesuffix("\n").split("\n"), first_line):
             stripped = line.strip()
@@ -164,14 +166,30 @@ class _File:
                 try:
                     if len(cells) != len(header):
                         raise ValueError(f"{len(cells)} columns where {len(header)} are expected")
+                    if tuple(cell.strip().strip('"') for cell in cells) == header:
+                        raise ValueError("the line of column names once more")
                     rows.append([_number(cells[k], header[k], layout.decimal) for k in self.positions])
                     numbers.append(number)
                 except ValueError as error:
                     if self.spec.bad_rows == "error":
-                        raise InputError(str(error), where=f"{self.origin}:{number}") from None
+                        raise InputError(f"{error}; {BAD_ROWS}", where=f"{self.origin}:{number}") from None
                     counts.drop("not a row of numbers", f"line {number}, {error}")
         values = np.array(rows, dtype=np.float64).reshape(len(rows), len(self.positions))
         return Block(values=values, lines=np.array(numbers, dtype=np.int64))
+
+
+def text_of(data: bytes, encoding: str = UTF_8) -> str:
+    """Text in its encoding; what is no UTF-8, where that is the default, is Windows-1252.
+
+    Examples
+    --------
+    >>> text_of("Winkel [°]".encode("cp1252")), text_of("Winkel [°]".encode())
+    ('Winkel [°]', 'Winkel [°]')
+    """
+    try:
+        return data.decode(encoding)
+    except UnicodeDecodeError:
+        return data.decode("cp1252" if encoding == UTF_8 else encoding, errors="replace")
 
 
 def _line_blocks(stream: BinaryIO, origin: str, digest: hashlib._Hash) -> Iterator[bytes]:
@@ -251,8 +269,6 @@ class BoundedRows:
     of twice as many rows of the file. ``factor`` tells how many. A remainder shorter than ``factor`` at
     the end of the file becomes a row of its own, so no row is lost.
 
-    Examples
-    --------
     >>> rows = BoundedRows(columns=1, limit=4)
     >>> rows.add(np.arange(8.0).reshape(-1, 1))
     >>> rows.array()[:, 0].tolist(), rows.factor

@@ -35,8 +35,6 @@ def central_difference(values: Floats, period_s: float, points: int = 3) -> Floa
     Over three points it falls short by ``(w T)^2 / 6`` of a sine of frequency w, over seven by
     ``(w T)^6 / 140``; the outermost three samples have three points.
 
-    Examples
-    --------
     >>> t = np.arange(200) * 0.1
     >>> three, seven = (central_difference(np.sin(5.0 * t), 0.1, n)[100] / 5.0 for n in (3, 7))
     >>> [round(float(slope / np.cos(5.0 * t[100])), 3) for slope in (three, seven)]

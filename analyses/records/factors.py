@@ -29,8 +29,6 @@ def named_factor(ratio: float, more: Mapping[float, str] | None = None) -> str |
 
     The ratio is recorded over expected, its sign is told too; ``more`` are factors of the case at hand.
 
-    Examples
-    --------
     >>> named_factor(9.56)
     '60/2 pi (rpm read as rad/s, or the reverse)'
     >>> named_factor(-1.001), named_factor(1.18)
@@ -63,8 +61,6 @@ USUAL = {"A": (1e3,), "V": (1e3,), "rad/s": (60.0 / (2.0 * pi), 180.0 / pi, 2.0 
 def explaining(over: float, unit: str) -> str | None:
     """The usual factor of a unit that brings a value back below its limit, but not far below it.
 
-    Examples
-    --------
     >>> explaining(640.0, "A")
     '1000 (milli read as one, or the reverse)'
     """

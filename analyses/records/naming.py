@@ -58,6 +58,8 @@ SIGNALS = (
 
 KNOWN_UNITS = {"time": "s"} | {signal.name: signal.unit for signal in SIGNALS}
 MEANINGS = {signal.name: signal.meaning for signal in SIGNALS}
+RATES = {"rotary": "speed", "linear": "velocity"}  # of the motor, by the axis
+LOADS = {"rotary": "torque", "linear": "load_force"}
 TIME_NAMES = ("time", "t", "timestamp", "elapsed", "time_stamp")
 NOT_NEEDED = {"motor_angle": "m", "motor_position": "m"}
 """A trajectory of a linear axis holds its position twice."""
@@ -85,8 +87,6 @@ class ColumnName:
 def taken_apart(column: str) -> ColumnName:
     """Words and unit of a column name.
 
-    Examples
-    --------
     >>> taken_apart("Motor speed [rpm]").base, taken_apart("Motor speed [rpm]").unit
     ('motor_speed', 'rpm')
     >>> taken_apart("t/ms").unit, taken_apart("current_A").unit, taken_apart("Irms (A)").rms

@@ -11,7 +11,7 @@ from typing import Any
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import as_path, open_regular, read_campaign_toml, shown, shown_path
 from analyses.records.campaign_file import RECORDS, record_spec, refuse_design
-from analyses.records.csv_stream import STAMP
+from analyses.records.csv_stream import STAMP, text_of
 from analyses.records.inputs import spec_of_names
 from analyses.records.naming import is_unit
 from analyses.records.readers import TABLES, columns_of, load_mat, names_in, read_record
@@ -36,6 +36,8 @@ ODRIVE_SPEC = RecordSpec(
         SignalColumn(name="speed", column="velocity", unit="turn/s"),
     ),
 )
+BESIDE = ("file", "settings", "signals")
+BY_ROW = ("bad_rows", "missing", "disorder", "resample_tolerance")  # keys that describe no column
 HEAD_BYTES = 1 << 16
 UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 PACKED = (b"\x1f\x8b", b"PK", b"BZ", b"\xfd7")
@@ -105,12 +107,20 @@ def _described(path: Path) -> list[Record]:
         names: list[Any] = files if isinstance(files, list) and files else [files]
         if not all(isinstance(name, str) for name in names):
             raise own.fail("file", "a text, or a list of texts, is wanted")
-        rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
-        spec = record_spec(Table(rest, own.path, own.origin))
         told = tuple(f"set: {key} = {value}" for key, value in settings.items())
-        read = (read_record(path.parent / name, spec) for name in names)
+        read = (_read_as_told(path.parent / name, own) for name in names)
         result += [replace(one, settings=settings, notes=(*one.notes, *told)) for one in read]
     return result
+
+
+def _read_as_told(path: Path, own: Table) -> Record:
+    """A file as its table says; where that describes no column, the columns' own names do."""
+    if own.data["signals"] or not set(own) <= {*BESIDE, *BY_ROW}:
+        rest = {key: value for key, value in own.data.items() if key not in ("file", "settings")}
+        return read_record(path, record_spec(Table(rest, own.path, own.origin)))
+    known, _ = _spec_of_file(path, path.suffix.lower())
+    given = {key: getattr(known, key) for key in ("format", "time", "signals")}
+    return read_record(path, own.read(RecordSpec, beside=BESIDE, **given))
 
 
 def _settings(table: Table) -> dict[str, str | float]:
@@ -147,7 +157,7 @@ def _spec_of_file(path: Path, suffix: str) -> tuple[RecordSpec, Mapping[str, str
             data = stream.read(HEAD_BYTES)
         if data[:2] not in UTF_16 and (b"\0" in data or data[:2] in PACKED):
             raise InputError("is no text but binary or packed; allowed: " + RECORDS, where=shown_path(path))
-        head = data.decode("utf-8-sig", errors="replace")
+        head = text_of(data[: data.rfind(b"\n") + 1] or data).removeprefix("\ufeff")  # of whole lines
         if head.startswith("%Motor characterization data"):
             return ODRIVE_SPEC, {}
         columns, layout = _columns_of_csv(head)

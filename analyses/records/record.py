@@ -15,6 +15,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Mask
 
+DISORDER = "whose time does not increase"
 RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling accepted without being told to
 
 
@@ -61,8 +62,9 @@ class Record:
     ``time_s`` increases strictly and may be irregular; ``signals`` hold arrays of the same length in SI,
     ``units`` their SI units. ``averaged`` tells how many rows of the file were averaged into one where the
     file was too long to be held (1: none). ``inputs`` accounts for every column of the file.
-    ``left_out`` marks rows that no fit is to use. ``settings`` are keys of a design, with their values, that
-    were other than the design's while this record was taken.
+    ``left_out`` marks rows that no fit is to use. ``first_row`` is how many rows of the file come before the
+    first, ``as_read`` the record as it was before it was put on a grid (None: it is that). ``settings`` are
+    keys of a design, with their values, that were other than the design's while this record was taken.
     """
 
     name: str
@@ -77,6 +79,8 @@ class Record:
     inputs: tuple[InputColumn, ...] = ()
     resample_tolerance: float = RESAMPLE_TOLERANCE
     left_out: Mask | None = field(default=None, repr=False)
+    first_row: int = field(default=0, repr=False)
+    as_read: Record | None = field(default=None, repr=False)
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
 
     def drive(self, design: Design) -> Design:
@@ -108,11 +112,25 @@ class Record:
         steps = np.diff(self.time_s)
         return bool(np.all(np.abs(steps - np.median(steps)) <= 0.01 * np.median(steps)))
 
+    @property
+    def rows_missing(self) -> int | None:
+        """Rows missing on a regular grid on which all others are; None where they are on none."""
+        steps = np.diff(self.time_s) / self.period_s
+        whole = np.round(steps)
+        on_grid = np.all(np.abs(steps - whole) <= 0.01) and np.all(whole >= 1.0)
+        return int(np.sum(whole - 1.0)) if on_grid else None
+
     def slice(self, start: int, stop: int) -> Record:
         """Rows ``start:stop``."""
         cut = {name: values[start:stop] for name, values in self.signals.items()}
         left_out = None if self.left_out is None else self.left_out[start:stop]
-        return replace(self, time_s=self.time_s[start:stop], signals=MappingProxyType(cut), left_out=left_out)
+        return replace(
+            self,
+            time_s=self.time_s[start:stop],
+            signals=MappingProxyType(cut),
+            left_out=left_out,
+            first_row=self.first_row + start,
+        )
 
     def resampled(self) -> Record:
         """The record on a regular grid by linear interpolation, with the fact and its error noted.
@@ -128,11 +146,14 @@ class Record:
         gap = float(steps[widest] / period)
         errors = ((line_error(self.time_s, values, gap), name) for name, values in self.signals.items())
         error, worst = max(errors, key=lambda one: one[0])
-        note = f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
+        lost = self.rows_missing
+        note = f"{lost} rows missing on a regular grid: " if lost else ""
+        note += f"resampled to a period of {period:.6g} s by linear interpolation; longest step "
         note += f"{steps[widest]:.4g} s at {self.time_s[widest]:.4g} s, error up to "
         note += f"{100.0 * error:.2g} % of the range ({worst})"
         check_error(error, self.resample_tolerance, note, self.name)
-        return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=(*self.notes, note))
+        notes = (*self.notes, note)
+        return replace(self, time_s=grid, signals=MappingProxyType(cut), notes=notes, as_read=self)
 
 
 def check_error(error: float, tolerance: float, note: str, where: str) -> None:
@@ -191,8 +212,6 @@ def period_of(record: Record) -> float:
 def stretches(marked: Mask) -> list[tuple[int, int]]:
     """Where marked rows follow each other: the first, and the one after the last.
 
-    Examples
-    --------
     >>> stretches(np.array([True, False, False, True, True]))
     [(0, 1), (3, 5)]
     """

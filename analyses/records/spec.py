@@ -100,8 +100,6 @@ class SignalColumn:
     def terms(self, there: Collection[str]) -> tuple[tuple[float, str | int], ...]:
         """Sign and column of each part of a sum of columns, where the file has no such column itself.
 
-        Examples
-        --------
         >>> SignalColumn(name="voltage", column="u - pulses + 3rd").terms({"u", "pulses", "3rd"})
         ((1.0, 'u'), (-1.0, 'pulses'), (1.0, '3rd'))
         """
@@ -183,8 +181,6 @@ def unit_factor(unit: str, known: str | None, what: str) -> float:
 def to_si(signal: SignalColumn) -> tuple[float, str]:
     """The factor of ``raw + offset`` of one signal, and the SI unit of the result.
 
-    Examples
-    --------
     >>> factor, unit = to_si(SignalColumn(name="speed", column="n", unit="rpm"))
     >>> round(9000.0 * factor, 3), unit
     (942.478, 'rad/s')

@@ -11,7 +11,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import shown_path
 from actuator_lti.types import Floats, Ints, Mask
 from analyses.records.inputs import inputs_of
-from analyses.records.record import Record, RowCounts, check_error, line_error
+from analyses.records.record import DISORDER, Record, RowCounts, check_error, line_error
 from analyses.records.spec import RecordSpec, to_si, unit_factor
 
 
@@ -78,7 +78,7 @@ class SiRows:
                 block = self._kept(block, late, f"time below {times.minimum:g} {times.unit}")
             time = self._unwrapped(block.values[:, 0]) * self._factor
             keep = self._increases(time, block)
-            time, raw = time[keep], self._kept(block, keep, "whose time does not increase").values[:, 1:]
+            time, raw = time[keep], self._kept(block, keep, DISORDER).values[:, 1:]
         self._counts.rows_out += len(time)
         signals, first = [], 0
         for signal, factor in zip(spec.signals, self._factors, strict=True):
@@ -119,8 +119,11 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            message = f"time {time[k]:.9g} s does not come after {reached[k]:.9g} s; allowed: rising "
-            message += 'times, or disorder = "drop" in a record file'
+            message = (
+                f"time {time[k]:.9g} s does not come after {reached[k]:.9g} s; allowed: rising times: a "
+            )
+            message += 'file for each run; or disorder = "drop" in a record file, which leaves out this row '
+            message += "and all that follow up to the time that was reached"
             raise InputError(message, where=f"{self._origin}:{block.lines[k]}")
         return keep
 

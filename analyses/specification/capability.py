@@ -46,8 +46,6 @@ def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
     Copper heat goes with the square of the current, and the winding's time constant is taken as long against
     the manoeuvre.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> thermal_duty(load_design("ilr33-amber"), 8.0)
     0.25
@@ -188,8 +186,6 @@ def drive_figures(design: Design, load_Nm: float = 0.0) -> DriveFigures:
 
     Raises `InputError`: if the load is not finite.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> result = drive_figures(load_design("ilr33-amber"), load_Nm=8.0)
     >>> round(result.motor_current_A, 3), result.rate_limit

@@ -42,8 +42,6 @@ def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None
     is met is lost. ``None`` where no single gain within the factor `SPAN` does, or the view is no loop of
     `linear_figures`.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> from analyses.linear.loop_survey import survey_loops
     >>> from analyses.specification.weakest import weakest

@@ -149,8 +149,6 @@ def which_response(quantity: str, loop: str, to: ResponseTo = "command", design:
     with profile, filter and feed-forward, or to the reference behind profile and filter; of an inner loop,
     those of the feedback loop. Of ``design`` only the parts are named that it has.
 
-    Examples
-    --------
     >>> which_response("bandwidth", "position"), which_response("phase_margin", "position")
     ('of the response to the command: mean of its profile, filter and feed-forward included', '')
     """
@@ -188,8 +186,6 @@ def _verdict(
 def distance(requirement: Requirement, value: float) -> float:
     """Give the distance of a value to the nearer limit, in its unit, positive on the good side.
 
-    Examples
-    --------
     >>> distance(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0), 9.4)
     3.4000000000000004
     """

@@ -60,8 +60,6 @@ def sensitivities(design: Design, paths: Sequence[str] | None = None) -> Sensiti
 
     By default to every number of the plant and the controller that is not zero.
 
-    Examples
-    --------
     The position loop's crossover, and so its bandwidth, follows its gain:
 
     >>> from actuator_lti import load_design

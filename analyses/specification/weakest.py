@@ -52,8 +52,6 @@ class WeakPoint:
 def weakest(survey: LoopSurvey, corners: Corners | None = None) -> WeakPoint | None:
     """The weakest point of a drive; ``None`` where no margin is known.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> from analyses.linear.loop_survey import survey_loops
     >>> point = weakest(survey_loops(load_design("ilr33-amber")))

@@ -263,8 +263,6 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
 
     A spring that bends has them at each of its pieces that a load of ``validation.loads`` reaches.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> [f"{curve.state} {curve.static_Nm_rad:.0f}" for curve in stiffness_curves(load_design("fin"))]
     ['powered 1324', 'shorted 30', 'open 30']

@@ -198,8 +198,6 @@ def sampler_of(design: Design, *, seed: int = 0, table: Table | None = None) -> 
     Refused where nothing has a tolerance, where one reaches values that its key does not allow, or a
     correlation names a key that has none.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> sampler_of(load_design("ilr33-amber")).draw(5, 1).shape
     (1, 4)

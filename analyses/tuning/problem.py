@@ -222,8 +222,6 @@ _FORM = re.compile(r"\s*([a-z]+)\.([a-z_0-9]+)\s*(>=|<=)\s*(.+?)\s*")
 def read_requirement(words: str, design: Design) -> Requirement:
     """Read a requirement on a loop; what makes no sense is refused with what is allowed.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> result = read_requirement("position.bandwidth >= 30 Hz", load_design("ilr33-amber"))
     >>> result.id, result.minimum, result.unit

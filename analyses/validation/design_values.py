@@ -23,8 +23,6 @@ def design_value_rows(design: Design, model: Design | None = None) -> list[Row]:
 
     ``design`` is simulated, ``model`` (by default the same) predicted.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> rows = design_value_rows(load_design("ilr33-amber"))
     >>> {str(row.verdict) for row in rows}

@@ -72,22 +72,11 @@ def simulate_bench(
 ) -> tuple[TrueRun, ...]:
     """Simulate every run of a plan at the drive's own tick, and keep what falls on the log's period.
 
-    Parameters
-    ----------
-    design : Design
-        With a friction load path; its friction coefficients are what the campaign is to find.
-    plan : BenchPlan, optional
-    seed : int
-        Of the clutch's slow ripple (relative standard deviation ``plan.ripple``), the only chance in it.
-    progress : callable, optional
-        Called with (runs done, runs in all).
+    The design has a friction load path; its friction coefficients are what the campaign is to find. ``seed``
+    is that of the clutch's slow ripple (relative standard deviation ``plan.ripple``), the only chance in it.
 
-    Raises
-    ------
-    InputError
-        For a linear axis or a drive without a current.
-    NumericalError
-        If a run does not reach its speed, because a limit of the drive holds it back.
+    Raises `InputError`: for a linear axis or a drive without a current. Raises `NumericalError`: if a run
+    does not reach its speed, because a limit of the drive holds it back.
     """
     plan = BenchPlan() if plan is None else plan
     if design.axis != "rotary" or design.motor.torque_constant_Nm_A is None:

@@ -74,13 +74,7 @@ def write_bench(
     seed: int,
     progress: Callable[[int, int], None] | None = None,
 ) -> Path:
-    """Write the logs and ``campaign.toml``; the campaign file comes last, so that it names only whole files.
-
-    Returns
-    -------
-    Path
-        Of the campaign file.
-    """
+    """Write the logs and, last, ``campaign.toml``, whose path comes back: it names only whole files."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     bounds = BenchInstruments().bounds

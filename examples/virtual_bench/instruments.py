@@ -67,17 +67,9 @@ class RunLogs:
 def measure_bench(
     runs: tuple[TrueRun, ...], seed: int, instruments: BenchInstruments | None = None
 ) -> tuple[tuple[RunLogs, ...], DrawnErrors]:
-    """The logs of a campaign as recorded with one set of instruments.
+    """The logs of a campaign as recorded with one set of instruments, and their shared errors.
 
-    Parameters
-    ----------
-    runs : tuple of TrueRun
-    seed : int
-        Decides the shared errors, one child a run decides its noise and its sensor's clock.
-
-    Returns
-    -------
-    tuple of RunLogs, DrawnErrors
+    ``seed`` decides these, one child of it a run decides its noise and its sensor's clock.
     """
     instruments = BenchInstruments() if instruments is None else instruments
     first, *children = np.random.default_rng(seed).spawn(len(runs) + 1)

@@ -35,10 +35,8 @@ def plan_for(design: Design) -> TwoMassPlan:
     flank, the direction of motion and the current allow: rms a sixth of the mean torque in the coupling, a
     fifth of the speed, three tenths of the peak current.
 
-    Raises
-    ------
-    InputError
-        For a drive without a current loop or a coupling, or that a moment does not drive back.
+    Raises `InputError`: for a drive without a current loop or a coupling, or that a moment does not drive
+    back.
     """
     if design.controller.current is None or design.coupling is None or design.axis != "rotary":
         raise InputError("this bench needs a rotary drive with a current loop and a coupling", design.name)

@@ -44,10 +44,8 @@ class TwoMassPlan:
 def sweep_record(design: Design, plan: TwoMassPlan | None = None, *, seed: int = 0) -> Record:
     """The record of the multisine.
 
-    Raises
-    ------
-    InputError
-        For a drive without a current loop or without a coupling, or where the coupling leaves its flank.
+    Raises `InputError`: for a drive without a current loop or without a coupling, or where the coupling
+    leaves its flank.
     """
     from nonlinear import State, commands, simulate
 

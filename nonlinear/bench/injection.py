@@ -98,6 +98,8 @@ class Injection:
 
     def _read(self, s: Floats, p: Floats) -> Floats:
         """What comes back, negated; the output itself for command and load."""
+        if self.place == "current":  # cut at its controller's output: back-EMF feed-forward stays closed
+            return p[at.BACK_EMF_FEEDFORWARD] * s[:, at.S_MEASURED_SPEED] - s[:, self.read_at]
         if not self.at_start:
             return -s[:, self.read_at]
         if self.place == "command" and self.outermost != "position":

@@ -81,8 +81,6 @@ def operating_motion(design: Design) -> OperatingMotion:
     Raises `InputError`: if friction holds the drive whatever it does, or takes too much of a drive that
     cannot stand.
 
-    Examples
-    --------
     >>> from actuator_lti.design import load_design
     >>> result = operating_motion(load_design("ilr33-amber"))
     >>> result.speed_rad_s > 100.0, result.voltage_V < 0.5 * 12.0

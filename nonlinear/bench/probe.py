@@ -52,8 +52,6 @@ def fractional_delay(delay_samples: float) -> tuple[int, Floats]:
     Lagrange interpolation of degree 1 (delay below 1), 3 (below 2) or 5, its fraction in the middle of
     the taps where that is causal; the error at frequency w is about ``(w T/2)^(degree + 1)``.
 
-    Examples
-    --------
     >>> whole, taps = fractional_delay(0.25)
     >>> whole, taps.tolist()
     (0, [0.75, 0.25])

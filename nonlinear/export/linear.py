@@ -22,10 +22,11 @@ from nonlinear.export.linear_row import at_rest, set_off
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
 AT_SPEED, AT_CURRENT, AT_VOLTAGE = range(4, 7)  # break points of the closed drive; POSITION is the output's
+AT_LAW = 7  # what a law of one's own of the current gives, before feed-forward
 # the probe of each; -1: it is run through its command
 POINT = (
     layout.POINT_CURRENT, -1, layout.POINT_OUTPUT, -1,
-    layout.POINT_SPEED, layout.POINT_CURRENT, layout.POINT_VOLTAGE,
+    layout.POINT_SPEED, layout.POINT_CURRENT, layout.POINT_VOLTAGE, layout.POINT_VOLTAGE,
 )  # fmt: skip
 NO_LOOP, TOO_LONG, LOST = 0, -1, -2  # lost: no double holds what a tick gives
 MOST_TICKS = 16  # of a column that are noted
@@ -46,11 +47,14 @@ REMEMBERED = np.array([
 
 @kernel
 def cut_of(q, stage):
-    """Where the loop of a stage is cut: with a law of one's own at the break point that it drives."""
+    """Where the loop of a stage is cut: with a law of one's own at what that gives.
+
+    Only to that of the current something is added on the way to the break point that it drives.
+    """
     own = q[layout.OWN_STAGE]
     position = stage == POSITION and own == layout.OWN_POSITION
     if stage == CURRENT and own == layout.OWN_CURRENT:
-        return AT_VOLTAGE
+        return AT_LAW
     if position and q[layout.HAS_VELOCITY] > 0.0:
         return AT_SPEED
     if position or (stage == VELOCITY and own == layout.OWN_VELOCITY):
@@ -146,6 +150,8 @@ def seen_value(q, s, io, stage):
         return io[layout.IO_OUTPUT]
     if stage == AT_SPEED:
         return s[layout.S_SPEED_COMMAND]
+    if stage == AT_LAW:
+        return s[layout.S_VOLTAGE_BEFORE] - q[layout.BACK_EMF_FEEDFORWARD] * s[layout.S_MEASURED_SPEED]
     return s[layout.S_CURRENT_BEFORE] if stage == AT_CURRENT else s[layout.S_VOLTAGE_BEFORE]
 
 
@@ -251,10 +257,10 @@ def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
 
 @kernel
 def cut_here(q, stage):
-    """Put a probe in that lets nothing through but what is injected; a loop that is run closed has none."""
+    """Put a probe in that lets nothing through but what is injected, or all where the loop is run closed."""
     if POINT[stage] >= 0 and (stage != CURRENT or q[layout.HAS_VELOCITY] > 0.0):
         at = layout.PROBES + POINT[stage] * layout.PROBE_SIZE
-        q[at + layout.PROBE_ON], q[at + layout.PROBE_GAIN] = 1.0, 0.0
+        q[at + layout.PROBE_ON], q[at + layout.PROBE_GAIN] = 1.0, 1.0 if stage == AT_LAW else 0.0
 
 
 @kernel
@@ -277,5 +283,5 @@ def prepared(q, s, stage):
 
 @kernel
 def runs_closed(stage):
-    """Whether a loop is run closed, through the command of its own stage."""
-    return stage == CURRENT or stage == VELOCITY
+    """Whether a loop is run closed: through the command of its own stage, or beside what its law gives."""
+    return stage == CURRENT or stage == VELOCITY or stage == AT_LAW

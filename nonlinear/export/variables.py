@@ -161,8 +161,6 @@ def _of_key(key: Key, reference: int, causality: Causality, variability: str) ->
 def structured(path: str) -> str:
     """A dotted path in FMI's structured naming: numbers as indices, other names quoted.
 
-    Examples
-    --------
     >>> structured("control.velocity.filter.1.depth")
     'control.velocity.filter[1].depth'
     """

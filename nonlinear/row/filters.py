@@ -36,8 +36,6 @@ def section(item: Filter, period_s: Any, where: str = "") -> Section:
     Raises `InputError`: for a missing value, a frequency at or above pi/T, or a biquad that does not fit or
     is unstable.
 
-    Examples
-    --------
     >>> from actuator_lti.design.model import Filter
     >>> notch = Filter(kind="notch", frequency_rad_s=640.0, width_rad_s=320.0, depth=0.1)
     >>> [round(float(x), 12) for x in section(notch, 2e-4)]  # a notch at 640 rad/s

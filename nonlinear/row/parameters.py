@@ -28,8 +28,6 @@ STAGES = ("current", "velocity", "position")  # in the order of the kernel's num
 def split_delay(delay_s: Any, period_s: Any) -> tuple[Any, Any]:
     """Whole ticks and the rest in seconds of a computing delay; a rest below 1e-9 of a tick is none.
 
-    Examples
-    --------
     >>> [float(x) for x in split_delay(3e-4, 1e-4)]
     [3.0, 0.0]
     """

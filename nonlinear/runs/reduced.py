@@ -23,8 +23,6 @@ def whole_periods(
     It is off by at most half a tick over the window, 0.13 % with 400 ticks; behind it ticks and periods of
     that.
 
-    Examples
-    --------
     >>> whole_periods(333.0, 1e-4)
     (333.3333333333333, 420, 14)
     """

@@ -51,8 +51,6 @@ class Running:
     ``start``: the state that it began in.
     ``work``: ticks that `advance` went on by, and integration steps within them.
 
-    Examples
-    --------
     >>> from actuator_lti import load_design
     >>> from nonlinear.rows import Rows
     >>> rows = Rows.of(load_design("ilr33-amber"))

@@ -60,35 +60,19 @@ _RANGED = [1, at.HISTORY_ANGLE, 3, 4, 5, 6]  # both angles, currents, voltage, c
 class Rest:
     """What a motion ends in; angles at the output, in the unit of the outermost stage's command.
 
-    Attributes
-    ----------
-    verdict : {"at rest", "limit cycle", "still moving", "diverging"}
-    error : float
-        Command less what follows it, at the end; of a limit cycle the mean between its ends.
-    amplitude, motor_amplitude : float
-        Half the span of what follows the command, and of the motor's own angle over the reduction (speed, for
-        a speed drive), over the cycle that returned, else in the last half of the work; 0 at rest.
-    frequency_hz : float or None
-        Of a limit cycle.
-    periods : int
-        Whole swings seen.
-    limited : tuple of str
-        Limiters that act in the last half of the work.
-    after_s : float
-        From the start of the judgement to its end, waits that were leapt over included.
-    work : int
-        Ticks gone through, and integration steps within them.
+    An amplitude is half the span of what follows the command, or of the motor's own angle over the reduction
+    (speed, for a speed drive), over the cycle that returned, else in the last half of the work; 0 at rest.
     """
 
     verdict: Verdict
-    error: float
+    error: float  # command less what follows it, at the end; of a limit cycle the mean between its ends
     amplitude: float
     motor_amplitude: float
-    frequency_hz: float | None
-    periods: int
-    limited: tuple[str, ...]
-    after_s: float
-    work: int
+    frequency_hz: float | None  # of a limit cycle
+    periods: int  # whole swings seen
+    limited: tuple[str, ...]  # limiters that act in the last half of the work
+    after_s: float  # from the start of the judgement to its end, waits that were leapt over included
+    work: int  # ticks gone through, and integration steps within them
 
     @property
     def comes_to_rest(self) -> bool:
@@ -104,8 +88,6 @@ def judge(running: Running, most_work: int = MOST_WORK) -> Rest | None:
     passes it. None where command, load or supply still change of themselves. Noise is left out: it is no
     cycle.
 
-    Examples
-    --------
     >>> from nonlinear import commands, simulate
     >>> judge(simulate("ilr33-amber", commands.step(0.01), 0.05).running).verdict
     'at rest'

@@ -125,6 +125,17 @@ class Overview:
         return "; ".join([said, *(f"{one.name}: {STATES[one.state][1]}" for one in apart)])
 
     @property
+    def said_of_all(self) -> str:
+        """What it says that all designs pass: of requirements that are stated, of a night to compare with."""
+        parts = [f"All {len(self.alone)} designs are built"]
+        stated = any(one.result.total for one in self.alone)
+        parts += ["meet their requirements"] * stated
+        compared = (one.baseline.run for one in self.alone)
+        parts += ["are no worse than the baseline"] * any(run and run.id < self.run.id for run in compared)
+        words = " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
+        return words if stated else f"{words}; no requirement is stated"
+
+    @property
     def passed(self) -> bool:
         """Whether every design was built, meets its requirements and is as approved."""
         return all(d.state == "pass" for d in self.designs)

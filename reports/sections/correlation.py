@@ -5,6 +5,7 @@ from dataclasses import replace
 from analyses.correlation.closed_loop import CorrelationResult
 from analyses.correlation.compare import SignalComparison
 from analyses.correlation.run import BESIDE, Correlation, SignalSummary, moves_alike, worst_of
+from analyses.records.consistency import left_out_of
 from analyses.records.naming import MEANINGS
 from reports import document as doc
 from reports.charts import style
@@ -42,7 +43,8 @@ def words(whole: Correlation) -> str:
     """One sentence: how far the motion is off, the signal furthest off, and what contradicts."""
     results, limit = whole.records, whole.limit
     wrong = [(r.record, f) for r in results for f in r.findings if f.passed is False]
-    parts = [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
+    parts = left_out_of({one.record: one.findings for one in results})
+    parts += [f"{record}: {outcome.subject}: {outcome.text}." for record, outcome in wrong[:2]]
     result, motion = worst_of(results)
     where = f" ({result.record})" if len(results) > 1 else ""
     beside = [result[name] for name in BESIDE if name in result.signals and name != motion.name]
@@ -55,10 +57,10 @@ def words(whole: Correlation) -> str:
     )
     apart = [one.record for one in results if not moves_alike(one)]
     parts += [f"{record}: a fit below 0 %, the model moves otherwise." for record in apart]
-    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_of_motion)
-    beyond = far.share_of_motion > limit
+    far = max((s for r in results for s in r.signals.values()), key=lambda s: s.share_beyond_noise)
+    beyond = far.share_beyond_noise > limit
     side = "Above" if beyond else "Within"
-    parts.append(f"{side} the limit of {100.0 * limit:g} %: {_named(far.name).lower()} {_share(far)}.")
+    parts.append(f"{side} the limit of {100.0 * limit:g} %: {_named(far.name).lower()} {_beyond_noise(far)}.")
     if not (wrong or beyond or apart):
         parts.append("No record contradicts itself or the design.")
     return " ".join(parts)
@@ -66,6 +68,14 @@ def words(whole: Correlation) -> str:
 
 def _share(signal: SignalComparison) -> str:
     return f"{show(100.0 * signal.share_of_motion, 'sig:3')} %"
+
+
+def _beyond_noise(signal: SignalComparison) -> str:
+    """What is held against the limit, and what was taken off."""
+    if 100.0 * (signal.share_of_motion - signal.share_beyond_noise) < 0.1:
+        return _share(signal)
+    noise = f"white noise of the record, {show(signal.noise_rms, 'sig:3')} {signal.unit} rms"
+    return f"{show(100.0 * signal.share_beyond_noise, 'sig:3')} % beyond the {noise}"
 
 
 def _summary(whole: Correlation) -> doc.Section:

@@ -1,7 +1,7 @@
 """Limit cycles of play and quantisation: predicted by describing function, then sought by simulation."""
 
 from actuator_lti.asked.verdict import Verdict
-from analyses.limit_cycles.run import AS_PREDICTED, LimitCycles
+from analyses.limit_cycles.run import AS_PREDICTED, CYCLES_WATCHED, LimitCycles
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, acting, judged_by, verdict_of, words
 from reports import document as doc
 from reports.sections.names import Unit, fine_unit, load_unit
@@ -65,6 +65,8 @@ def _predicted(result: LimitCycles, fine: Unit) -> doc.Block:
         "out or by its own describing function, as the column says; no limit acts. Confirmed: amplitude and "
         f"frequency are both within a factor of {AS_PREDICTED:g} of the predicted."
     )
+    if not all(one.tried for one in result.confirmations):
+        note += f" Not tried: {CYCLES_WATCHED} periods take more ticks than are simulated at once."
     return doc.listing("Predicted limit cycles, at the output", result.confirmations, columns, note)
 
 

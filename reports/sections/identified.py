@@ -13,6 +13,8 @@ from reports import document as doc
 from reports.numbers import show
 from reports.verdict_summary import BENCH_CHECKS
 
+HANGS = 0.5  # relative change of a value over that of what is kept: it hangs on that more than on the record
+
 
 def judged(
     id: str, title: str, found: Identified, blocks: Sequence[doc.Block], *, result: str, intro: str
@@ -50,12 +52,24 @@ def value_words(fit: Fit, name: str, axis: str = "rotary") -> str:
 
 
 def constant_words(fit: Fit, axis: str = "rotary") -> str:
-    """The constant of the design at which all values are, after them; empty where there is none."""
-    if (given := given_constant(fit)) is None:
-        return ""
-    one = parameter(given, axis)
-    label = one.label[:1].lower() + one.label[1:]
-    return f", all at the design's {label}, {show(fit[given], 'sig:4')} {one.unit}"
+    """What is kept of the design and all values hang on, after them; empty where there is nothing.
+
+    The constant that makes torques; of a run-down, whose motor makes none, the friction that is kept.
+    """
+
+    def share(name: str) -> float:
+        """The largest relative change of a value over that of what is kept."""
+        one = fit.fixed[name]
+        return max((abs(move * one.value / fit[n]) for n, move in one.moves.items() if fit[n]), default=0.0)
+
+    hang = [name for name in fit.fixed if share(name) > HANGS]
+    if not hang and (given := given_constant(fit)) is not None:
+        hang = [given]
+    told = []
+    for one, name in ((parameter(name, axis), name) for name in hang):
+        label = one.label[:1].lower() + one.label[1:]
+        told.append(f"{label}, {show(one.scale * fit[name], 'sig:4')} {one.unit}")
+    return f", all at the design's {' and '.join(told)}" if told else ""
 
 
 def parameter_table(
@@ -107,7 +121,7 @@ def finding_table(record: str, findings: Sequence[Finding]) -> doc.Block:
     words = {True: "yes", False: "NO", None: "not told"}
     columns = [
         doc.of("subject", "subject", "Looked at"),
-        doc.of(lambda one: words[one.passed], "state", "Agrees"),
+        doc.of(lambda one: one.done or words[one.passed], "state", "Agrees"),
         doc.of("text", "text", "Found"),
     ]
     return doc.listing(

@@ -6,13 +6,14 @@ import numpy as np
 
 from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.bench import BenchResult
-from analyses.identification.design_values import given_constant
+from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.friction_map import LawChoice
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
+from analyses.records.consistency import left_out_of
 from reports import document as doc
 from reports.charts import style
-from reports.numbers import capital
+from reports.numbers import capital, show
 from reports.sections import identified
 from reports.sections.names import speed_unit
 
@@ -68,11 +69,12 @@ def _result(result: BenchResult, axis: str) -> str:
         ]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
-    worst = max(result.resimulated, key=lambda one: one.relative_error)
+    worst = max(result.resimulated, key=lambda one: one.beyond_noise)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
     words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
-    return f"{capital(words)} {100.0 * worst.relative_error:.3g} % ({worst.how})."
+    words = f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
+    return " ".join([*left_out_of(result.findings), words])
 
 
 def _intro(result: BenchResult) -> str:
@@ -106,6 +108,10 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
     return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 
 
+def _own_share(one: DesignValue) -> str:
+    return show(100.0 * one.allowed, "sig:2") + " assumed" * one.assumed
+
+
 def _against_design(result: BenchResult) -> doc.Block:
     """Each number beside what the records say of it; those that the design keeps at the end."""
     model, axis, values = result.model, result.design.axis, result.design_values
@@ -116,7 +122,7 @@ def _against_design(result: BenchResult) -> doc.Block:
         doc.of(lambda one: parameter(one.name, axis).unit, "unit", "Unit"),
         doc.of("ratio", "ratio", "Records over design", format="sig:4"),
         doc.of("error", "error", "Standard error", format="sig:2"),
-        doc.of("allowed", "allowed", "Design's own uncertainty", "%", scale=100.0, format="sig:2"),
+        doc.of(_own_share, "allowed", "Design's own uncertainty", "%"),
         doc.of(lambda one: "yes" if one.agrees else "no", "agrees", "Agrees"),
     ]
     note = (

@@ -10,7 +10,7 @@ from actuator_lti.files.tree import Tree
 from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.finite import finite
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
-from analyses.linear.loop_survey import OperatingPointFigures
+from analyses.linear.loop_survey import AT_REST, OperatingPointFigures, at_rest
 from analyses.margins.run import Margins
 from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
@@ -102,7 +102,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}. {judged['result']}"
+    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}{_hold(result)}. {judged['result']}"
     if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
         said += " Judged on the sampled loops with sliding friction."
     return [{**made, "result": said + _below_custom(result)}, judged]
@@ -140,13 +140,32 @@ def _below_custom(result: Margins) -> str:
 
 
 def _where(result: Margins) -> str:
-    return f"{result.asked.operating_point}, load {result.asked.load_Nm:g} {load_unit(result.design)}"
+    point, load = result.asked.operating_point, f"load {result.asked.load_Nm:g} {load_unit(result.design)}"
+    return f"{at_rest(result.design) if point == 'rest' else point}, {load}"
 
 
 def _notes(result: Margins, named: Mapping[str, LoopFigures]) -> list[str]:
     own = [note for one in named.values() for note in (*one.margins.notes, *one.notes)]
     around = [f"{name}: broken at the command of the drive" for name in result.around]
-    return list(dict.fromkeys([*own, *around]))
+    return list(dict.fromkeys([*own, *around, *_smoothed(result)]))
+
+
+def _smoothed(result: Margins) -> list[str]:
+    """Where the speed that dry friction is smoothed over decides the least phase margins: those without."""
+    least = {name: own["phase_margin"].where for name, own in result.spread.items() if "phase_margin" in own}
+    sliding = {name: one.judged.margins for name, one in result.operating_points[0].figures.items()}
+    known = [
+        f"{LOOPS[name].lower()} {fixed(value, 2)} deg"
+        for name, where in least.items()
+        if where.startswith(f"{AT_REST}, ") and (value := sliding[name].phase_margin_deg) is not None
+    ]
+    if not known or at_rest(result.design) == AT_REST:
+        return []
+    given = "" if "friction.smoothing_speed" in result.design.parameters else " (not given)"
+    return [
+        f"the phase margins at rest go with friction.smoothing_speed{given}, as dry friction has no slope of "
+        f"its own there; without that slope (sliding): {', '.join(known)}"
+    ]
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
@@ -189,6 +208,15 @@ def _cogging(result: Margins) -> str:
     names = ", ".join(LOOPS[name].lower() for name in result.by_cogging)
     away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
     return f" ({names}: by cogging alone, {away})" if names else ""
+
+
+def _hold(result: Margins) -> str:
+    """Loops that are unstable only as a slope over the angle is held over a tick, and what the drive is."""
+    alone = [LOOPS[name].lower() for name, one in result.loops.items() if one.by_hold]
+    whole = result.loops.get(result.design.controller.outermost)
+    drive = "; the drive with all loops closed is stable" if whole is not None and whole.sound else ""
+    held = "only as the slope of a torque over the angle, held over a tick, is slightly active"
+    return f" ({', '.join(alone)}: {held}{drive})" if alone else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:

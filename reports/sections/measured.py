@@ -21,7 +21,8 @@ def words(one: Measured) -> str:
     like = ""
     if one.nearer:
         of, off = one.nearer
-        like = f" It is nearer to {of} of the model, {off:.2f} dB rms: was it measured of {one.loop}:{of}?"
+        asked = f"was it measured of {one.loop}:{of}" if of in WHAT else "was it measured with the other sign"
+        like = f" It is nearer to {of} of the model, {off:.2f} dB rms: {asked}?"
     beyond = f" {one.beyond} points above half the sampling frequency are left out." if one.beyond else ""
     left = f" {one.left_out} rows without numbers or at 0 Hz are left out." if one.left_out else ""
     read = f" {one.read_as[:1].upper()}{one.read_as[1:]}." if one.read_as else ""

@@ -284,15 +284,46 @@ def test_closed_loops_and_how_their_errors_grow(tmp_path, of):
     np.testing.assert_allclose(np.abs(value(near) / value(L) - 1.0), 1e-7, rtol=1e-4)
 
 
+def repeated(tmp_path: Path, count: int, head: str = "", more: str = "") -> RecordedResponse:
+    rng = np.random.default_rng(count)
+    f = np.tile(np.geomspace(1.0, 100.0, 40), count)
+    z = (1.0 - 2.0j) / f * (1.0 + 0.02 * (rng.normal(size=f.size) + 1j * rng.normal(size=f.size)) / 2**0.5)
+    rows = "\n".join(
+        f"{a!r},{b.real!r},{b.imag!r}{more}" for a, b in zip(f.tolist(), z.tolist(), strict=True)
+    )
+    return recorded(tmp_path, f"f_hz,re,im{head}\n{rows}")
+
+
+@pytest.mark.parametrize("count", [2, 3, 10])
+def test_rows_of_one_frequency_are_repeats(tmp_path: Path, count: int) -> None:
+    """Their mean has the noise over sqrt(n), as their scatter says, or as each row does."""
+    for read in (repeated(tmp_path, count), repeated(tmp_path, count, ",deviation", ",0.02")):
+        assert read.frequency_hz.size == 40
+        error = np.abs(read.response * read.frequency_hz / (1.0 - 2.0j) - 1.0)
+        assert np.sqrt(np.mean(error**2)) == pytest.approx(0.02 / count**0.5, rel=0.25)
+        assert read.deviation == pytest.approx(np.full(40, 0.02 / count**0.5), rel=0.5)
+        assert np.mean(error < read.radius) >= 0.95
+        assert f"rows that repeat a frequency are averaged ({40 * count - 40})" in read.read_as
+    assert repeated(tmp_path, count).noise == "scatter of repeats"
+
+
+def test_a_row_copied_tells_no_noise(tmp_path: Path) -> None:
+    read = recorded(tmp_path, "f_hz,re,im\n" + 2 * "1,2,3\n2,1,2\n3,1,1\n")
+    assert read.response.tolist() == [2 + 3j, 1 + 2j, 1 + 1j]
+    assert np.isnan(read.deviation).all()
+    assert read.noise == ""
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ("f,gain,phase_deg\n1,2,3\n2,1,4", "says no unit; allowed: gain_db or gain_ratio"),
         ("f,gain_db,phase\n1,2,-3\n2,1,-4", "allowed: phase_deg or phase_rad"),
         ("f,gain_db\n1,2\n2,1", "no phase in the columns f, gain_db"),
-        ("f,re,im\n1,2,3\n1,2,3", "a frequency is given twice"),
+        ("f,re,im\n1,2,3\n1,2,3", "every row is at 1 Hz; allowed: two frequencies or more"),
         ("f,re,im\n0,2,3\n1,2,3", "frequencies above 0"),
-        ("f,re,im,coherence\n1,2,3,1.2\n2,2,3,1", "a coherence outside 0 to 1"),
+        ("f,re,im,coherence\n1,2,3,-1.2\n2,2,3,1", "a coherence of -1.2; allowed: 0 to 1"),
+        ("f,re,im,coherence\n1,2,3,98\n2,2,3,99", "of 98; allowed: 0 to 1, a ratio and not per cent"),
         ("f,re,im\n1,2,3\n2,2", "2 columns in line 3, 3 in the first"),
         ("[motor]\nR = 1", "a heading such as f_hz,gain_db,phase_deg"),
         ("# bench\nf,re,im\n1,2,3\n\n2,x,1\n3,1,1", 'line 5: "x" is no number'),

@@ -211,6 +211,12 @@ def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -
     asked = cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"]
     assert asked == [{"path": "motor.torque_constant", **told}]
     assert "In the model as" in cli.text("keys", "--explain", "ilr33-amber")
+    # what the friction was read from: 137 mA, 7580 rpm
+    sheet_s = {item.path: item.read for item in explained(sheet("[[gear]]", "[[gear]]", 1))}
+    assert (sheet_s["motor.no_load_current"], sheet_s["motor.no_load_speed"]) == (
+        "0.137 A",
+        "793.775744 rad/s",
+    )
 
 
 def test_a_filter_is_added_behind_those_that_there_are() -> None:

@@ -133,7 +133,7 @@ def test_a_motor_with_a_mistake_does_not_hide_what_its_top_speed_refuses(
     assert text.count(old) == 1
     wrong, periods = sorted(mistakes(text.replace(old, new)).split("\n"), key=lambda line: "periods" in line)
     assert key in wrong
-    assert f"a tick, in which {top_rad_s / AMBER.total_ratio:.4g} rad/s passes" in periods
+    assert f" rad at {top_rad_s / AMBER.total_ratio:.4g} rad/s, " in periods
 
 
 REQUIREMENTS = """

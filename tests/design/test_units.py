@@ -34,6 +34,7 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("kg", 3.0, ("3 kilograms",)),
     ("kg", 150 * LB, ("150 lbm",)),
     ("m", 4 * 25.4e-6, ("4 mils",)),
+    ("m", 5.08e-3, ("0.2 inches", "5080 microns")),
     ("rad/s", 300 * pi, ("9000 rpm", "150 Hz")),
     # a minute without an angle is that of revolutions
     ("rad/s", 100 * pi, ("3000 min-1", "3000 min^-1", "3000 1/min", "3000 r/min", "3000 RPM", "3000 U/min")),
@@ -173,6 +174,8 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("2,621,440 counts", "1", 'write "2621440 counts"'),
         ("100-120 V", "V", "a range; write one number"),
         ("1.5 Ts", "s", "a time is so many of that period"),
+        ("4096 steps", "1", 'written "counts"'),
+        ("311 °F", "degC", "(F - 32)/1.8 degC"),
         ("3 Ms", "s", 'nearest known: "ms"'),
         ("3 Mm", "m", 'nearest known: "mm"'),
         ("1,234.5 rpm", "rad/s", 'write "1234.5 rpm";'),

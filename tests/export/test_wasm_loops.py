@@ -29,6 +29,7 @@ from nonlinear.export import linear, linear_loops
 from nonlinear.export.c_files import exported_row
 from nonlinear.export.page import line_of
 from tests.changed import changed
+from tests.loops.own_laws import as_law
 from tests.margins.test_unstable_inner_loops import unstable_inside
 from tests.validation.rich_drives import rich_drive
 
@@ -195,7 +196,16 @@ def random_drives() -> list[Design]:
     return designs
 
 
-FAMILIES = (shipped, without_outer_stages, far_too_fast, random_drives)
+def laws_of_the_current() -> list[Design]:
+    """What back-EMF feed-forward adds to a law of one's own stays closed, from a slower measurement too."""
+    fed = {"back_emf_feedforward": 0.8, "resistance_feedforward": 0.5}
+    names = "ilr33-amber", "ilr33-amber-multirate"
+    designs = [changed(load_design(name), controller={"current": fed}, requirements=()) for name in names]
+    designs += [changed(designs[0], controller={"velocity": None, "position": None})]
+    return [as_law(each, "current") for each in designs]
+
+
+FAMILIES = (shipped, without_outer_stages, far_too_fast, random_drives, laws_of_the_current)
 
 
 @pytest.mark.parametrize("make", FAMILIES)

@@ -171,11 +171,8 @@ def undisturbed(number: int, top: Path, cluster: Cluster) -> tuple[dict[str, byt
 def one_study(number: int, top: Path, cluster: Cluster, draw: random.Random) -> Iterator[str]:
     """Disturb one study until it has ended; whom each kill met while the study ran."""
     cluster.start()
-    (plain, usual_s), folder, status = (
-        undisturbed(number % SEEDS, top, cluster),
-        top / f"study-{number}",
-        None,
-    )
+    (plain, usual_s), folder = undisturbed(number % SEEDS, top, cluster), top / f"study-{number}"
+    status = None
     while status != 0:
         cluster.start()
         process = child(number % SEEDS, folder, Engine(scheduler=cluster.address))

@@ -165,7 +165,7 @@ def test_values_hang_on_the_torque_constant_as_stated(signals, held, columns) ->
     held_at = {name: one.value for name, one in result.model.fixed.items() if name in NAMES["symmetric"]}
     own, other = (fit_records(design, [record], fixed=held_at) for design in (BASE, more))
     for name in ("viscous", "dry"):
-        assert own[name] - other[name] == pytest.approx(2e-4 * kept.moves[name], rel=0.01)
+        assert own[name] - other[name] == pytest.approx(-2e-4 * kept.moves[name], rel=0.01)
 
 
 @pytest.mark.parametrize("scale", [0.5**0.5, 2.0**0.5])
@@ -179,7 +179,7 @@ def test_a_scale_of_the_current_is_in_what_the_constant_moves(signals, scale, co
     kept = model.fixed["torque_constant"]
     for name, truth in WANTED.items():
         assert abs(model[name] - truth) > 20.0 * model.std(name)
-        right = model[name] - kept.moves[name] * kept.value * (1.0 / scale - 1.0)
+        right = model[name] + kept.moves[name] * kept.value * (1.0 / scale - 1.0)
         assert right == pytest.approx(truth, rel=0.005)
 
 
@@ -333,16 +333,10 @@ WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
     "s read as ms": (_scaled(1e-3, "time"), WHOLE, {}, "is the unit of the time right?"),
     "radians read as degrees": (_scaled(np.pi / 180.0, "angle"), ALL, {}, "degrees read as radians"),
     "current of another run": (_of_another_run("current"), BARE, {}, "does not explain"),
-    "command of another run": (
-        _of_another_run("reference"), ALL, TRUTH, "not that of the command"
-    ),
+    "command of another run": (_of_another_run("reference"), ALL, TRUTH, "not that of the command"),
     "range of the current x 2 midway": (_range_from(0.5, 2.0), BARE, {}, "does not explain"),
-    "torque constant 20 % off": (
-        dict, BARE, TRUTH | STRONG, "factor 1.2"
-    ),
-    "torque constant, by the voltage": (
-        dict, WHOLE, STRONG, "so kM and all"
-    ),
+    "torque constant 20 % off": (dict, BARE, TRUTH | STRONG, "factor 1.2"),
+    "torque constant, by the voltage": (dict, WHOLE, STRONG, "so kM and all"),
     "dry friction 1 000 times": (dict, ALL, {"friction.dry_torque": 3.0}, "factor 1000"),
 }  # fmt: skip
 

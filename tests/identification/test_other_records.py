@@ -126,7 +126,7 @@ def test_the_tolerance_of_a_value_that_is_kept_counts_in_those_that_were_found(t
     design = replace(AMBER, parameters=FrozenMap({**AMBER.parameters, key: known}))
     plain, wide = fit_records(AMBER, [record]), fit_records(design, [record])
     k = plain.names.index("dry")
-    assert plain.fixed["load_coefficient"].moves["dry"] == pytest.approx(3.0, rel=0.02)
+    assert plain.fixed["load_coefficient"].moves["dry"] == pytest.approx(-3.0, rel=0.02)
     added = wide.covariance[k, k] - plain.covariance[k, k]
     assert np.sqrt(added) == pytest.approx(3.0 * std, rel=0.02)
     assert "an error of it moves dry by -" in wide.fixed["load_coefficient"].reason

@@ -247,7 +247,7 @@ def test_values_hang_on_the_gain_that_makes_torques_and_it_is_said(tmp_path) -> 
     """A source 10 % stronger, with all inertias, stiffness and friction 10 % larger, is the same loop."""
     result = _found(tmp_path, "L", 1e-7, 0, stated=False)
     kept = result.fit.fixed["source_gain"]
-    shares = {key: -kept.moves[key] * kept.value / TRUTH[key] for key in TRUTH}
+    shares = {key: kept.moves[key] * kept.value / TRUTH[key] for key in TRUTH}
     assert list(shares.values()) == pytest.approx([1.0] * 5 + [0.0], abs=0.01)
     (item,) = (one for one in result.items if one.id == "kept-source_gain")
     assert item.passed is None

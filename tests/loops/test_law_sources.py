@@ -83,6 +83,46 @@ def test_what_is_not_real_is_refused_by_its_name(name: str, made: Any, tmp_path:
         assert said.endswith(f'law.file = "k.mat": {name}: must be real; allowed: finite real numbers'), said
 
 
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_what_is_not_finite_is_told_so(value: float) -> None:
+    said = refused(BASE.with_law, "velocity", ([[value]], [[1]], [[1]], [[0]], T), ["error"])
+    assert said == "A: must be finite; allowed: finite real numbers"
+
+
+EVERY = {"value": 8, "source": "data sheet", "grade": "C"}
+
+
+@pytest.mark.parametrize("every", [8, 8.0, "8", EVERY])
+def test_a_system_is_sampled_at_the_period_of_its_stage_however_that_is_written(every: Any) -> None:
+    """Of a design and of the setting alike: a lag's pole p is exp(p 8 Ts) by zero-order hold."""
+    joint, K = load_design("joint"), control.tf([0.3, 40.0], [0.02, 1.0])
+    T_8 = 8 * joint.controller.period_s
+    design = joint.with_values({"control.position.every": every})
+    for made in (design.with_law("position", K, ["error"], method="zoh"),
+                 joint.with_law("position", K, ["error"], method="zoh", every=every)):  # fmt: skip
+        assert made.controller.position.every == 8
+        assert made.controller.position.law.A[0][0] == pytest.approx(np.exp(-50.0 * T_8), rel=1e-12)
+    assert f"a sampled one of dt = {T_8:g} s" in refused(design.with_law, "position", K, ["error"])
+
+
+@pytest.mark.parametrize("made", [scipy.signal.TransferFunction, control.tf])
+@pytest.mark.parametrize("dt", [None, T])
+def test_an_improper_transfer_function_is_refused(made: Any, dt: float | None) -> None:
+    sampled = {} if dt is None else {"dt": dt}
+    K, how = made([1, 0, 0], [1, 5], **sampled), {"method": "tustin"} if dt is None else {}
+    said = refused(lambda: BASE.with_law("velocity", K, ["error"], **how))
+    assert said == "system: improper; allowed: no more zeros than poles"
+
+
+def test_a_pole_that_tustin_takes_to_infinity_is_refused() -> None:
+    """At s = 2/T, alone or beside another, where rounding leaves a number of 1e16."""
+    s = control.tf("s")
+    for K in (1 / (s * T / 2 - 1), (3 * s + 1) / ((s * T / 2 - 1) * (s / 300 + 1) * (s / 7e4 + 1))):
+        said = refused(lambda K=K: BASE.with_law("velocity", K, ["error"], method="tustin"))
+        assert f"a pole at 2/T = {2 / T:g} 1/s" in said
+        assert "allowed: none there, or method = zoh" in said
+
+
 @pytest.mark.parametrize("value", ['"0.5"', "true", "null", "[[0.5, true]]"])
 def test_json_text_and_truth_are_no_numbers(value: str, tmp_path: Path) -> None:
     said = refused(read, tmp_path, f'{{"A": {value}, "B": [[1]], "C": [[1]], "D": [[0]], "Ts": {T}}}', NAMES)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from loop_designs import amber, controlled, ctms_position, emps, faster, response, without
 
-from actuator_lti import DelaySystem, InputError, assemble_loops
+from actuator_lti import DelaySystem, InputError, assemble_loops, stability_margins
 from actuator_lti.design.model import Design, Encoder, Friction, Load
 from actuator_lti.drive.operating import Operating, slope_at
 from actuator_lti.loops import exact_margins
@@ -167,6 +167,15 @@ def test_exact_margins_of_the_multirate_drive_bring_it_to_its_border() -> None:
         delay_s = design.controller.computing_delay_s + change * exact.delay_s
         system = assemble_loops(controlled(design, computing_delay_s=delay_s)).tick_system
         assert bool(np.max(np.abs(np.linalg.eigvals(system.lifted().A))) < 1) is stable
+
+
+@pytest.mark.parametrize(("gain", "stable"), [(100.0, True), (1000.0, False)])
+def test_a_fundamental_of_many_states_has_the_verdict_of_the_whole_period(gain: float, stable: bool) -> None:
+    """20 updates a period: 139 states, with a double pole at z = 1 that double precision does not place."""
+    loops = assemble_loops(controlled(amber(1, 20), position={"gain": gain}))
+    loop = loops.break_points["u"].open_loop
+    assert loop.nstates > 120
+    assert stability_margins(loop).stable is exact_margins(loops, "u").stable is stable
 
 
 def test_trap_the_inner_loops_do_not_see_the_angle() -> None:

@@ -95,10 +95,22 @@ def test_the_tangent_is_the_linear_loop_at_every_place(case: int) -> None:
         assert np.abs(ours - theirs).max() <= 1e-9 * most + 1e-12, (case, place, most)
 
 
-@pytest.mark.parametrize("stage", ["current", "velocity", "position"])
-def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
-    """The same margins from a loop that is cut elsewhere, in every form, and the same run to rounding."""
+FED = {"current": {"back_emf_feedforward": 0.8, "resistance_feedforward": 0.5}}
+ACCELERATED = FED | {"position": {"acceleration_feedforward": 0.7}}
+
+
+@pytest.mark.parametrize(
+    ("stage", "fed"),
+    [*((stage, {}) for stage in ("current", "velocity", "position")), ("position", FED)]
+    + [(stage, ACCELERATED) for stage in ("current", "velocity")],
+)
+def test_a_pi_written_as_a_law_is_the_pi(stage: str, fed: dict[str, Any]) -> None:
+    """The same margins from a loop that is cut elsewhere, in every form, and the same run to rounding.
+
+    What feed-forward adds to it, back-EMF above all, stays closed.
+    """
     design = replace(load_design("ilr33-amber"), encoder=Encoder())  # a law takes counted angles
+    design = changed(design, controller=fed)
     loop, T = getattr(design.controller, stage), design.controller.period_of(stage)
     gain = loop.gain_V_A if stage == "current" else loop.gain
     rate = None if loop.integral_time_s is None else gain / loop.integral_time_s
@@ -116,6 +128,28 @@ def test_a_pi_written_as_a_law_is_the_pi(stage: str) -> None:
         assert one.ratio == pytest.approx(two.ratio, rel=1e-9)
     runs = [stepped(each, 2000, 0.01, limits_on=False).output_angle_rad for each in (mine, design)]
     np.testing.assert_allclose(runs[0], runs[1], rtol=0, atol=1e-9 * 0.01)
+
+
+@pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate"])
+def test_back_emf_feedforward_stays_closed_in_the_loop_of_a_current_law(name: str) -> None:
+    """Its gain margin is the factor on the law that brings a pole to the unit circle; the tangent's as well.
+
+    Of a slower measured speed the loop is periodic, and its closed poles are those over a whole period.
+    """
+    design = changed(linear(load_design(name)), controller=FED)
+    mine = as_law(design, "current")
+    loops = [assemble_loops(each).current for each in (mine, design)]
+    z = np.exp(1j * np.geomspace(1e-3, 3.0, 40))
+    np.testing.assert_allclose(*(loop.open_loop(z) for loop in loops), rtol=1e-9)
+    if loops[0].periodic:
+        return
+    ratio = stability_margins(loops[0].open_loop).gain_margins[-1].ratio
+    for gain, side in ((ratio * (1 - 1e-6), -1), (ratio * (1 + 1e-6), 1)):
+        closed = assemble_loops(mine.with_values({"control.current.law.gain": gain})).current.plain_closed
+        assert np.sign(np.abs(closed.poles()).max() - 1.0) == side
+    for each, loop in zip((mine, design), loops, strict=True):
+        measured = tangent(each, "current", hold=False).closed(z)
+        np.testing.assert_allclose(measured, loop.closed_loop(z), rtol=1e-6)
 
 
 def test_a_run_starts_from_states_of_the_law() -> None:

@@ -1,5 +1,6 @@
 """Torques that bend with the angle or go with the speed of the load: closed forms of both writings."""
 
+import re
 from dataclasses import dataclass, replace
 from math import acos, asin, cos, exp, pi, sin, sqrt
 
@@ -9,9 +10,11 @@ from loop_designs import controlled, source_drive
 
 from actuator_lti import InputError, load_design, write_design
 from actuator_lti.design import model, read_design_text
+from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
 from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
 from actuator_lti.drive.wiring import wire
+from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import TickProgram
 from nonlinear import State, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion
@@ -79,6 +82,15 @@ def test_small_swings_about_rest_have_the_frequency_of_the_slope(case: Case) -> 
 
 
 @each
+def test_at_every_instant_it_is_a_spring_that_keeps_its_energy(case: Case) -> None:
+    """As in the motor: poles exp(+-j omega Ts), omega = sqrt(A Z/J)."""
+    at = Operating(angle_rad=case.stable / N, torques_at_once=True)
+    poles = np.linalg.eigvals(TickProgram(wire(case.put(rotor()), at), "voltage").tick(0).A)
+    assert np.abs(poles) == pytest.approx(1.0, abs=1e-12)
+    assert np.max(np.angle(poles)) == pytest.approx(sqrt(A * case.order / J) * Ts, rel=1e-9)
+
+
+@each
 def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
     at = Operating(speed_rad_s=40.0, angle_rad=0.3)
     own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))
@@ -123,8 +135,15 @@ def test_keys_of_a_wave(name: str) -> None:
     other, own = (getattr(each, part).over_angle.at(0.2) for each in (fin, design))
     assert own - other == pytest.approx(peak * cos(0.6), rel=1e-12)
     assert getattr(read_design_text(write_design(design)), part) == getattr(design, part)
-    with pytest.raises(InputError, match=f"{name}_periods{HELD}"):
-        fin.with_values({**values, f"{name}_periods": 1e6})
+    fastest = reachable_speed(fin) / (fin.total_ratio if part == "load" else 1.0)
+    most = 0.5 / (fastest * fin.controller.period_s)
+    for factor in (1e3, 1.25):
+        values |= {f"{name}_periods": f"{factor * most} rad/rad"}
+        with pytest.raises(InputError, match=f"{name}_periods{HELD}") as refused:
+            fin.with_values(values)
+    takes = dict(re.findall(r"(control\.period|limits\.speed) = (\S+ \S+)", str(refused.value)))
+    for key in ("control.period", "limits.speed"):  # either takes it
+        fin.with_values({**values, key: takes[key]})
 
 
 def test_keys_of_a_moment() -> None:
@@ -259,3 +278,26 @@ def test_cogging_is_blamed_for_the_loops_alone_that_are_stable_without_it(cli) -
     both = cli.text("margins", "joint", *cogging, *fast, status=1)
     assert "(current loop, velocity loop: by cogging alone" in " ".join(both.split())
     assert "by cogging" not in cli.text("margins", "joint", *fast, status=1)
+
+
+def test_a_loop_that_only_the_hold_of_a_slope_makes_unstable_is_told_so(cli) -> None:
+    """A spring without friction: held over a tick it makes the pole larger by K Ts^2/(4 J N^2), nearly.
+
+    The drive itself, whose outer loops damp it, is stable; at a gain of 6000/s it is not.
+    """
+    settings = {"load.path": "back-drivable", "load.moment_slope": "-1000 N*m/rad",
+                "friction.viscous": "0 N*m*s/rad", "control.current.back_emf_feedforward": "0.5"}  # fmt: skip
+    design = load_design("ilr33-amber").with_values(settings)
+    radius = [
+        np.abs(loops_at(design, Operating(torques_at_once=once)).current.plain_closed.poles()).max()
+        for once in (False, True)
+    ]
+    grown = 1000.0 * design.controller.period_s**2 / (4.0 * design.inertia_kgm2 * design.total_ratio**2)
+    assert radius[0] > 1.0 > radius[1]
+    assert radius[0] - radius[1] == pytest.approx(grown, rel=0.2)  # back-EMF adds to the inertia
+    asked = [word for key, value in settings.items() for word in ("--set", f"{key}={value}")]
+    told = " ".join(cli.text("margins", "ilr33-amber", *asked, status=1).split())
+    assert "(current loop: only as the slope of a torque over the angle, held over a tick, is" in told
+    assert "; the drive with all loops closed is stable)" in told
+    fast = cli.text("margins", "ilr33-amber", *asked, "--set", "control.position.gain=6000 1/s", status=1)
+    assert "slightly active)" in " ".join(fast.split())

@@ -101,6 +101,7 @@ def plain_sampled(rng: np.random.Generator) -> control.TransferFunction:
 
 
 FAR = 1e9  # ratio of gain margins that are compared behind a delay: 180 dB
+SURE = 100  # neighbours that all have to have the truth before another answer is called wrong
 MOST_RAD = 300.0  # that the delay turns by
 CERTIFIED_LATE = 0.05  # share of the loops behind a delay: by intervals in certified arithmetic, the slow way
 Family = Callable[[np.random.Generator], control.LTI]
@@ -238,7 +239,8 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
         listed = without_touches(expected, m)
         if what := unlike(ours, listed, 1e-6, 1e-3):
             said = leaves_out(m) and not unlike(ours, listed, 1e-6, 1e-3, far=30.0)
-            kind = "wrong" if determined(loop, expected, rng) else "right" if said else "undetermined"
+            sure = determined(loop, expected, rng, SURE)
+            kind = "wrong" if sure else "right" if said else "undetermined"
             return kind, f"against the truth: {what}"
         if what := too_far(m):
             return "wrong", what

@@ -265,9 +265,9 @@ def towards_the_border(loop: control.TransferFunction) -> control.TransferFuncti
         return control.tf(near(loop.num[0][0]), near(loop.den[0][0]), loop.dt)
 
 
-def determined(loop: control.LTI, answer: Facts, rng: np.random.Generator) -> bool:
+def determined(loop: control.LTI, answer: Facts, rng: np.random.Generator, count: int = NEIGHBOURS) -> bool:
     """Whether neighbours 8 ulp away, random ones and the one most likely to differ, all have these facts."""
-    near = [moved(loop, rng) for _ in range(NEIGHBOURS)]
+    near = [moved(loop, rng) for _ in range(count)]
     if isinstance(loop, control.TransferFunction):
         near.append(towards_the_border(loop))
     return all(unlike(answer, truth_of(other), 0.05, 5.0) is None for other in near)

@@ -244,14 +244,14 @@ def test_the_smallest_distance_is_found_at_a_resonance_that_few_places_show() ->
 
 
 def test_a_loop_of_hundreds_of_states_that_double_precision_does_not_place_is_withheld_at_once() -> None:
-    """A pole at z = 1 but for rounding, and 150 states: exact arithmetic would take minutes."""
-    n = 150
+    """A pole at z = 1 but for rounding, and 250 states: exact arithmetic would take minutes."""
+    n = 250
     A = np.diag(np.full(n - 1, 1.0), -1)
     A[0, -1] = 1.0 + 2.0**-52  # poles on the circle all round, to rounding
     loop = control.StateSpace(A, np.eye(n)[:, :1], 0.5 * np.eye(n)[-1:], [[0.0]], 0.1)
     m = stability_margins(loop, certify=True)
     assert (m.stable, m.evidence) == (None, "withheld")
-    assert "exact arithmetic decides up to 120 states, these are 150" in m.evidence_reason
+    assert "exact arithmetic decides up to 200 states, these are 250" in m.evidence_reason
 
 
 def test_a_gain_margin_at_rest_has_its_digits_where_states_that_are_0_there_weigh_more() -> None:

@@ -1,6 +1,7 @@
 """Whole nights: what is built, what is not built again, what changed and what is approved."""
 
 import json
+import re
 from dataclasses import replace
 from xml.etree import ElementTree
 
@@ -80,6 +81,23 @@ def test_what_is_not_stable_is_the_worst_and_a_comparison_that_fails_is_counted_
     assert "of a margin, in % of the distance from −1 that the limit keeps" in torn
     index = (nights.site / "index.html").read_text()
     assert '<span class="worst neg">not met</span>' in index
+
+
+def test_what_passes_says_no_more_than_what_was_asked_and_compared(nights) -> None:
+    """The comparison of all is a row of its own, which no count has; the terminal's count is the page's."""
+    jobs = job("a"), job("b"), replace(job("All compared"), kind="comparison")
+    first, second = nights(*jobs), nights(*jobs)
+    assert first.said_of_all == "All 2 designs are built and meet their requirements"
+    assert second.said_of_all == (
+        "All 2 designs are built, meet their requirements and are no worse than the baseline"
+    )
+    bare = [replace(one, result=replace(one.result, total=0)) for one in first.designs]
+    words = replace(first, designs=tuple(bare)).said_of_all
+    assert words == "All 2 designs are built; no requirement is stated"
+    index = (nights.site / "index.html").read_text()
+    assert second.counts == "2 passing"
+    assert re.search(r'Passing <span class="n">2<', index)
+    assert second.said_of_all in index
 
 
 def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -> None:

@@ -7,9 +7,11 @@ from pathlib import Path
 import control
 import numpy as np
 import pytest
+from scipy.io import savemat
 
-from actuator_lti import InputError, assemble_loops, stability_margins
+from actuator_lti import InputError, assemble_loops, load_design, stability_margins
 from actuator_lti.margins import MeasuredResponse
+from analyses.identification.measured_response import identify_response
 from analyses.margins.run import measured_over
 from reports import report
 from reports.sections.measured import blocks, words
@@ -164,6 +166,35 @@ def test_data_of_another_sampling_period_are_refused() -> None:
         measured_over(LOOPS, Response(truth.frdata.ravel(), truth.omega, dt=dt), "velocity")
     with pytest.raises(InputError, match=r"dt = 0\.5 s; allowed: .* of the velocity loop"):
         measured_over(LOOPS, Response(truth.frdata.ravel()[:4], truth.omega[:4] / 1e3, dt=0.5), "velocity")
+
+
+@pytest.mark.parametrize("name", ["Ts", "dt", "sampling_period", "period_s"])
+def test_a_sampling_period_in_a_file_is_read_as_one_of_data(name: str, tmp_path: Path) -> None:
+    """A number in a .mat or a column of one value; for margins and for a fit."""
+    truth, period, design = bench("velocity", gain=1.0), LOOPS.velocity.period_s, load_design("ilr33-amber")
+    held = {"f_hz": truth.omega / (2.0 * np.pi), "L": truth.frdata.ravel()}
+    for dt, fits in ((0.0, True), (period, True), (2.0 * period, False)):
+        savemat(tmp_path / "m.mat", held | {name: dt})
+        parts = held["L"].real, held["L"].imag, np.full(held["L"].shape, dt)
+        table = saved(tmp_path / "m.csv", truth, f"real,imag,{name}", *parts)
+        for file in (tmp_path / "m.mat", table):
+            if fits:
+                one = measured_over(LOOPS, file, "velocity")
+                assert f'sampling period in s "{name}"' in one.read_as
+                assert "not read" not in one.read_as
+                continue
+            for call in (lambda file=file: measured_over(LOOPS, file, "velocity"),
+                         lambda file=file: identify_response(design, file, loop="velocity")):  # fmt: skip
+                with pytest.raises(InputError, match=f"dt = {dt:g} s; allowed: {period:g} s, of the vel"):
+                    call()
+
+
+def test_the_other_sign_is_named() -> None:
+    """What comes back, behind the summing point's minus, is -L."""
+    truth = bench("velocity", gain=1.05)
+    one = measured_over(LOOPS, Response(-truth.frdata.ravel(), truth.omega), "velocity")
+    assert one.nearer == ("-L", pytest.approx(20.0 * np.log10(1.05), rel=1e-6))
+    assert "nearer to -L of the model, 0.42 dB rms: was it measured with the other sign?" in words(one)
 
 
 def test_a_coherence_of_few_averages_is_as_wide_as_its_quantile_says(tmp_path) -> None:

@@ -14,6 +14,7 @@ from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import operating_points
+from analyses.margins import Asked as MarginsAsked
 from analyses.margins import margins
 from analyses.motion.settling import Settling
 from analyses.specification.requirements import which_response
@@ -28,14 +29,44 @@ from reports.sections import validation
 from reports.sections.answer import believed
 from reports.sections.cycles import section as cycles_section
 from reports.sections.large_signal import _shift_table
-from reports.sections.margins import DOWNWARDS, margin_table, result, spread_table
+from reports.sections.margins import DOWNWARDS, brief, margin_table, result, spread_table
 from reports.sections.names import Unit
 from reports.terminal import print_blocks
+from tests.changed import changed
 
 SHAPED = {"filter_time": 0.01, "rate": 0.3, "acceleration": 10.0, "jerk": 100.0}
 SHAPED = {f"command.{key}": value for key, value in SHAPED.items()}
 INCLUDED = {"": {}, ": feed-forward included": {"control.position.feedforward": 1.0}}
 INCLUDED |= {": mean of its profile and filter included": SHAPED}
+
+
+def test_a_margin_that_goes_with_the_hold_of_a_torque_says_what_it_is_in_the_motor() -> None:
+    """The continuous form, with the delays of the controller and no held torque, is its other writing."""
+    cogging = {"cogging_Nm": 0.02, "cogging_periods": 100.0, "cogging_phase_rad": pi}
+    design = changed(load_design("fin"), motor=cogging, load={"moment_slope_Nm_rad": 0.0})
+    known = margins(design).loops["velocity"]
+    note = next(one for one in known.notes if "acted at every instant" in one)
+    there = float(re.search(r"phase margin (\S+) deg if cogging", note)[1])
+    held = known.margins.phase_margin_deg
+    continuous = stability_margins(
+        assemble_loops(design, form="continuous").velocity.open_loop
+    ).phase_margin_deg
+    assert there == pytest.approx(continuous, abs=0.1)
+    assert held < continuous - 3.0
+    slack = {"cogging_Nm": 5e-4}
+    assert not any("instant" in one for one in margins(changed(design, motor=slack)).loops["position"].notes)
+
+
+def test_margins_that_the_smoothing_of_dry_friction_decides_say_those_without_it() -> None:
+    """Over 1e9 rad/s it has no slope left: then rest is as sliding, and the note's margin that at rest."""
+    amber = load_design("ilr33-amber")
+    (note,) = (one for one in brief(margins(amber)).notes if "smoothing_speed (not given)" in one)
+    wide = margins(
+        with_values(amber, {"friction.smoothing_speed": 1e9}), MarginsAsked(operating_point="rest")
+    )
+    for name, said in re.findall(r"(\w+) loop (\S+) deg", note) or pytest.fail(note):
+        assert float(said) == pytest.approx(wide.loops[name].margins.phase_margin_deg, abs=0.006)
+    assert not any("smoothing" in one for one in brief(margins(load_design("ilr33-amber-tanh"))).notes)
 
 
 def test_a_gain_margin_has_one_sign_in_all_tables() -> None:

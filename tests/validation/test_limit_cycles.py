@@ -213,6 +213,13 @@ def test_confirmed_is_a_cycle_of_about_the_predicted_size_and_frequency(ratio, h
     assert Confirmation(cycle, ratio, hertz).verdict == verdict
 
 
+def test_a_cycle_of_an_hour_is_told_and_not_tried(cli) -> None:
+    """24 periods of 0.000433 Hz at 62.5 us from 41 sizes are 3.6e10 ticks."""
+    said = cli.text("cycles", "joint", "--set", 'coupling.play="0.5 mrad"', status=1)
+    assert "not tried" in said
+    assert "Not tried: 24 periods take more ticks" in " ".join(said.split())
+
+
 def test_the_frequency_of_a_cycle_is_that_of_where_the_motion_ends() -> None:
     """A relay in the sensor: in its first periods the joint still follows what it was started with."""
     (cycle, *_) = cycles_of_quantisation(load_design("joint"))

@@ -231,6 +231,20 @@ def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(
     assert ("at 50 Hz" in said["status_detail"]) == (ends == "ripple")
 
 
+@pytest.mark.parametrize(("counts", "ends"), [("", "ripple"), ("counts_per_rev = 4000", "limit cycle")])
+def test_what_passes_between_two_updates_is_a_ripple_where_it_swings_by_nothing_else(
+    cli, tmp_path, counts: str, ends: str
+) -> None:
+    """400 Hz, seen every millisecond; speeds made of 4000 counts, 90 deg/s each, swing by themselves."""
+    path = tmp_path / "turning.toml"
+    encoder = f'[encoder]\nspeed = "difference"\nfilter_time = "1 ms"\n{counts}\n[limits]'
+    path.write_text(SPEED_DRIVE.format(cogging="68 mN*m").replace("[limits]", encoder))
+    said = cli.data("simulate", str(path), "--amplitude", "2880 deg/s", "--duration", "1")
+    assert said["status"] == ends
+    other = "passing at 400 Hz" if ends == "ripple" else "without the cogging limit cycle"
+    assert other in said["status_detail"]
+
+
 @pytest.mark.parametrize(("millionths", "verdict"), [(0.5, "at rest"), (2.0, "limit cycle")])
 def test_a_swing_too_small_to_count_is_rest_for_all_who_ask(millionths: float, verdict: str) -> None:
     """The joint hunts by its counts; beside a full deflection of two or half a million such swings."""

@@ -159,10 +159,7 @@ def exact_delay_loop(form: DelayForm, *, reduced: bool = True) -> ExactDelayLoop
     (-B1, -D21; C1, D12 E, D11), which is (D11 - 1) D and D less the product of that column and row. A power
     of s in every term of both is cancelled where the loop is to be ``reduced``.
 
-    Raises
-    ------
-    InputError
-        Too many delays, or a neutral loop.
+    Raises `InputError`: for too many delays, or a neutral loop.
     """
     q, n = form.delays_s.size, form.states
     if q > _MOST_DELAYS:

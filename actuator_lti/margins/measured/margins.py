@@ -12,7 +12,6 @@ import numpy as np
 from actuator_lti.errors import InputError
 from actuator_lti.margins.assemble import delay_margins
 from actuator_lti.margins.distances import DISK, MODULUS
-from actuator_lti.margins.measured.bounds import Bounds, Strip, bounds, distance_ranges
 from actuator_lti.margins.results import StabilityMargins
 from actuator_lti.margins.single import (
     Agreement,
@@ -22,16 +21,21 @@ from actuator_lti.margins.single import (
     between_text,
     frequency_text,
 )
-from actuator_lti.systems.measured_response import MeasuredResponse, measured_response
+from actuator_lti.measured.bounds import Bounds, Strip, bounds, distance_ranges
+from actuator_lti.measured.local_fit import averaged
+from actuator_lti.measured.response import MeasuredResponse, measured_response
 from actuator_lti.types import Complex, Real
 
 _MOST_UNRESOLVED = 0.5
 _TOLD = 6
+_OPEN = "as it is known: crossings there are neither sure nor excluded"
 _NOTES = (
     "measured data: stability cannot be determined from them, and outside of their band nothing is known",
     "each crossing lies between two points (bracket_rad_s); the figure between them is interpolated, it lies "
     "in ratio_range or deg_range as far as the loop between the points is no more curved than about them",
-    "modulus and disk margin are the smallest values at measured points; over the band and within the noise "
+    "noise is averaged over as many neighbouring points as the curvature allows; their errors are taken as "
+    "independent",
+    "modulus and disk margin are the smallest values at these points; over the band and within the noise "
     "they lie in modulus_range and alpha_range",
 )
 
@@ -39,16 +43,14 @@ _NOTES = (
 def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] | None) -> StabilityMargins:
     """Margins from `control.FrequencyResponseData` or `MeasuredResponse`, see `stability_margins`.
 
-    Every value lies in a circle (noise), every interval between two points in a strip about its chord that
-    the second differences nearby allow (see `Bounds`). A crossing is listed where the strips pass the level
-    from one side to the other, with the range of its margin over all places at which they may. Where the
-    phase betrays a resonance between two points, or a pair of crossings cannot be excluded, a note says so.
+    Noise is averaged over neighbouring points (see `local_fit`). Every value lies in a circle (noise),
+    every interval between two points in a strip about its chord that the second differences nearby allow
+    (see `Bounds`). A crossing is listed where the strips pass the level from one side to the other, with the
+    range of its margin over all places at which they may. Where the phase betrays a resonance between two
+    points, or a pair of crossings cannot be excluded, a note says so.
 
-    Raises
-    ------
-    InputError
-        More than one input or output, fewer than two points, values that are zero or not finite, or points
-        so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
+    Raises `InputError`: for more than one input or output, fewer than two points, values that are zero or not
+    finite, or points so coarse that more than half of the intervals turn by more than 60 deg or 10 dB.
     """
     response = measured_response(data)
     omega, L, radius = measured_points(response, band_rad_s)
@@ -76,7 +78,8 @@ def measured_margins(data: Any, delay_s: float, band_rad_s: tuple[float, float] 
         period_s=response.dt,
         delay_s=delay_s,
         band_rad_s=(float(omega[0]), float(omega[-1])),
-        method="neighbouring points of measured data; straight between them in dB and deg over log frequency",
+        method="points of measured data, their noise averaged over neighbours; straight between them in dB "
+        "and deg over log frequency",
         agreement=Agreement(None, None),
         evidence_reason=_reason(omega, result, response.noise_known),
         notes=(*_hidden(omega, result), *_lost(omega, result), *grazed, *touched, noise, *_NOTES),
@@ -107,8 +110,10 @@ def measured_points(data: MeasuredResponse, band: tuple[float, float] | None) ->
     if not (np.isfinite(L).all() and np.isfinite(omega).all()) or (L == 0.0).any():
         raise InputError("measured data: every value must be finite and not zero")
     if (np.diff(omega) <= 0.0).any():
-        raise InputError("measured data: a frequency is given twice")
-    return omega, L, radius
+        twice = omega[1:][np.diff(omega) <= 0.0][0]
+        allowed = "each once, repeats as MeasuredResponse.from_repeats"
+        raise InputError(f"measured data: {twice:.6g} rad/s is given twice; allowed: {allowed}")
+    return omega, *averaged(omega, L, radius)
 
 
 def refuse_coarse(omega: Real, L: Complex, result: Bounds) -> None:
@@ -181,7 +186,7 @@ def single_passages(strip: Strip, level: float) -> list[Group]:
 
 
 def passed(strip: Strip, level: float, group: Group) -> tuple[int, float] | None:
-    """Interval and place in it where the level is passed first; ``None``: not surely passed.
+    """Interval and place in it where the level is passed, the middle one of several; ``None``: not surely.
 
     Both ends of the group have to lie off the level: at an edge of the band they may not.
     """
@@ -192,7 +197,8 @@ def passed(strip: Strip, level: float, group: Group) -> tuple[int, float] | None
         sides[0] = -sides[1]
     if sides[0] * sides[1] >= 0 or part[0] * part[-1] > 0.0 or part[0] == part[-1]:
         return None
-    k = int(np.flatnonzero((part[:-1] * part[1:] <= 0.0) & (part[:-1] != part[1:]))[0])
+    places = np.flatnonzero((part[:-1] * part[1:] <= 0.0) & (part[:-1] != part[1:]))
+    k = int(places[places.size // 2])
     return first + k, float(part[k] / (part[k] - part[k + 1]))
 
 
@@ -200,6 +206,7 @@ def _passages(
     omega: Real, result: Bounds, strip: Strip, level: float, notes: list[str], what: str
 ) -> Iterator[tuple[Group, int, float]]:
     """Where a level is surely passed: group, interval and place in it; where that is open, a note."""
+    doubtful = list[Group]()
     for group in single_passages(strip, level):
         if strip is result.phase and result.lost[group.first : group.last + 2].any():
             continue
@@ -207,8 +214,12 @@ def _passages(
         if at is not None:
             yield group, *at
         elif not result.unresolved[group.first : group.last + 1].all():  # told already
-            where = "between {:.6g} and {:.6g} rad/s".format(*group.bracket(omega))
-            notes.append(f"{where} {what} as it is known: crossings there are neither sure nor excluded")
+            doubtful.append(group)
+    told = [group.bracket(omega) for group in doubtful]
+    if len(told) > _TOLD:
+        notes.append(f"at {len(told)} places {between_text(told[0][0], told[-1][1])} {what} {_OPEN}")
+    else:
+        notes += [f"{between_text(*ends)} {what} {_OPEN}" for ends in told]
 
 
 def _phase_margins(

@@ -3,6 +3,7 @@
   const table = document.getElementById("designs");
   const body = table.tBodies[0];
   const rows = [...body.rows];
+  const designs = rows.filter((row) => row.dataset.kind === "design"); // what is counted, here and on the buttons
   const search = document.getElementById("search");
   const filters = [...document.querySelectorAll(".filters button")];
   const shown = document.querySelector(".shown");
@@ -12,15 +13,13 @@
 
   const show = () => {
     const words = fold(search.value).split(/\s+/).filter(Boolean);
-    let count = 0;
     for (const row of rows) {
       const text = fold([row.dataset.name, ...[0, 1].map((k) => row.cells[k].textContent)].join(" "));
       const fits = (!state || row.dataset.state === state) && words.every((word) => text.includes(word));
       row.hidden = !fits;
-      count += fits;
     }
-    shown.textContent = `${count} of ${rows.length} shown`;
-    nothing.hidden = count > 0;
+    shown.textContent = `${designs.filter((row) => !row.hidden).length} of ${designs.length} shown`;
+    nothing.hidden = rows.some((row) => !row.hidden);
   };
 
   const sort = (button) => {

@@ -5,15 +5,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_lti.margins.single import between_text
-from actuator_lti.systems.measured_response import at_once
-from actuator_lti.types import Complex, Mask, Real
+from actuator_lti.measured.response import at_once
+from actuator_lti.types import Complex, Ints, Mask, Real
 
 _LARGE_TURN = np.radians(60.0)
 _LARGE_STEP = np.log(10.0) / 2.0  # 10 dB
 _JUMP = np.radians(25.0)
 _STANDS_OUT = 4.0  # a turn this many times that of both neighbours is no smooth curve's
 _FLIP = np.radians(140.0)  # a turn that may as well be its complement the other way round
-_CURVATURE = 3.0  # times the largest second difference nearby
+CURVATURE = 3.0  # times the largest second difference nearby
 _PIECES = 32  # of an interval between two points
 Range = tuple[float, float]
 
@@ -85,15 +85,14 @@ def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:
     size = np.abs(L)
     gain = np.log(size)
     lost = radius >= size
-    ratio = np.minimum(radius / size, 1.0)
-    up, down = np.log1p(radius / size), -np.log1p(-np.minimum(ratio, 1.0 - 1e-12))
-    wobble = np.where(lost, np.pi, np.arcsin(ratio))
+    up, down = np.log1p(radius / size), -np.log1p(-np.minimum(radius / size, 1.0 - 1e-12))
+    wobble = _wobble(L, radius)
     turn = np.angle(L[1:] / L[:-1])
-    unresolved = _unresolved(gain, turn, wobble)
+    unresolved = unresolved_intervals(L, radius)
     phase = np.angle(L[0]) + np.concatenate(([0.0], np.cumsum(turn))) - omega * delay_s
     u = np.log(omega)
-    log_gain = _strip(gain, down, up, _bend(u, gain), unresolved)
-    angle = _strip(phase, wobble, wobble, _bend(u, phase), unresolved)
+    log_gain = _strip(gain, down, up, bend(u, gain), unresolved)
+    angle = _strip(phase, wobble, wobble, bend(u, phase), unresolved)
     # inside an unresolved interval the gain may rise without limit, or fall where the phase leads
     flips = np.abs(turn) > _FLIP
     either = flips | (np.abs(turn) < _JUMP)
@@ -104,8 +103,16 @@ def bounds(omega: Real, L: Complex, radius: Real, delay_s: float) -> Bounds:
     return Bounds(log_gain, angle, unresolved, turn, lost)
 
 
-def _unresolved(gain: Real, turn: Real, wobble: Real) -> Mask:
-    around = np.abs(turn)
+def _wobble(L: Complex, radius: Real) -> Real:
+    """How far the phase of each value may be off, rad."""
+    ratio = radius / np.abs(L)
+    return np.asarray(np.where(ratio >= 1.0, np.pi, np.arcsin(np.minimum(ratio, 1.0))))
+
+
+def unresolved_intervals(L: Complex, radius: Real) -> Mask:
+    """Where a resonance hides between two points, or L changes by more than 60 deg or 10 dB; (m - 1,)."""
+    gain, wobble = np.log(np.abs(L)), _wobble(L, radius)
+    around = np.abs(np.angle(L[1:] / L[:-1]))
     padded = np.concatenate(([0.0], around, [0.0]))
     beside = np.maximum(padded[:-2], padded[2:])
     noise = 2.0 * (wobble[1:] + wobble[:-1])
@@ -114,14 +121,40 @@ def _unresolved(gain: Real, turn: Real, wobble: Real) -> Mask:
     return np.asarray(jump | large)
 
 
-def _bend(u: Real, y: Real) -> Real:
-    """How far y may leave its chord in each interval, from the second differences nearby."""
-    h = np.diff(u)
-    slope = np.diff(y) / h
-    second = 2.0 * np.abs(np.diff(slope)) / (h[1:] + h[:-1])
-    padded = np.concatenate(([0.0, 0.0], second, [0.0, 0.0]))
-    nearby = np.max([padded[k : k + h.size] for k in range(4)], axis=0)
-    return _CURVATURE * nearby * h**2 / 8.0
+def bend(u: Real, y: Real) -> Real:
+    """How far y may leave its chord in each interval, from the second differences nearby.
+
+    Their steps are as long as the interval, as near as there are points: the noise of closer ones is no
+    curvature.
+    """
+    h, end = np.diff(u), u.size - 1
+    left = np.arange(h.size)
+    right = left + 1
+    after = _ahead(u, right, h)
+    before = end - _ahead(-u[::-1], end - left, h)
+    further, last = _ahead(u, after, h), end - _ahead(-u[::-1], end - before, h)
+    triples = ((last, before, left), (before, left, right), (left, right, after), (right, after, further))
+    return CURVATURE * np.max([_second(u, y, *each) for each in triples], axis=0) * h**2 / 8.0
+
+
+def _ahead(u: Real, at: Ints, step: Real) -> Ints:
+    """The later point whose distance is nearest to a step, in ratio; m where there is none."""
+    at = np.minimum(at, u.size - 1)
+    far = np.maximum(np.searchsorted(u, u[at] + step), at + 1)
+    near, there = far - 1, np.minimum(far, u.size - 1)
+    shorter = (far > there) | ((u[near] - u[at]) * (u[there] - u[at]) >= step**2)
+    return np.where((near > at) & shorter, near, far)
+
+
+def _second(u: Real, y: Real, a: Ints, b: Ints, c: Ints) -> Real:
+    """Size of the second derivative from three points; 0 where one of them lies beyond the ends."""
+    there = (a >= 0) & (c < u.size)
+    a, b, c = a[there], b[there], c[there]
+    first, second = u[b] - u[a], u[c] - u[b]
+    size = np.zeros(there.size)
+    slopes = (y[c] - y[b]) / second - (y[b] - y[a]) / first
+    size[there] = 2.0 * np.abs(slopes) / (first + second)
+    return size
 
 
 def _strip(y: Real, down: Real, up: Real, bend: Real, unresolved: Mask) -> Strip:

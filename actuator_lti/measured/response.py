@@ -18,7 +18,7 @@ CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
 _KNOWN = "what is known goes in a column deviation, or a MeasuredResponse"
 _GUESSED = f"as points scatter about their neighbours; {_KNOWN}"
-_NEIGHBOURS = 17  # points whose scatter tells the noise of one
+NEIGHBOURS = 17  # points whose scatter tells the noise of one
 _FEWEST = 6  # points: of two residuals the median has one degree of freedom
 _UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
@@ -166,11 +166,11 @@ def _scatter(omega: Real, L: Complex) -> Real | None:
                 weight[:, i] *= off[:, j] / (u[beside[:, i]] - u[beside[:, j]])
     residual = y[at] - (weight * y[beside]).sum(axis=1)
     squared = np.abs(residual) ** 2 / (1.0 + (weight**2).sum(axis=1))
-    first = np.clip(np.arange(u.size) - 2 - _NEIGHBOURS // 2, 0, max(at.size - _NEIGHBOURS, 0))
-    window = first[:, None] + np.arange(min(_NEIGHBOURS, at.size))
+    first = np.clip(np.arange(u.size) - 2 - NEIGHBOURS // 2, 0, max(at.size - NEIGHBOURS, 0))
+    window = first[:, None] + np.arange(min(NEIGHBOURS, at.size))
     sigma = np.sqrt(np.median(squared[window], axis=1) / math.log(2.0))
     reach = sigma * student(window.shape[1] // 2, CONFIDENCE)
-    if u.size < _NEIGHBOURS and (reach >= 1.0).all():
+    if u.size < NEIGHBOURS and (reach >= 1.0).all():
         return None
     radius = np.zeros(L.size)
     radius[usable] = np.abs(L[usable]) * reach

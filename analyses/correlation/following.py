@@ -1,0 +1,100 @@
+"""How a record follows its command beside how the design's loops do: what its clock and scale are off by."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import lfilter
+
+from actuator_lti.design.model import Design
+from actuator_lti.types import Floats
+from analyses.correlation.driving import command_of
+from analyses.estimation.least_squares import solve, told_apart
+from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding
+from analyses.records.driven_motion import ratio_of
+from analyses.records.record import Record
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Shares by which a record's clock and the scale of its position are off, 0 where chance explains it."""
+
+    stage: str  # that is commanded; behind a speed clock and scale are one
+    alike: float  # correlation of the recorded motion with the simulated one
+    clock: float  # of the following error, recorded over simulated
+    off: float = 0.0  # of what the position has too much of the motion
+
+    @property
+    def fails(self) -> bool:
+        """Whether they are off by more than an interval can hold."""
+        return self.alike < ALIKE or max(abs(self.clock), abs(self.off)) > RATE_TOLERANCE
+
+    @property
+    def words(self) -> str:
+        """What is off, by how much, and by what."""
+        if self.alike < ALIKE:
+            return f"the motion is not that of the command (correlation {self.alike:.2f})"
+        scale = "counts a revolution, the reduction, or a unit"
+        what, ratio, of = "motion", 1.0 + self.clock, "which the loops make of the commanded speed"
+        cause = f"the clock, {scale}"
+        if abs(self.off) > RATE_TOLERANCE:
+            what, ratio, of = "recorded position", 1.0 + self.off, "which the loops follow the command with"
+            cause = scale
+        elif self.stage == "position":
+            what, of = "following error", "of the design's loops at this motion"
+            clock = f"a clock about {100.0 * self.clock:+.2g} % off"
+            cause = f"{clock}, a command logged early or late, or another gain"
+        return f"the {what} is {ratio:.4g} times that {of}: {cause}"
+
+
+def followed(
+    design: Design, record: Record, simulated: Mapping[str, Floats], command: str | None = None
+) -> Followed | None:
+    """The motion behind a command as a clock: the loops' gains are per second, whatever the drive's torque.
+
+    Inertia, friction and gravity of a record whose clock runs wrong agree with each other, as its torque is
+    right and its motion only stretched. But a position loop T over a velocity loop lags by ``(v + i/Kp)/Kv``
+    (without the second term where the velocity loop has an integral), whatever the motor: a clock off by a
+    factor changes Kv by it, so the motion by ``T (command - motion)``; a scale of the position by a part of
+    the motion. Both are regressed together. A speed is followed one to one: there clock and scale are one.
+    Noise is in the recorded position alone. None where no such loop acts, or the motion does not tell.
+    """
+    design = record.drive(design)
+    control, driven = design.controller, command_of(design, record, command)
+    if driven is None or control.velocity is None or driven.stage not in ("position", "velocity"):
+        return None
+    at_output = driven.stage == "position" and control.position and control.position.sensor != "motor"
+    place = "position" if design.axis == "linear" else "output_angle" if at_output else "angle"
+    if place not in simulated or place not in record.signals:
+        return None
+    model = simulated[place]
+    own = record[place][: len(model)]  # of a long one the first part
+    columns = [model]
+    if driven.stage == "position" and control.position:
+        factor, lag = design.total_ratio if place == "angle" else 1.0, control.position.gain * record.period_s
+        error = factor * driven.values[: len(model)] - model
+        columns = [-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error), model]
+    table = np.column_stack([values - values.mean() for values in columns])
+    kept, _ = told_apart(table, ("clock", "motion")[-len(columns) :])
+    if 0 not in kept or not np.ptp(own):
+        return None
+    size = np.linalg.norm(table[:, kept], axis=0)
+    solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
+    shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
+    _, alike = ratio_of(own - own.mean(), model - model.mean())
+    return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())
+
+
+def following_finding(design: Design, one: Followed) -> Finding:
+    """The same of a design as it is; not determined where the motion is another, which its error tells.
+
+    A speed loop without an integral leaves an error that the design's friction makes: no proof of a clock.
+    """
+    loop, subject = design.controller.velocity, "following error against that of the design's loops"
+    if one.alike < ALIKE:
+        return Finding(subject, None, one.words)
+    if not one.fails:
+        largest = 100.0 * max(abs(one.clock), abs(one.off))
+        return Finding(subject, True, f"within {largest:.2g} %" if largest else "they agree but for chance")
+    passed = None if loop is None or loop.integral_time_s is None else False
+    return Finding(subject, passed, one.words)

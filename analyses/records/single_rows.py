@@ -1,0 +1,51 @@
+"""Rows that no drive can have taken, each by its line, time and value."""
+
+import numpy as np
+from scipy.stats import norm
+
+from actuator_lti.types import Floats, Ints
+from analyses.records.record import Record
+
+MOST_NAMED = 3
+NORMAL = 1.4826  # standard deviation of a normal spread over its median
+
+
+def noise_bound(values: Floats, sure: float) -> float:
+    """What white noise of a signal, known from row to row, reaches in no row, as sure as so many deviations.
+
+    Second differences of white noise have six times its variance; the median passes over single bad rows.
+
+    >>> noise = np.random.default_rng(1).standard_normal(10_000)
+    >>> bool(np.max(np.abs(noise)) < noise_bound(noise, 4.0) < 7.0)
+    True
+    """
+    std = NORMAL * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if len(values) > 2 else 0.0
+    return std * float(norm.isf(norm.sf(sure) / len(values)))
+
+
+def impossible_steps(record: Record, place: Floats, rate: float, sure: float) -> Ints:
+    """The row behind each step of a position that is larger than a rate, a count and noise make it."""
+    step = np.abs(np.diff(place))
+    count = np.min(step, where=step > 0.0, initial=np.inf)
+    most = rate * np.diff(record.time_s) + np.sqrt(2.0) * noise_bound(place, sure)
+    return np.flatnonzero(step > most + (count if np.isfinite(count) else 0.0)) + 1
+
+
+def named_rows(record: Record, rows: Ints, name: str, unit: str, *, jumps: bool = False) -> str:
+    """The first few such rows, with what the file has there in SI; with ``jumps`` the row before as well."""
+    values = record[name]
+
+    def told(row: int) -> str:
+        before = f"from {values[row - 1]:.4g} to " * jumps
+        return f"{before}{values[row]:.4g} {unit} in {place_in_file(record, row)}"
+
+    more = [f"{len(rows) - MOST_NAMED} more"] if len(rows) > MOST_NAMED else []
+    return " and ".join([", ".join(map(told, rows[:MOST_NAMED].tolist())), *more])
+
+
+def place_in_file(record: Record, row: int) -> str:
+    """The line of a row where every line of the file is one, else which row it is; and its time."""
+    counts, number = record.counts, record.first_row + row + 1
+    plain = counts.lines == counts.header + counts.rows_out and record.averaged == 1
+    where = f"line {counts.header + number}" if counts.lines and plain else f"row {number}"
+    return f"{where} ({record.time_s[row]:.6g} s)"
