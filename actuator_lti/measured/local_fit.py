@@ -1,9 +1,9 @@
 """Measured points, each by a straight line through as many about it as the data allow: noise averages out.
 
 Log L over log frequency. A line through n points leaves about 1/sqrt(n) of their noise, and errs by what
-the curvature makes over the window. That is judged as between the points: three times what the parabolas
-through the windows nearby say. The window in which both are least together is taken, point by point; the one
-that holds only the point itself is among them. Points are taken as independent.
+the curvature makes of it: judged, as between the points, by three times what the parabolas nearby say. The
+window in which both are least together is taken, point by point; the one that holds only the point itself is
+among them. Points are taken as independent.
 """
 
 from dataclasses import dataclass
@@ -74,12 +74,14 @@ def _fitted(u: Real, y: Complex, ratio: Real, apart: Mask, half: int) -> _Fit:
 
 
 def _lines(u: Real, y: Complex, ratio: Real, apart: Mask, at: Ints, half: int) -> tuple[Complex, Real, Real]:
-    """Value, radius and curvature at some points, of the lines through the windows about them.
+    """Value, radius and curvature at some points: of a parabola over the window about each, and of a line
+    over the inner half of it, so that the curvature is known better than what it makes of the line.
 
     The radius is infinite where the window holds a resonance between two points, a value lost in noise, or
     values farther off their parabola than their noise in 99 of 100 cases.
     """
-    window = at[:, None] + np.arange(-half, half + 1)
+    offset = np.arange(-half, half + 1)
+    window = at[:, None] + offset
     there = (window >= 0) & (window < u.size)
     window = np.clip(window, 0, u.size - 1)
     values, noise = np.where(there, y[window], 0.0), np.where(there, ratio[window], 0.0)
@@ -92,7 +94,7 @@ def _lines(u: Real, y: Complex, ratio: Real, apart: Mask, at: Ints, half: int) -
     bow = np.where(there, tilt**2 - tilt2 / count - _dot(tilt**2, tilt) / tilt2 * tilt, 0.0)
     mean, slope = values.sum(axis=1, keepdims=True) / count, _dot(tilt, values) / tilt2
     curve = _dot(bow, values) / np.maximum(_dot(bow, bow), np.finfo(float).tiny)
-    weight = np.where(there, 1.0 / count - middle * tilt / tilt2, 0.0)
+    weight = _line_weights(x, there & (np.abs(offset) <= half // 2))
     rest = np.where(there, values - mean - slope * tilt - curve * bow, 0.0)
     bent = 2.0 * _nearby(np.abs(curve[:, 0]))
     off = CURVATURE * bent * np.abs(_dot(weight, x**2)[:, 0]) / 2.0
@@ -101,7 +103,15 @@ def _lines(u: Real, y: Complex, ratio: Real, apart: Mask, at: Ints, half: int) -
     torn = crossed[window[:, -1]] > crossed[window[:, 0]]
     most = _largest(count[:, 0] - 3.0) * (noise**2).sum(axis=1) / count[:, 0]
     wrong = torn | ((np.abs(rest) ** 2).sum(axis=1) > most)
-    return (mean - slope * middle)[:, 0], np.where(wrong, np.inf, radius), bent
+    return _dot(weight, values)[:, 0], np.where(wrong, np.inf, radius), bent
+
+
+def _line_weights(x: Real, there: Mask) -> Real:
+    """Of each value in the least-squares line's at x = 0."""
+    count = there.sum(axis=1, keepdims=True)
+    middle = np.where(there, x, 0.0).sum(axis=1, keepdims=True) / count
+    tilt = np.where(there, x - middle, 0.0)
+    return np.where(there, 1.0 / count - middle * tilt / _dot(tilt, tilt), 0.0)
 
 
 def _dot(one: Real, other: Complex) -> Complex:

@@ -10,6 +10,8 @@ import pytest
 
 from actuator_lti.errors import InputError
 from actuator_lti.margins import MeasuredResponse, StabilityMargins, stability_margins
+from actuator_lti.measured.local_fit import averaged
+from actuator_lti.measured.response import GAUSSIAN
 
 A1 = control.tf([25], [1, 10, 10, 10])
 
@@ -55,6 +57,7 @@ def test_delay_is_applied_exactly_to_data() -> None:
         ([1.0, 2.0, 3.0], [1.0, np.nan, 0.5], "finite"),
         ([1.0, 2.0, 3.0], [1.0, 0.0, 0.5], "not zero"),
         ([1.0, 2.0, 3.0], [1.0, -1.0, 0.5], "too coarse: 2 of 2"),
+        ([1.0, 2.0, 2.0], [1.0, 0.8, 0.8], "2 rad/s is given twice; allowed: each once, repeats as Measured"),
     ],
 )
 def test_unusable_data(omega: list[float], values: list[float], message: str) -> None:
@@ -310,6 +313,7 @@ def test_noise_that_so_few_points_do_not_show_is_said_and_no_range_stated(count:
 
 
 WC, LAG, DELAY = 30.0, 200.0, 2e-3
+CIRCLE = 0.03 * GAUSSIAN
 
 
 def phase_margin_of_the_lag() -> float:
@@ -369,3 +373,18 @@ def test_doubtful_crossings_are_counted_in_one_line() -> None:
     m = stability_margins(MeasuredResponse.with_noise(control.frd(L, omega), 0.01))
     (line,) = (note for note in m.notes if "neither sure nor excluded" in note)
     assert line.startswith("at 20 places between ")
+
+
+@pytest.mark.parametrize("bend", [0.0, 3.0])
+def test_circles_of_averaged_values_hold_the_truth_in_99_of_100(bend: float) -> None:
+    """A power law, and one that bends: log L is a parabola over log frequency."""
+    rng, omega = np.random.default_rng(0), np.geomspace(1.0, 30.0, 600)
+    u = np.log(omega)
+    exact = np.exp(-u - 0.5 * bend * (1.0 + 0.5j) * u**2)
+    inside, narrower = [], []
+    for _ in range(60):
+        L, radius = averaged(omega, exact * (1.0 + 0.03 * circular(rng, u.shape)), CIRCLE * np.abs(exact))
+        inside.append(np.abs(L - exact) <= radius)
+        narrower.append(radius / np.abs(exact) / CIRCLE)
+    assert np.mean(inside) >= 0.99
+    assert np.median(narrower) < 0.5
