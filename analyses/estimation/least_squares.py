@@ -119,6 +119,20 @@ def information_of(w: Floats, noise: Floats) -> Information:
     return Information(gram=w.T @ w, noise=variance * z.T @ z, rows=len(w), order=len(a) - 1)
 
 
+def events_of(w: Floats, noise: Floats) -> Information:
+    """As `information_of`, of noise that comes in events: at a jump, a reversal, a limit, no two alike.
+
+    ``W'e e'W`` from the sums of ``w e`` over root n blocks of root n rows each, whatever their own sizes
+    (White's covariance, clustered; Liang and Zeger, Biometrika 73, 1986). The noise may be that of the first
+    rows only.
+    """
+    blocks = max(int(np.sqrt(len(noise))), 2)
+    parts = np.array_split(w[: len(noise)] * noise[:, None], blocks)
+    sums = np.array([part.sum(axis=0) for part in parts])
+    grown = blocks / max(blocks - w.shape[1], 1) * len(w) / len(noise)
+    return Information(gram=w.T @ w, noise=grown * sums.T @ sums, rows=len(w), order=0)
+
+
 def covariance_of(records: Sequence[Information]) -> Floats:
     """Covariance of the least-squares values that all records together give.
 

@@ -4,12 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
+import numpy as np
+
 from actuator_lti.design import read_design_text, with_values, write_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.asked import FrozenMap
+from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.errors import InputError
 from actuator_lti.types import Progress
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
+from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification import to_design, verdict
 from analyses.identification.asked import Settings, fixed_values, held_by_name
 from analyses.identification.design_values import (
@@ -20,7 +24,12 @@ from analyses.identification.design_values import (
     with_given_constant,
 )
 from analyses.identification.diagnosis import Diagnosed, diagnosed, without_flat_tops
-from analyses.identification.electrical import ElectricalFit, electrical_values, fit_electrical
+from analyses.identification.electrical import (
+    ElectricalFit,
+    electrical_values,
+    fit_electrical,
+    without_own_bias,
+)
 from analyses.identification.friction_map import fit_map
 from analyses.identification.inverse import fit_records, held_out_residual
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, LawChoice, Recipe
@@ -34,6 +43,8 @@ from analyses.records.record import Record, prepared
 
 HELD_OUT_FACTOR = 1.5
 HELD_OUT_EXTRA = 0.02
+ROUNDS = 4
+SETTLED = 0.1  # standard errors by which the motor may still move
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +66,8 @@ class BenchResult(verdict.Identified):
     def inputs(self) -> dict[str, tuple[InputUse, ...]]:
         """The columns of each record, and what each was used for."""
         pairs = zip(self.model.records, self.records, strict=True)
-        return {record.name: account(record, part.used) for part, record in pairs}
+        own = {} if self.electrical is None else {"voltage": "voltage equation: R, kE, L"}
+        return {record.name: account(record, {**own, **part.used}) for part, record in pairs}
 
     @cached_property
     def residual_tests(self) -> tuple[ResidualTest, ...]:
@@ -82,17 +94,13 @@ def identify_bench(
     usual = settings.cutoff_hz is None and settings.decimation is None
     recipe = None if usual else recipe_for(used[0], settings.cutoff_hz, settings.decimation)
     findings = {record.name: check_record(plain, record) for record in (*used, *unseen)}
-    start, electrical = plain, None
-    if settings.electrical:
-        with because(findings):
-            start, electrical = _by_voltage(plain, used, recipe)
-        judged = replace(start, motor=replace(start.motor, resistance_ohm=design.motor.resistance_ohm))
-        findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
-    held = _held(design, start, settings)
     with because(findings):
-        right = diagnosed(design, start, used, partial(_fitted, start, settings, held, recipe), recipe)
-    if electrical is not None and "inductance" in electrical.names:
-        start, electrical = _by_voltage(plain, used, recipe, right.late_s)
+        if settings.electrical:
+            judged = _judged(plain, _by_voltage(plain, used, recipe)[0])
+            findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
+    with because(findings):
+        start, electrical, right = _motor_and_motion(design, plain, used, settings, recipe)
+    held = _held(design, start, settings)
     compared = design_values(design, right.model, right.records, start)
     model, both = _with_constant(start, right, compared, electrical)
     whole = [without_flat_tops(start, record, recipe) for record in unseen]
@@ -120,13 +128,61 @@ def identify_bench(
     )
 
 
+def _motor_and_motion(
+    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
+) -> tuple[Design, ElectricalFit | None, Diagnosed]:
+    """The motor as the voltage tells it, where that is asked, and the motion: in turn.
+
+    The motion needs kM; the motor is found less its own bias on records that are simulated with both.
+    """
+
+    def moved(start: Design) -> Diagnosed:
+        fit = partial(_fitted, start, settings, _held(design, start, settings), recipe)
+        return diagnosed(design, start, records, fit, recipe)
+
+    if not settings.electrical:
+        return plain, None, moved(plain)
+    start, found = _by_voltage(plain, records, recipe)
+    for _ in range(ROUNDS):
+        before, right = found, moved(start)
+        start, found = _by_voltage(plain, records, recipe, (start, right))
+        off = [abs(found[n] - before[n]) - SETTLED * found.std(n) for n in found.names if n in before.names]
+        if found.names == before.names and max(off) < 0.0:
+            break
+    return start, found, right
+
+
 def _by_voltage(
-    plain: Design, records: Sequence[Record], recipe: Recipe | None, late_s: float = 0.0
+    plain: Design,
+    records: Sequence[Record],
+    recipe: Recipe | None,
+    simulated: tuple[Design, Diagnosed] | None = None,
 ) -> tuple[Design, ElectricalFit]:
-    """The design with what the voltage equation tells of its motor, and that fit."""
-    found = fit_electrical(plain, records, recipe, late_s)
+    """The design with what the voltage equation tells of its motor, and that fit.
+
+    Less its own bias where the records were simulated, with the motor of the design given beside them.
+    """
+    if simulated is None:
+        found = fit_electrical(plain, records, recipe)
+    else:
+        start, right = simulated
+        found = fit_electrical(plain, records, recipe, right.late_s)
+        found = without_own_bias(found, start, records, right.model.simulated, recipe)
     told = f"voltage equation of {_names(records)}"
     return to_design.design_with_fit(plain, electrical_values(plain, found), told), found
+
+
+def _judged(plain: Design, start: Design) -> Design:
+    """The design that records are held against: its own, its kE as doubtful as what was found is off."""
+    key, motor = parameter("back_emf").key, start.motor
+    found, parameters = start.parameters[key], dict(plain.parameters)
+    own = plain.motor.back_emf_constant_Vs_rad
+    if own is not None and motor.back_emf_constant_Vs_rad is not None:
+        off = float(np.hypot(own_std(plain, key) or UNSTATED * own, motor.back_emf_constant_Vs_rad - own))
+        parameters[key] = replace(found, value=own, tolerance=Tolerance(kind="normal", std=off))
+        motor = replace(motor, back_emf_constant_Vs_rad=own)
+    motor = replace(motor, resistance_ohm=plain.motor.resistance_ohm)
+    return replace(start, motor=motor, parameters=FrozenMap(parameters))
 
 
 def _names(records: Sequence[Record]) -> str:

@@ -18,7 +18,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.parameters import default_value, own_share, own_std, parameter
-from analyses.identification.electrical import fit_electrical
+from analyses.identification.electrical import fit_electrical, without_own_bias
 from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
 from analyses.records.consistency import SURE, one_phase
@@ -89,6 +89,9 @@ def design_values(
     if whole and known.resistance_ohm is not None and known.back_emf_constant_Vs_rad:
         with suppress(InputError):  # R and kE are not told apart
             electrical = fit_electrical(start, whole, model.asked)
+            likes = [like for like in model.simulated if {"voltage", "current"} <= set(like.signals)]
+            likes = likes if len(likes) == len(whole) else []
+            electrical = without_own_bias(electrical, start, whole, likes, model.asked)
             if any(one_phase(start, record) for record in whole):  # R hangs on the voltage in between
                 del own["resistance"]
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]

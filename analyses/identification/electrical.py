@@ -1,7 +1,7 @@
 """Resistance, back-EMF constant and, only where the record shows it, inductance: from u, i and w."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.signal import butter, filtfilt
@@ -10,7 +10,13 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import solve, told_apart
+from analyses.estimation.least_squares import (
+    covariance_of,
+    events_of,
+    scaled_lstsq,
+    solve,
+    told_apart,
+)
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import Recipe
 from analyses.identification.rows import motion_of, recipe_for
@@ -19,6 +25,7 @@ from analyses.records.record import Record, period_of
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
 SHOWN = 5.0  # a value counts as shown where it exceeds its standard error so many times
+LARGEST_BIAS = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -26,6 +33,9 @@ class ElectricalFit(Fit):
     """``u = R i + kE w + L di/dt + offset`` (equation 1); fixed is what the records do not show."""
 
     relative_residual: float
+    columns: tuple[str, ...]  # of the fit; an inductance that takes up a lag is not among the names
+    at_once: Floats  # what a voltage that acts at once would change of the values
+    bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
 
 
 def fit_electrical(
@@ -54,7 +64,10 @@ def fit_electrical(
     if value > SHOWN * std:  # it takes up the lag, which leaves the others right
         told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
         fit = whole.renamed({name: name for name in rest})
-        again = replace(whole, names=rest, values=fit.values, covariance=fit.covariance)
+        others = [whole.names.index(name) for name in rest]
+        again = replace(
+            whole, names=rest, values=fit.values, covariance=fit.covariance, at_once=whole.at_once[others]
+        )
     else:
         again = _fitted(late, early, rest)
     kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
@@ -63,21 +76,91 @@ def fit_electrical(
 
 def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ...]) -> ElectricalFit:
     """The fit of some parameters, in error by what a voltage that acts at once would make of them."""
-    table = np.concatenate(late)
-    w, u = table[:, [NAMES.index(name) for name in only]], table[:, -1]
+    w, u = _columns(late, only)
     kept, left = told_apart(w, only)
     for one in left:
         if one.name in ("resistance", "back_emf"):
-            raise InputError(f"{parameter(one.name).key}: {one}; vary speed and load, not together only")
-    result = solve(w[:, kept], u, np.cumsum([len(part) for part in late]).tolist())
-    names, table = tuple(only[k] for k in kept), np.concatenate(early)
-    moved = result.values - solve(table[:, [NAMES.index(name) for name in names]], table[:, -1]).values
+            raise InputError(f"{parameter(one.name).key}: {one}; {_instead(one.moves, w, u, only)}")
+    result = solve(w[:, kept], u)
+    names = tuple(only[k] for k in kept)
+    moved = result.values - scaled_lstsq(*_columns(early, names))
+    told = [_residual(table, names, result.values) for table in late]
     return ElectricalFit(
         names=names,
         values=result.values,
-        covariance=result.correlated + np.outer(moved, moved) / 3.0,
+        covariance=covariance_of([events_of(*each) for each in told]) + np.outer(moved, moved) / 3.0,
         fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
+        columns=names,
+        at_once=moved,
+    )
+
+
+def _residual(table: Floats, names: Sequence[str], values: Floats) -> tuple[Floats, Floats]:
+    """The columns of some names of one record, and what their values leave of u."""
+    w, u = _columns([table], names)
+    return w, np.asarray(u - w @ values)
+
+
+def _instead(moves: Mapping[str, float], w: Floats, u: Floats, names: Sequence[str]) -> str:
+    """What to record where R or kE is not told; of a rotor held fast, what it tells all the same."""
+    speed = names.index("back_emf")
+    if moves or np.any(w[:, speed]):
+        return "vary speed and load, not together only"
+    rest = [k for k, name in enumerate(names) if name != "back_emf" and np.any(w[:, k])]
+    kept = [rest[k] for k in told_apart(w[:, rest], [names[k] for k in rest])[0]]
+    result, parts = solve(w[:, kept], u), []
+    for k, value, std in zip(kept, result.values, np.sqrt(np.diag(result.correlated)), strict=True):
+        one = parameter(names[k])
+        if one.key:
+            parts.append(f"{one.key} = {value:.4g} {one.unit} (standard error {std:.2g})")
+    told = f"of the motor held fast the record tells {', '.join(parts)}, " if parts else ""
+    return f"{told}and neither kE nor inertia and friction: these take a record that moves"
+
+
+def _columns(tables: Sequence[Floats], names: Sequence[str]) -> tuple[Floats, Floats]:
+    """The columns of some names of all records, and u."""
+    table = np.concatenate(tables)
+    return table[:, [NAMES.index(name) for name in names]], table[:, -1]
+
+
+def without_own_bias(
+    fit: ElectricalFit,
+    start: Design,
+    records: Sequence[Record],
+    simulated: Sequence[Record],
+    recipe: Recipe | None = None,
+) -> ElectricalFit:
+    """The fit less what the same fit finds too much in records simulated with the motor of ``start``.
+
+    Between the rows the voltage goes on in steps of the controller's tick, of which a row shows one: at a
+    jump of the command it is far from the mean over its interval, and the same way each time, which no
+    residual tells. The simulated rows miss it alike (as `own_bias.without_bias` does for the motion); the
+    errors are those of what the two residuals do not share. A bias as large as half a value stays in it, and
+    in its error.
+    """
+    if not simulated:
+        return fit
+    control, columns, motor = start.controller, fit.columns, start.effective_motor
+    shift = control.computing_delay_s + 0.5 * control.period_s
+    own, other = ([_rows(start, one, recipe, shift) for one in these] for these in (records, simulated))
+    truth = motor.resistance_ohm, motor.back_emf_constant_Vs_rad, motor.inductance_H, 0.0
+    known = {name: value or 0.0 for name, value in zip(NAMES, truth, strict=True)}
+    values, again = (scaled_lstsq(*_columns(tables, columns)) for tables in (own, other))
+    picked = [columns.index(name) for name in fit.names]
+    bias = again[picked] - np.array([known[name] for name in fit.names])
+    if np.any(np.abs(bias) > LARGEST_BIAS * np.abs(fit.values) + fit.standard_errors):
+        return replace(fit, covariance=fit.covariance + np.outer(bias, bias))
+    told = []
+    for measured, model in zip(own, other, strict=True):
+        (w, rest), (_, like) = _residual(measured, columns, values), _residual(model, columns, again)
+        count = min(len(rest), len(like))  # of a long record the first part is simulated
+        told.append(events_of(w, rest[:count] - like[:count]))
+    return replace(
+        fit,
+        values=fit.values - bias,
+        covariance=covariance_of(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
+        bias=dict(zip(fit.names, bias.tolist(), strict=True)),
     )
 
 

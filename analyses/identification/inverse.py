@@ -41,11 +41,12 @@ def fit_records(
 ) -> JointModel:
     """Fit one inverse dynamic model to all records.
 
-    Each record counts with the inverse of its own residual variance, or by its ``weights``. What the records
-    do not tell apart is kept at the design's value, and said; the design's constants make torques of currents
-    or voltages. ``fixed`` holds values by the names of the model, ``gravity`` looks for a moment ``m g l
-    sin(output angle + offset)``, ``knots_rad_s`` (from 0) are speeds of a friction map in the place of dry
-    and viscous friction. The recipe is by default that of each record's own period.
+    Each record counts with the inverse of its own residual variance, or by its ``weights`` in a fit whose own
+    bias is looked for (there no value is kept for being negative). What the records do not tell apart is kept
+    at the design's value, and said; the design's constants make torques of currents or voltages. ``fixed``
+    holds values by the names of the model, ``gravity`` looks for a moment ``m g l sin(output angle +
+    offset)``, ``knots_rad_s`` (from 0) are speeds of a friction map in the place of dry and viscous friction.
+    The recipe is by default that of each record's own period.
 
     Raises `InputError`: if a record lacks a signal, or nothing is left to fit. Raises `NumericalError`: if
     the rows are singular all the same.
@@ -116,9 +117,9 @@ def _fitted(
         solution = problem.solved(weights)
     found = dict(zip(problem.free, solution.values.tolist(), strict=True))
     negative = {name: value for name, value in found.items() if value < 0.0 and name not in SIGNED}
-    if negative:  # as no drive has them
+    if negative and given is None:  # as no drive has them; of a simulated record the bias is as it is
         again = {name: default_value(design, name) for name in negative}
-        return _said(design, problem, negative, _fitted(design, blocks, {**held, **again}, given))
+        return _said(design, problem, negative, _fitted(design, blocks, {**held, **again}, None))
     return _model(design, problem, solution, weights)
 
 

@@ -13,7 +13,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
-from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq
+from analyses.estimation.least_squares import covariance_of, events_of, information_of, scaled_lstsq
 from analyses.estimation.parameters import default_value
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
@@ -24,6 +24,9 @@ from analyses.records.record import Record
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
 ROUNDS = 3
+PLACES = {"angle", "output_angle", "position"}
+ROUNDING = 1e-6  # of a position in a file
+OFF_COUNT = 0.05  # of a count
 SETTLED = 0.1  # standard errors within which a bias that was found again is the one that was found before
 
 
@@ -36,7 +39,7 @@ def without_bias(
     simulated records as by the measured ones; what the fit makes of them is known there (bias correction by
     indirect inference; Gourieroux, Monfort, Renault, 1993). It is taken off, and found again with the
     design that then comes of it. What the simulated records leave of a residual has no chance in it: the
-    errors are those of the difference of the two residuals, with its own autocorrelation. A record without
+    errors are those of the difference of the two residuals, block by block (`events_of`). A record without
     a command is simulated with one that moves the drive as recorded; of a long one the first part is. That
     of the EMPS benchmark, with published figures, is left as it is. ``make`` gives the design that comes of
     a model.
@@ -91,7 +94,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     less = replace(
         model,
         values=model.values - bias,
-        covariance=covariance_of([information_of(*each) for each in weighed]) + np.outer(moved, moved),
+        covariance=covariance_of([events_of(*each) for each in weighed]) + np.outer(moved, moved),
         records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
@@ -164,7 +167,29 @@ def _with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals, _ = model_signals(design, record, {name: record[name] for name in names})
+    signals |= {n: in_counts(signals[n], record[n]) for n in PLACES & signals.keys()}
     return replace(record, signals={**record.signals, **signals})
+
+
+def in_counts(values: Floats, recorded: Floats) -> Floats:
+    """A position as the encoder of a recorded one shows it: at its counts, where all of it is at such.
+
+    Examples
+    --------
+    >>> in_counts(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.25, 0.5, 1.0])).tolist()
+    [0.0, 0.0, 0.25]
+    """
+    levels = np.unique(recorded)
+    steps = np.diff(levels)
+    steps = steps[steps > ROUNDING * np.max(np.abs(levels))]  # of the file
+    if not len(steps):
+        return values
+    count = float(np.mean(steps[steps < 1.5 * np.min(steps)]))
+    many = np.round(steps / count)
+    if np.any(np.abs(steps / count - many) > OFF_COUNT):
+        return values
+    count = float(np.sum(steps) / np.sum(many))
+    return np.asarray(levels[0] + count * np.floor((values - levels[0]) / count + ROUNDING))
 
 
 def _sizes(model: JointModel) -> np.ndarray:

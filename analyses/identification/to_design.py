@@ -15,6 +15,7 @@ from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel
+from analyses.records.consistency import SURE
 
 LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to
@@ -133,8 +134,11 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     except InputError as error:
         if not error.message.startswith(fit.names):
             raise
-        told = f"identified {error.message}; the record does not tell it: it takes a longer motion,"
-        raise InputError(told + " at several speeds in both directions") from error
+        name = max((name for name in fit.names if error.message.startswith(name)), key=len)
+        told = "the record does not tell it: it takes a longer motion, at several speeds in both directions"
+        if name.startswith("motor.") and fit[name] < -SURE * fit.std(name):
+            told = "a column has the other sign, or is another signal"
+        raise InputError(f"identified {error.message}; {told}") from error
     parameters = dict(changed.parameters)
     for path, std in zip(fit.names, fit.standard_errors, strict=True):
         tolerance = _tolerance(path, parameters[path].value, _short(float(std)))

@@ -35,9 +35,10 @@ def section(result: BenchResult) -> doc.Section:
             note += f" {parameter(kept, axis).label}, fixed: {model.fixed[kept].reason}."
         blocks.append(identified.parameter_table("Refined by simulation", refined, note, axis=axis))
     if result.electrical is not None:
-        residual = 100.0 * result.electrical.relative_residual
-        note = f"u = R i + kE w + L di/dt; relative residual {residual:.3g} %."
-        blocks.append(identified.parameter_table("Voltage equation", result.electrical, note))
+        found = result.electrical
+        note = f"u = R i + kE w + L di/dt; relative residual {100.0 * found.relative_residual:.3g} %."
+        more = [doc.of(dict(found.bias).get, "bias", "Bias removed", format="sig:2")] if found.bias else []
+        blocks.append(identified.parameter_table("Voltage equation", found, note, more=more))
     blocks += [law_table(result, axis)] if result.laws else []
     blocks += [scatter_table(model, axis)] if len(result.records) > 1 else []
     for part, record in zip(model.records, result.records, strict=True):
@@ -99,9 +100,10 @@ def _parameters(model: JointModel, axis: str) -> doc.Block:
     if model.bias:
         more.append(doc.of(dict(model.bias).get, "bias", "Bias removed", format="sig:2"))
     note = (
-        "White residuals: ordinary least squares, as is usually published. Standard error: with the "
-        "autocorrelation of the residuals, and the scatter between records where there are several; this one "
-        "goes into the design." + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
+        "White residuals: ordinary least squares, as is usually published. Standard error: of "
+        "residuals that are correlated and not alike everywhere, and the scatter between records where there "
+        "are several; this one goes into the design."
+        + (f" Bias of the fit: {model.bias_told}." if model.bias_told else "")
     )
     return identified.parameter_table("Identified parameters", model, note, axis=axis, more=more)
 

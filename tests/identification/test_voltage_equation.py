@@ -1,0 +1,210 @@
+"""R, kE, L and the motion of records whose truth is an integration of its own, not the simulator's."""
+
+from math import copysign, exp, floor, pi
+
+import numpy as np
+import pytest
+
+from actuator_lti.design import read_design_text, with_values
+from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
+from analyses.identification.asked import Settings
+from analyses.identification.bench import BenchResult, identify_bench
+from analyses.identification.own_bias import in_counts
+from analyses.records.record import Record
+from tests.identification.bench_records import record_of
+
+OHM, HENRY, BACK, RATIO = 0.6, 3e-4, 0.05, 50.0
+INERTIA, DRY, VISCOUS = 6e-5, 0.012, 4e-5
+TICK_S, STEPS = 1e-4, 4
+TEXT = """
+[design]
+name = "mid"
+[motor]
+resistance = "0.6 ohm"
+inductance = "0.0003 H"
+torque_constant = "0.05 N*m/A"
+back_emf_constant = "0.05 V*s/rad"
+rotor_inertia = "4e-05 kg*m^2"
+[[gear]]
+name = "g"
+ratio = 50
+[load]
+inertia = "0.05 kg*m^2"
+path = "back-drivable"
+moment_max = "5 N*m"
+[friction]
+law = "coulomb"
+dry_torque = "0.012 N*m"
+viscous = "4e-05 N*m*s/rad"
+load_coefficient = 0
+breakaway_ratio = 1
+offset_torque = "0 N*m"
+[encoder]
+speed = "ideal"
+[limits]
+voltage = "48 V"
+speed = "600 rad/s"
+peak_current = "20 A"
+[control]
+period = "100 us"
+computing_delay = "50 us"
+[control.current]
+gain = "0.75 V/A"
+integral_time = "0.0005 s"
+[control.velocity]
+gain = "0.45 A*s/rad"
+every = 1
+integral_time = "0.02 s"
+[control.position]
+gain = "50 1/s"
+every = 1
+[validation]
+full_deflection = "28.6 deg"
+amplitude_fractions = [0.1]
+loads = ["0 N*m"]
+"""
+
+
+def _held(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)
+
+
+def _driven(command: np.ndarray) -> np.ndarray:
+    """Angle, current and voltage at each tick: the drive of TEXT under a position command at the output.
+
+    Exact in the winding and of the first order in the motion, over quarters of a tick; the voltage acts half
+    a tick after its sample, and the integrators stand still at their limits.
+    """
+    h = TICK_S / STEPS
+    decay = exp(-OHM * h / HENRY)
+    angle = speed = current = acting = of_speed = of_current = 0.0
+    rows = np.empty((len(command), 3))
+    for k, wanted in enumerate((RATIO * command).tolist()):
+        off = _held(50.0 * (wanted - angle), 600.0) - speed
+        more = of_speed + 0.45 * TICK_S / 0.02 * off
+        asked = _held(0.45 * off + more, 20.0)
+        of_speed = more if abs(asked) < 20.0 else of_speed
+        more = of_current + 0.75 * TICK_S / 0.0005 * (asked - current)
+        voltage = _held(0.75 * (asked - current) + more, 48.0)
+        of_current = more if abs(voltage) < 48.0 else of_current
+        rows[k] = angle, current, voltage
+        for step in range(STEPS):
+            u = acting if 2 * step < STEPS else voltage
+            settled = (u - BACK * speed) / OHM
+            current = settled + (current - settled) * decay
+            torque, before = BACK * current - VISCOUS * speed, speed
+            if speed == 0.0:
+                speed = h / INERTIA * copysign(max(abs(torque) - DRY, 0.0), torque)
+            else:
+                speed += h / INERTIA * (torque - copysign(DRY, speed))
+                speed = 0.0 if speed * before < 0.0 and abs(torque) <= DRY else speed
+            angle += 0.5 * h * (before + speed)
+        acting = voltage
+    return rows
+
+
+def _command(kind: str) -> np.ndarray:
+    time = np.arange(40_000) * TICK_S
+    if kind == "square":
+        return np.radians(17.0) * np.sign(np.sin(pi * time - 0.3)) * (time > 0.2)
+    waves = 0.7 * np.sin(4.4 * time) + 0.3 * np.sin(14.5 * time + 1.0) - 0.3 * np.sin(1.0)
+    return np.asarray(0.25 * waves * np.clip(time / 0.2, 0.0, 1.0))
+
+
+@pytest.fixture(scope="module", params=["square", "sines"])
+def ticks(request: pytest.FixtureRequest) -> Record:
+    """The drive at every tick."""
+    command = _command(request.param)
+    angle, current, voltage = _driven(command).T
+    signals = {"reference": command, "angle": angle, "current": current, "voltage": voltage}
+    return record_of(np.arange(len(command)) * TICK_S, request.param, **signals)
+
+
+def _every(record: Record, count: int) -> Record:
+    signals = {name: values[::count] for name, values in record.signals.items()}
+    return record_of(record.time_s[::count], record.name, **signals)
+
+
+def _design(**changes: float) -> Design:
+    design = read_design_text(TEXT)
+    return with_values(design, {f"motor.{key}": value for key, value in changes.items()})
+
+
+def _identified(record: Record, **changes: float) -> BenchResult:
+    return identify_bench(_design(**changes), [record], settings=Settings(electrical=True))
+
+
+@pytest.mark.parametrize("every", [1, 5, 10])
+def test_rows_thinned_out_tell_the_motor_within_their_intervals(ticks: Record, every: int) -> None:
+    """The voltage at a tenth of the ticks is not its mean between them: kE was off by ten standard errors."""
+    result = _identified(
+        _every(ticks, every), back_emf_constant=0.047, torque_constant=0.047, resistance=0.55
+    )
+    fit, truth = result.electrical, {"resistance": OHM, "back_emf": BACK, "inductance": HENRY}
+    for name in truth.keys() & set(fit.names):
+        assert abs(fit[name] - truth[name]) < 3.5 * fit.std(name), name
+    assert fit["back_emf"] == pytest.approx(BACK, rel=1e-3)
+    assert abs(result.model["inertia"] - INERTIA) < 3.5 * result.model.std("inertia")
+    assert result.passed
+
+
+def test_a_voltage_that_one_row_misses_is_in_the_intervals(ticks: Record) -> None:
+    """10 V over 5 ms at twelve places, which no simulated record has; the noise elsewhere is 1 mV."""
+    record = _every(ticks, 10)
+    rng, off = np.random.default_rng(3), np.zeros(len(record))
+    off[rng.integers(200, len(record) - 200, 12)[:, None] + np.arange(5)] = 10.0
+    noise = 1e-3 * rng.standard_normal(len(record))
+    hit = {**record.signals, "voltage": record["voltage"] + off * np.sign(rng.normal(size=len(off))) + noise}
+    fit = _identified(record_of(record.time_s, "hit", **hit)).electrical
+    assert abs(fit["back_emf"] - BACK) < 3.5 * fit.std("back_emf")
+
+
+@pytest.mark.parametrize("counts", [256, 1024])
+def test_a_coarse_encoder_does_not_make_the_inertia_small(ticks: Record, counts: int) -> None:
+    """Noise of the acceleration takes from the inertia; what it takes is known of a simulated encoder."""
+    record, count = _every(ticks, 10), 2.0 * pi / counts
+    seen = np.array([count * floor(angle / count) for angle in record["angle"]])
+    signals = {**record.signals, "angle": seen}
+    del signals["voltage"]
+    rng = np.random.default_rng(counts)
+    signals["current"] = record["current"] + 4e-3 * rng.standard_normal(len(seen))
+    model = identify_bench(_design(), [record_of(record.time_s, "coarse", **signals)]).model
+    assert abs(model["inertia"] - INERTIA) < 3.0 * model.std("inertia")
+    assert model["inertia"] == pytest.approx(INERTIA, rel=5e-3)
+
+
+def test_counts_are_those_of_the_record_and_no_others() -> None:
+    rng = np.random.default_rng(1)
+    angle, count = rng.uniform(-20.0, 20.0, 4000), 2.0 * pi / 256
+    recorded = np.array([float(f"{np.degrees(count) * k:.8g}") for k in np.floor(angle / count)])
+    assert in_counts(np.degrees(angle), recorded) == pytest.approx(recorded, abs=1e-4)
+    assert np.array_equal(in_counts(angle, angle), angle)
+
+
+def test_a_record_is_held_against_one_design(ticks: Record) -> None:
+    """R i and kE w, both as the design has them, and the voltage is used."""
+    result = _identified(_every(ticks, 1), back_emf_constant=0.047, torque_constant=0.047)
+    (finding,) = (one for one in result.findings[ticks.name] if one.subject.startswith("voltage against R"))
+    assert finding.passed
+    assert "kE w is 1.06 to 1.06 times as the design has it" in finding.text
+    ratio = next(one.ratio for one in result.design_values if one.name == "back_emf")
+    assert ratio == pytest.approx(0.05 / 0.047, rel=1e-3)
+    assert result.passed
+
+
+def test_a_reversed_column_is_not_answered_with_a_longer_motion(ticks: Record) -> None:
+    record = _every(ticks, 10)
+    turned = record_of(record.time_s, "r", **{**record.signals, "current": -record["current"]})
+    with pytest.raises(InputError, match=r"current is reversed.*a column has the other sign"):
+        _identified(turned)
+
+
+def test_a_motor_held_fast_tells_resistance_and_inductance() -> None:
+    """u = R i + L di/dt, by the derivative of the current itself; the voltage acts 0.1 ms later."""
+    time, turn = np.arange(20_000) * TICK_S, 2.0 * pi * 40.0
+    current = np.sin(turn * time)
+    voltage = OHM * np.sin(turn * (time + TICK_S)) + HENRY * turn * np.cos(turn * (time + TICK_S))
+    record = record_of(time, "fast", angle=np.zeros_like(time), current=current, voltage=voltage)
+    with pytest.raises(InputError, match=r"resistance = 0\.6 ohm .*inductance = 0\.000(3|299\d) H .*moves"):
+        _identified(record)
