@@ -120,14 +120,13 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
         values = np.asarray(source.frdata).ravel()
         columns = {"f_hz": np.asarray(source.omega) / (2.0 * np.pi), "re": values.real, "im": values.imag}
         dt = getattr(source, "dt", None)
-        dt = None if dt is True else dt
-        if not isinstance(source, MeasuredResponse) or not source.noise_known:
-            read = _response(columns, "measured response", averages)
-            return replace(read, read_as="", period_s=dt)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            columns["deviation"] = source.radius / np.abs(values) / GAUSSIAN
+        known = source if isinstance(source, MeasuredResponse) and source.noise_known else None
+        if known is not None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                columns["deviation"] = known.radius / np.abs(values) / GAUSSIAN
         read = _response(columns, "measured response", averages)
-        return replace(read, noise=source.source, read_as="", period_s=dt)
+        read = replace(read, read_as="", period_s=None if dt is True else dt)
+        return read if known is None else replace(read, noise=known.source)
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
     with in_file(shown_path(source)):

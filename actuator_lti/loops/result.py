@@ -31,8 +31,8 @@ class Loop:
     With e the error there, y what comes back: ``y = L e``, ``e = r - y``.
 
     ``name``: "current", "velocity", "position", or the break point with all other loops closed.
-    ``break_point``: where it is cut: "u", "i_ref", "w_ref", "output". Cutting a loop at its own error gives
-    the same L, as all is in series.
+    ``break_point``: where it is cut: "u", "i_ref", "w_ref", "output". A loop cut at its own error has the
+    same L where nothing is fed forward: that stays closed there.
     ``plain_open``, ``plain_closed``, ``plain_sensitivity``: the `PlainSystem` or `PlainDelaySystem` that
     `open_loop`, `closed_loop` and `sensitivity` are made of when they are first asked for; all figures take
     these as well.

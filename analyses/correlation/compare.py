@@ -13,9 +13,8 @@ from analyses.records.single_rows import NORMAL
 
 ORDERS = (1, 2, 4)  # of the differences in which noise shows
 LEAST_ROWS = 100
-CHANCE = (
-    5.26  # variance of s^2 by the fourth differences of n rows, times n over s^4: 2 sum (C(8, 4+k)/C(8, 4))^2
-)
+CHANCE = 2.0 * comb(16, 8) / comb(8, 4) ** 2
+"""Variance of s^2 by the fourth differences of n rows, times n over s^4: 2 sum (C(8, 4+k)/C(8, 4))^2."""
 
 
 @dataclass(frozen=True, kw_only=True)

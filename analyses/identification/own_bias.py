@@ -174,8 +174,6 @@ def _with_model_signals(design: Design, record: Record) -> Record:
 def in_counts(values: Floats, recorded: Floats) -> Floats:
     """A position as the encoder of a recorded one shows it: at its counts, where all of it is at such.
 
-    Examples
-    --------
     >>> in_counts(np.array([0.1, 0.2, 0.3]), np.array([0.0, 0.25, 0.5, 1.0])).tolist()
     [0.0, 0.0, 0.25]
     """

@@ -8,6 +8,7 @@ from scipy.stats import norm
 from actuator_lti.types import Floats
 from analyses.identification.steady import SteadyPoint
 from analyses.records.campaign_file import Instruments
+from analyses.records.single_rows import NORMAL
 
 DRAWS = 1 << 15
 LEVEL = 0.01  # probability of a false alarm in a campaign
@@ -79,7 +80,7 @@ def standardised(x: Floats, y: Floats, variance: Floats, shared: Floats) -> tupl
     for step in range(30):
         root = np.sqrt(weight)
         rest = (b - a @ np.linalg.lstsq(a * root[:, None], b * root, rcond=None)[0])[:count]
-        scale = max(1.4826 * float(np.median(np.abs(rest))), 1.0)
+        scale = max(NORMAL * float(np.median(np.abs(rest))), 1.0)
         size = np.maximum(np.abs(rest) / scale, 1e-6)
         weight[:count] = 1.0 / size if step < 15 else np.minimum(1.0, 1.345 / size)
     return rest / scale, float(norm.isf(0.5 * LEVEL / count))

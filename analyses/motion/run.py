@@ -33,7 +33,7 @@ class Motion:
     def ended(self) -> Conduct:
         """What it ends in; of a drive that turns, without the torques that pass as well where it swings."""
         passing = self._passing_hz()
-        own = conduct(self.run, self.design.validation.full_deflection_rad, passing)
+        own = conduct(self.run, self.design.validation.full_deflection_rad)
         if own.status != "limit cycle" or not passing:
             return own
         bare = motion(straight(self.design), replace(self.asked, csv=None, parquet=None)).ended

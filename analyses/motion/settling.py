@@ -1,9 +1,8 @@
 """What a motion of a drive ends in, a step above all: one word (`nonlinear.settling.rest`) for all."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from math import degrees, inf, radians
-from types import MappingProxyType
 
 import numpy as np
 
@@ -17,11 +16,10 @@ from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle
 from nonlinear.rows import Rows
 from nonlinear.runs.trajectory import COMMAND_UNITS, Trajectory
-from nonlinear.settling.rest import ALIKE, Rest, judge
+from nonlinear.settling.rest import Rest, judge
 
 SMALL = 1e-3  # of full deflection: a step beside those that the design asks for
 NEAR = 0.02  # of the largest value: a run that ends within it has settled
-NOTHING: Mapping[str, float] = MappingProxyType({})
 NOTICED = 1e-6  # of full deflection: a smaller swing is listed, and is rest
 
 
@@ -252,13 +250,10 @@ class Conduct:
         return self.status in ("comes to rest", "becomes steady", "following")
 
 
-def conduct(
-    run: Trajectory, full_deflection_rad: float = 0.0, passing_hz: Mapping[str, float] = NOTHING
-) -> Conduct:
+def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
     """Judge a run; where its end comes too early, the drive is followed beyond it.
 
-    Swings that are too small beside full deflection (m on a linear axis) are rest. One as often as something
-    passes at the commanded speed, cogging say, is its ripple.
+    Swings that are too small beside full deflection (m on a linear axis) are rest.
 
     >>> from nonlinear import commands, simulate
     >>> conduct(simulate("ilr33-amber", commands.step(0.01), duration_s=0.2)).status
@@ -276,9 +271,6 @@ def conduct(
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
         longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # a period than the run
         beyond = f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
-        hertz = rest.frequency_hz or 0.0
-        if of := [name for name, each in passing_hz.items() if abs(hertz - each) <= ALIKE * each]:
-            return Conduct("ripple", f"{text}, as often as a period of the {of[0]} passes", beyond)
         return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:

@@ -12,6 +12,7 @@ from analyses.estimation.means import best_lag, correlation_time
 from analyses.records.campaign_file import Method
 from analyses.records.factors import named_factor
 from analyses.records.record import Record
+from analyses.records.single_rows import NORMAL
 
 RATE_SPREAD = 0.01  # two clocks are taken to differ by less than 1 % in rate; anything else is no clock error
 GRID = 4000
@@ -121,7 +122,7 @@ def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | No
     """
     floor, plateau = np.quantile(magnitude, [0.01, 0.95])
     level = 0.5 * (floor + plateau)
-    noise = 1.4826 * float(np.median(np.abs(np.diff(magnitude)))) / np.sqrt(2.0)
+    noise = NORMAL * float(np.median(np.abs(np.diff(magnitude)))) / np.sqrt(2.0)
     up = np.flatnonzero(magnitude >= level)
     if plateau - floor <= max(6.0 * noise, 1e-12 * abs(plateau)) or up[0] == 0:
         return None

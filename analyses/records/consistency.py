@@ -18,7 +18,7 @@ from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wron
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
 from analyses.records.record import DISORDER, Record
-from analyses.records.single_rows import impossible_steps, named_rows, noise_bound
+from analyses.records.single_rows import NORMAL, impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
@@ -247,7 +247,7 @@ def _time(design: Design, record: Record) -> Finding | None:
 def _sign(design: Design, record: Record) -> Finding | None:
     """A current that would drive the other way; with a voltage, that says of which signal the sign is."""
     place = place_of(design, record)
-    if place is None or not {"current"} <= record.signals.keys() or "voltage" in record.signals:
+    if place is None or "current" not in record.signals or "voltage" in record.signals:
         return None
     smooth = (_smooth(record, values) for values in (record["current"], place[1]))
     told = turned_current(design, record, smooth)
@@ -315,7 +315,7 @@ def _steps(design: Design, record: Record) -> Finding | None:
         """A step of each row over those beside it, 0 where these are not alike; how many are."""
         mean, size = rows[:, beside].mean(axis=1), np.abs(rows[:, beside].mean(axis=1))
         alike = np.all(np.abs(rows[:, beside] - mean[:, None]) < STEADY * size[:, None], axis=1)
-        noise = 1.4826 * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
+        noise = NORMAL * float(np.median(np.abs(rows[:, at] - mean)))  # of a normal deviation
         alike &= (STEADY * size > count) & (0.5 * size > SURE * noise)
         share = np.divide(rows[:, at], mean, out=np.zeros(len(mean)), where=alike)
         return share, int(np.count_nonzero(alike))

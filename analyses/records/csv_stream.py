@@ -181,8 +181,6 @@ class _File:
 def text_of(data: bytes, encoding: str = UTF_8) -> str:
     """Text in its encoding; what is no UTF-8, where that is the default, is Windows-1252.
 
-    Examples
-    --------
     >>> text_of("Winkel [°]".encode("cp1252")), text_of("Winkel [°]".encode())
     ('Winkel [°]', 'Winkel [°]')
     """

@@ -1,7 +1,7 @@
 """Rows that no drive can have taken, each by its line, time and value."""
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from actuator_lti.types import Floats, Ints
 from analyses.records.record import Record
@@ -20,7 +20,7 @@ def noise_bound(values: Floats, sure: float) -> float:
     True
     """
     std = NORMAL * float(np.median(np.abs(np.diff(values, 2)))) / np.sqrt(6.0) if len(values) > 2 else 0.0
-    return std * float(norm.isf(norm.sf(sure) / len(values)))
+    return std * -float(ndtri(ndtr(-sure) / len(values)))
 
 
 def impossible_steps(record: Record, place: Floats, rate: float, sure: float) -> Ints:
