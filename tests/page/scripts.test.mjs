@@ -75,6 +75,11 @@ const read = (text, changed = {}, of = undefined) => {
   const table = tableOf(text), found = guess(table, MEASURED.angle, changed.kind), choice = { ...found, columns: { ...found.columns, ...changed.columns }, units: { ...found.units, ...changed.units } };
   return found.kind === "record" ? recordOf("a", table, choice, MEASURED.angle) : responseOf("a", table, choice, of);
 };
+test("rows of one frequency are repeats: their mean, as on the command line; a copy counts once", () => {
+  const found = read("f_Hz,re,im\n2,3,0\n1,1,0\n1,3,2\n1,3,2\n");
+  assert.deepEqual([found.hertz, found.re, found.im], [[1, 2], [2, 3], [1, 0]]);
+  assert.throws(() => read("f_Hz,re,im\n1,1,0\n1,3,2\n"), /two frequencies/);
+});
 test("columns are found by name and unit, or as chosen, or refused in words", () => {
   const text = "# bench\ntime_ms;note;angle_deg;command_deg\n10;1;0;0\n20;1;90;180\nx;1;2;3\n", found = read(text);
   assert.deepEqual([found.time, found.left], [[0, 0.01], 1]);

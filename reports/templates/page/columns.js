@@ -73,16 +73,22 @@ export const responseOf = (name, table, choice, of = "L") => {
   if (weight.some((share) => share < 0 || share > 1)) throw new Error("a coherence outside 0 to 1");
   const parts = unit("size") === "re";
   if (parts !== (unit("turn") === "im")) throw new Error("a real part goes with an imaginary part, a magnitude with a phase");
-  if (new Set(hertz).size < hertz.length) throw new Error("a frequency is given twice");
-  const points = order.sort((a, b) => hertz[a] - hertz[b]).map((k) => {
+  const at = new Map(); // by frequency; rows of one frequency are repeats, a copy of a row is none
+  for (const k of order.sort((a, b) => hertz[a] - hertz[b])) {
     const gain = unit("size") === "dB" ? 10 ** (size[k] / 20) : size[k], angle = turn[k] * unit("turn");
     const [re, im] = parts ? [size[k], turn[k]] : [gain * Math.cos(angle), gain * Math.sin(angle)];
     if (!Number.isFinite(re + im) || !(re || im)) throw new Error("a value that is 0 or beyond the range of numbers");
+    const there = at.get(hertz[k]) ?? at.set(hertz[k], []).get(hertz[k]);
+    if (!there.some((one) => one[0] === re && one[1] === im)) there.push([re, im, weight[k]]);
+  }
+  if (at.size < 2) throw new Error(`every row is at ${hertz[0]} Hz: two frequencies or more are needed`);
+  const means = [...at.values()].map((each) => [0, 1, 2].map((part) => each.reduce((sum, one) => sum + one[part], 0) / each.length));
+  const points = means.map(([re, im]) => {
     const far = of === "T" ? (1 - re) ** 2 + im ** 2 : re * re + im * im;
     if (of === "T") return [(re - re * re - im * im) / far, im / far]; // T / (1 - T)
     return of === "S" ? [re / far - 1, -im / far] : [re, im]; // 1 / S - 1
   });
-  return { name, hertz: order.map((k) => hertz[k]), re: points.map(([re]) => re), im: points.map(([, im]) => im), weight: order.map((k) => weight[k]), known, left };
+  return { name, hertz: [...at.keys()], re: points.map(([re]) => re), im: points.map(([, im]) => im), weight: means.map(([, , share]) => share), known, left };
 };
 // rms of what a model leaves over, and its fit: 100 (1 - |y - model| / |y - mean of y|) per cent
 export const fitOf = (measured, model) => {
