@@ -134,15 +134,12 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
         f"sampled loop, {noise}.{f' {read[:1].upper()}{read[1:]}.' if read else ''}"
     )
-    own: list[doc.Shown] = [
-        (doc.column("own", "Design", format="sig:5"), lambda key: result.own[key]),
-        (
-            doc.column("ratio", "Over it", format="sig:3"),
-            lambda key: result.own[key] and fit[key] / result.own[key],
-        ),
+    own, axis = result.own, result.design.axis
+    more = [
+        doc.of(own.__getitem__, "own", "Design", format="sig:5"),
+        doc.of(lambda key: own[key] and fit[key] / own[key], "ratio", "Over it", format="sig:3"),
     ]
-    axis = result.design.axis
-    blocks = [identified.parameter_table("Identified values", fit, axis=axis, more=own)]
+    blocks = [identified.parameter_table("Identified values", fit, axis=axis, more=more)]
     both = decibels_and_degrees(measured.response, result.modelled)
     for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
         chart, panel = style.plot(280.0, "frequency, Hz", label, "x")
@@ -151,10 +148,8 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
-    values = "; ".join(
-        f"{parameter(name).key} {identified.value_words(fit, name, result.design.axis)}" for name in fit.names
-    )
-    values += identified.constant_words(fit, result.design.axis)
+    found = (f"{parameter(name).key} {identified.value_words(fit, name, axis)}" for name in fit.names)
+    values = "; ".join(found) + identified.constant_words(fit, axis)
     return identified.judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )
