@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
