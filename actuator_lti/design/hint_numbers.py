@@ -14,8 +14,7 @@ from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.stated import CONVENTION, Frame
 from actuator_lti.design.units import parse_quantity, parse_unit
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown
 
 _TAKES = re.compile(r', which takes "([^"]*)"( too)?')
 _AT_MOTOR = re.compile(

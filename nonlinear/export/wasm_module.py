@@ -24,7 +24,7 @@ from actuator_lti.batch import _figures, _quoted, _response, _run, _withheld
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.program import Program, emit_c
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from nonlinear.export import linear, linear_loops
 from nonlinear.export.program import ENTRIES, HEAD, header_text, template
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from actuator_lti.asked.quantities import CUSTOMARY, QUANTITIES, Quantity, unit_words
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.finite import finite
 from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
