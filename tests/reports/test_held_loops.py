@@ -44,7 +44,7 @@ def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
 
 
 def overfed(slope_Nm_rad: float = -1.0) -> Design:
-    """1.3 times the back-EMF fed forward, J s (R + Kp) < 0.3 kM kE at s = 0: the rotor runs away by itself."""
+    """1.3 times the back-EMF fed forward, J s (R + Kp) < 0.3 kM kE at s = 0: the rotor runs away."""
     law = {"integral_time_s": None, "back_emf_feedforward": 1.3}
     return pushed(slope_Nm_rad, controller={"current": law}, requirements=())
 
