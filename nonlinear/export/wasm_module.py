@@ -1,11 +1,9 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
 The module is a wasi reactor without imports: the tick of the drive, its loops found by running that tick
-(`nonlinear.export.linear_loops`), and the figures of a loop by the kernels of
-`actuator_lti.batch`.  Rows lie in
-its memory; functions that end in ``_at`` say where.  A host writes the row of a run
-(`nonlinear.row.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs
-and
+(`nonlinear.export.linear_loops`), and the figures of a loop by the kernels of `actuator_lti.batch`. Rows lie
+in its memory; functions that end in ``_at`` say where. A host writes the row of a run
+(`nonlinear.row.parameters.design_row`) at ``p_at()``. Then ``start()`` and ``tick()`` run it, with inputs and
 outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
 its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
 (`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
