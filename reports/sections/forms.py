@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from actuator_lti.design.model import Design
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.loops.delay_budget import DelayBudget
 from analyses.linear.loop_figures import LoopFigures
 from analyses.linear.loop_survey import BreakPoint, OperatingPointFigures

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from actuator_lti.design.control import Stage
 from actuator_lti.drive.signals import LIMITERS, Limiter
 from actuator_lti.files.atomic import write_text
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.motion.run import Motion
 from analyses.motion.settling import Conduct, summary
 from nonlinear import Trajectory
