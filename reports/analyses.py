@@ -13,7 +13,7 @@ from inspect import cleandoc
 from typing import TYPE_CHECKING, Any
 
 from actuator_lti.asked.verdict import Verdict
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.corners.asked import Asked as CornersAsked
 from analyses.correlation.asked import Asked as CorrelationAsked
 from analyses.duty.asked import Asked as DutyAsked

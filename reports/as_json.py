@@ -11,8 +11,7 @@ import numpy as np
 
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
-from actuator_lti.files.reading import shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown_path
 from analyses.linear.loop_figures import HELD, LoopFigures
 from reports.document import plain
 

@@ -18,8 +18,7 @@ from actuator_lti.asked.quantities import shown_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design, Waiver
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import parse_json, read_json, shown, shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, parse_json, read_json, shown, shown_path
 from reports.certain import certain
 from reports.charts.chart import Chart
 from reports.charts.data import chart_data

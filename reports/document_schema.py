@@ -21,8 +21,7 @@ from pydantic import (
 from typing_extensions import TypedDict
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown
 
 SCHEMA: Final = "actuator-lti/report"
 VERSION: Final = 2

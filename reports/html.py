@@ -18,7 +18,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined, select_autoescap
 from markupsafe import Markup
 
 from actuator_lti.files.atomic import write_together
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.types import Progress
 from reports.charts.svg import draw_all
 from reports.document import dumps, figures, loads

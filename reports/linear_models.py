@@ -16,7 +16,7 @@ import numpy as np
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Form, Loop, Loops, assemble_loops, exact_margins
 from actuator_lti.margins import stability_margins
 from nonlinear.export.c_files import stage_words

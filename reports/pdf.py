@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.files.atomic import write_bytes
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.start.extras import need
 from reports.charts.svg import draw_all
 from reports.document import column, figures, judged, section, shown_fact, table, walk

@@ -9,7 +9,7 @@ from functools import cache
 from pathlib import Path
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.start.extras import package_version
 
 LIBRARIES = ("control", "numpy", "scipy", "matplotlib", "jinja2")

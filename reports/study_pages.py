@@ -7,7 +7,7 @@ from typing import Any
 from actuator_lti.design import design_hash
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import DC_PER_A
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.isolation import Missing
 from reports import document as doc
 from reports.document_schema import Document

@@ -1,8 +1,9 @@
 """What is asked and known of a drive as data: studies, requirements, tolerances, pedigree, objects."""
 
-from collections.abc import Iterator, Mapping
+import copyreg
 from dataclasses import dataclass, field
 from math import inf
+from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from actuator_lti.asked.quantities import QUANTITIES
@@ -151,29 +152,15 @@ class Parameter:
     stated: str = field(default="", compare=False)
 
 
-class FrozenMap(Mapping[str, Any]):
-    """A mapping that stays as it is and can be sent to a worker; equal to any with the same items.
+FrozenMap = MappingProxyType
+"""A mapping that stays as it is, equal to any with the same items."""
 
-    >>> FrozenMap({"a": 1}) == {"a": 1}
-    True
-    """
 
-    __slots__ = ("_items",)
+def _frozen(items: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    return FrozenMap(items)
 
-    def __init__(self, items: Mapping[str, Any] | None = None) -> None:
-        self._items = dict(items or {})
 
-    def __getitem__(self, key: str) -> Any:
-        return self._items[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._items)
-
-    def __len__(self) -> int:
-        return len(self._items)
-
-    def __repr__(self) -> str:
-        return f"FrozenMap({self._items!r})"
+copyreg.pickle(FrozenMap, lambda held: (_frozen, (dict(held),)))  # so that it can be sent to a worker
 
 
 @dataclass(frozen=True)

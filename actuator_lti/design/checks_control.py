@@ -72,15 +72,11 @@ def _tracking(design: Design) -> Iterator[Refusal]:
 
 def _windup(design: Design) -> Iterator[Refusal]:
     for name in ("velocity", "current"):
-        loop = getattr(design.controller, name)
-        if loop is not None and loop.integral_time_s is None and loop.anti_windup != "conditional":
+        if (loop := getattr(design.controller, name)) is None:
+            continue
+        if loop.integral_time_s is None and loop.anti_windup != "conditional":
             yield f"control.{name}.anti_windup", f'"{loop.anti_windup}"', "needs integral_time"
-
-
-def _tracking_time(design: Design) -> Iterator[Refusal]:
-    for name in ("velocity", "current"):
-        loop = getattr(design.controller, name)
-        if loop is not None and loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
+        if loop.tracking_time_s is not None and loop.anti_windup != "back-calculation":
             allowed = 'allowed with anti_windup = "back-calculation"'
             yield f"control.{name}.tracking_time", f"{loop.tracking_time_s:g} s", allowed
 
@@ -240,7 +236,7 @@ CONTROL_CHECKS: tuple[Check, ...] = (
     Rule("control.computing_delay", "{d.controller.computing_delay_s:g} s",
          "allowed: at most 100 ticks of {d.controller.period_s:g} s",
          lambda d: d.controller.computing_delay_s > 100 * d.controller.period_s),
-    _filters, _filter_count, _tracking, _tracking_time, _windup,
+    _filters, _filter_count, _tracking, _windup,
     *map(_fed_forward, FEED_FORWARD),
     _command, _command_filter, _laws, _jitter,
 )  # fmt: skip

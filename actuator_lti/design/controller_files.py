@@ -32,8 +32,7 @@ from actuator_lti.design.settings_file import parsed_xml, placed
 from actuator_lti.design.units import si_text
 from actuator_lti.design.writing import with_overrides
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.reading import parse_json, read_text, shown, shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, parse_json, read_text, shown, shown_path
 
 Stage = Literal["velocity", "-velocity", "current", "-current"]
 Value = float | Callable[..., float]

@@ -18,7 +18,7 @@ from actuator_lti.design.mistakes import UNREAD, Refusal, readable
 from actuator_lti.design.stated import Frame
 from actuator_lti.design.units import si_text
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 
 _CURRENT, _SPEED, _SHARE = "motor.no_load_current", "motor.no_load_speed", "motor.no_load_dry_share"
 SHEET: tuple[Field, ...] = (

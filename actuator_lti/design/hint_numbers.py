@@ -14,8 +14,7 @@ from actuator_lti.design.spellings import split_quantity
 from actuator_lti.design.stated import CONVENTION, Frame
 from actuator_lti.design.units import parse_quantity, parse_unit
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown
 
 _TAKES = re.compile(r', which takes "([^"]*)"( too)?')
 _AT_MOTOR = re.compile(
@@ -48,7 +47,10 @@ def with_numbers(word: str, path: str, key: str, table: Tree, tree: Tree, frame:
     if word.startswith(("integral_time =", "derivative_time =")):
         return word + _time(word, table, key)
     if word.startswith("every,"):
-        return _every(word, path, ticks_of(path, table[key], tree))
+        if f"{path}.every" not in FIELDS:
+            return "not needed: it runs every tick of control.period" if path == "control.current" else ""
+        ticks = ticks_of(path, table[key], tree)
+        return f"{word}; here {ticks}" if ticks else word
     if path == "control.current" and key == "bandwidth":
         time_s = _si(_of(tree, "motor", "inductance"), "H") / _si(_of(tree, "motor", "resistance"), "ohm")
         here = f", here {time_s:.4g} s" if time_s > 0.0 else ""
@@ -165,13 +167,6 @@ def ticks_of(path: str, period: Any, tree: Tree) -> int:
     field, ticks = FIELDS.get(f"{path}.every"), _period_s(period) / _period_s(_of(tree, "control", "period"))
     whole = round(ticks) if field is not None and 0.5 < ticks < 2.0 * field.high else 0
     return whole if field is not None and field.accepts(whole) and abs(ticks - whole) <= 1e-6 * whole else 0
-
-
-def _every(word: str, path: str, ticks: int) -> str:
-    """The hint of a loop's own period, with its ticks."""
-    if f"{path}.every" not in FIELDS:
-        return "not needed: it runs every tick of control.period" if path == "control.current" else ""
-    return f"{word}; here {ticks}" if ticks else word
 
 
 def _time(word: str, table: Tree, key: str) -> str:

@@ -8,7 +8,7 @@ from actuator_lti.design.data_sheet import SHEET, stated_in
 from actuator_lti.design.field import BIG, Field, Structure
 from actuator_lti.design.fields import FIELDS, RECORDS, field_of, fields_in
 from actuator_lti.design.model import Axis, Design
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 
 
 @dataclass(frozen=True)

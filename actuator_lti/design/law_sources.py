@@ -12,8 +12,7 @@ from actuator_lti.design.law import balance
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.errors import InputError
 from actuator_lti.files.mat5 import read_mat5
-from actuator_lti.files.reading import decode, parse_json, read_bytes, shown, shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, decode, parse_json, read_bytes, shown, shown_path
 
 PARTS = ("A", "B", "C", "D")
 _PERIODS = ("period", "Ts", "dt")

@@ -13,8 +13,7 @@ from actuator_lti.design.mistakes import Findings, lines_of, nearest
 from actuator_lti.design.model import Design
 from actuator_lti.design.reader import read_tree
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import decode, parse_toml, read_bytes, shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, decode, parse_toml, read_bytes, shown
 
 AnyDesign = Design | str | PathLike[str]  # or its name, or the path of its file
 SHIPPED = Path(__file__).parent / "shipped"

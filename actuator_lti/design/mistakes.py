@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_lti.errors import InputError, as_one
-from actuator_lti.files.reading import shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design

@@ -89,7 +89,7 @@ class Design:
     correlations: tuple[Correlation, ...] = ()
     facts: tuple[Fact, ...] = ()
     objects: ControllerObjects = field(default_factory=ControllerObjects)
-    parameters: Mapping[str, Parameter] = field(default_factory=FrozenMap, hash=False)
+    parameters: Mapping[str, Parameter] = field(default_factory=lambda: FrozenMap({}), hash=False)
     axis: Annotated[Axis, choice("rotary (rad, N m, kg m2) or linear (m, N, kg)")] = "rotary"
     revision: Annotated[str, text("revision of this file")] = ""
     description: Annotated[str, text("what the drive is and where its figures come from")] = ""

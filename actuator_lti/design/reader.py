@@ -40,8 +40,7 @@ from actuator_lti.design.stated import Frame
 from actuator_lti.design.tolerances import read_tolerance
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown
 
 MAX_GEARS = 20
 MAX_LIST = 200

@@ -143,9 +143,16 @@ def placed(element: Element, depth: int = 0) -> Iterator[tuple[ObjectPlace, Elem
 
 def _objects_in(root: Element) -> Iterator[tuple[ControllerObject, Element]]:
     """Every object with an actual value, and the element that holds it."""
-    return (
-        (_object_of(one, place), one) for place, one in placed(root) if one.get("actualValue") is not None
-    )
+    for place, one in placed(root):
+        if (given := one.get("actualValue")) is None:
+            continue
+        text, names = given.strip(), {"name": one.get("name", ""), "data_type": one.get("dataType", "")}
+        if not _INTEGER.match(text):
+            raise InputError(f"{place.label} = {shown(given)}: allowed: a whole number")
+        if any(len(name) > 200 for name in names.values()):
+            raise InputError(f"{place.label}: a name of more than 200 characters")
+        value = int(text, 16 if text[:2] in ("0x", "0X") else 10)
+        yield ControllerObject(index=place.index, subindex=place.subindex, value=value, **names), one
 
 
 def _is(element: Element, name: str) -> bool:
@@ -157,17 +164,6 @@ def _hex(element: Element, attribute: str, digits: int) -> int:
     if not re.fullmatch(rf"(?:0[xX])?[0-9A-Fa-f]{{1,{digits}}}", text):
         raise InputError(f"{attribute} = {shown(text)}: allowed: up to {digits} hexadecimal digits")
     return int(text, 16)
-
-
-def _object_of(element: Element, place: ObjectPlace) -> ControllerObject:
-    names = {"name": element.get("name", ""), "data_type": element.get("dataType", "")}
-    item = ControllerObject(index=place.index, subindex=place.subindex, value=0, **names)
-    text = element.attrib["actualValue"].strip()
-    if not _INTEGER.match(text):
-        raise InputError(f"{item.label} = {shown(element.attrib['actualValue'])}: allowed: a whole number")
-    if any(len(name) > 200 for name in names.values()):
-        raise InputError(f"{item.label}: a name of more than 200 characters")
-    return replace(item, value=int(text, 16 if text[:2] in ("0x", "0X") else 10))
 
 
 def write_settings_xml(objects: ControllerObjects) -> str:

@@ -8,7 +8,7 @@ from actuator_lti.design.fields import Field
 from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.design.units import parse_quantity
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 
 Parse = Callable[[Any], float]
 _KEYS = ("kind", "half_width", "std", "lower", "upper")

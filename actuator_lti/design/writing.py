@@ -24,8 +24,7 @@ from actuator_lti.design.settings_file import object_entry
 from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.units import ampere_unit, si_text
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import parse_toml, shown
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, parse_toml, shown
 
 _WHICH = ("rotor", "to", "locking_gear", "law", "continuous")  # mostly not said
 

@@ -32,8 +32,9 @@ from actuator_lti.bounds import (
     Bound,
 )
 from actuator_lti.errors import InputError, in_file
-from actuator_lti.files.tree import Tree
 
+Tree = dict[str, Any]
+"""A table of TOML or an object of JSON as a file has it: a schema checks its keys, or has done so."""
 INTEGERS = range(-(1 << 63), 1 << 63)
 """What TOML promises to hold; longer ones would become infinite as floats, or take long to print."""
 

@@ -26,7 +26,7 @@ from actuator_lti.files.response_columns import (
     taken_as,
     unit_of,
 )
-from actuator_lti.files.response_repeats import Repeats
+from actuator_lti.files.response_repeats import averaged
 from actuator_lti.measured.response import GAUSSIAN, MeasuredResponse
 from actuator_lti.types import Floats
 
@@ -191,7 +191,6 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     if f.size < 2 or not (f > 0.0).all():
         told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
         raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
-    order = f.argsort(kind="stable")
     z, coherence = complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
     if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
         per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())
@@ -200,13 +199,10 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
         raise InputError("a value that is 0 or beyond the range of floats")
     refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
     deviation, radius, noise = noise_of(table, units, averages)
-    every = Repeats(f[order], z[order], deviation[order], coherence[order], radius[order], noise)
-    read, told = every.averaged(), taken_as(columns, found, units, known=bool(noise))
-    if read.f.size < 2:
-        raise InputError(f"every row is at {read.f[0]:.6g} Hz; allowed: two frequencies or more")
-    if twice := f.size - read.f.size:
+    left_out, told = count - int(good.sum()), taken_as(columns, found, units, known=bool(noise))
+    read = averaged(RecordedResponse(f, z, deviation, coherence, name, left_out, radius, noise))
+    if (few := read.frequency_hz).size < 2:
+        raise InputError(f"every row is at {few[0]:.6g} Hz; allowed: two frequencies or more")
+    if twice := f.size - few.size:
         told += f"; rows that repeat a frequency are averaged ({twice})"
-    return RecordedResponse(
-        read.f, read.z, read.deviation, read.coherence, name, count - int(good.sum()),
-        read.radius, read.noise, told, float(table[PERIOD][0]) if PERIOD in table else None,
-    )  # fmt: skip
+    return replace(read, read_as=told, period_s=float(table[PERIOD][0]) if PERIOD in table else None)

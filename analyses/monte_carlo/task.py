@@ -25,7 +25,7 @@ from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version

@@ -10,7 +10,7 @@ from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design, Requirement, Waiver
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from actuator_lti.loops import Loops
 from analyses.large_signal.tones import TANH_TOLERANCE
 from analyses.limit_cycles.stick_slip import stick_slip_cycle

@@ -55,8 +55,7 @@ from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.mistakes import Findings, lines_of
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, as_one
-from actuator_lti.files.reading import parse_toml, read_text, read_toml, shown, shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, parse_toml, read_text, read_toml, shown, shown_path
 from analyses.slugs import slug
 from analyses.toml_tables import Table
 

@@ -196,8 +196,7 @@ def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, b
     put_inputs(q, s, io, stage, size)
     value = 0.0
     for k in range(every):
-        status = tick(q, s, io)
-        if status != layout.OK:
+        if tick(q, s, io) != layout.OK:
             return math.nan
         if k == 0:
             value = seen_value(q, s, io, stage)

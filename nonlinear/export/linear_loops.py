@@ -18,23 +18,11 @@ from actuator_lti.batch._run import one_loop
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear.export import linear
-from nonlinear.export.linear import (
-    LOST,
-    MOST,
-    NO_LOOP,
-    SEEN,
-    TOO_LONG,
-    cut_of,
-    interval,
-    repeats,
-    runs_closed,
-    speed_interval,
-)
 from nonlinear.export.linear_row import linear_row
 
 MOST_PHASES = 32  # updates of the signal within one period
 MOST_STATES = 160  # of all phases together
-BLOCK = MOST * (MOST + 2)  # numbers of one phase: A, b, c
+BLOCK = linear.MOST * (linear.MOST + 2)  # numbers of one phase: A, b, c
 SIGNALS = ("w_ref", "i_ref", "u")
 SHOWN = 3  # of them
 
@@ -46,24 +34,22 @@ def phases_of(p, q, s, io, stage, blocks, places, seen):
     Closed, but for the only phase of a loop that is cut: that one stays open.
     """
     linear_row(p, q)
-    every, whole = interval(q, stage), repeats(q, stage)
+    every, whole = linear.interval(q, stage), linear.repeats(q, stage)
     if every <= 0:
-        return NO_LOOP
+        return linear.NO_LOOP
     if whole > every * MOST_PHASES:
-        return TOO_LONG
-    ready = linear.prepared(q, s, stage)
-    if ready == 0:
-        return TOO_LONG
+        return linear.TOO_LONG
+    if not linear.prepared(q, s, stage):
+        return linear.TOO_LONG
     n, angles = linear.listed(q, places)
-    if n > MOST:
-        return TOO_LONG
-    cut = cut_of(q, stage)
+    if n > linear.MOST:
+        return linear.TOO_LONG
+    cut = linear.cut_of(q, stage)
     for m in range(int(whole / every)):
         at = m * BLOCK
-        done = linear.block(q, s, io, cut, m * every, every, places, n, angles, blocks, at, seen)
-        if done == 0:
-            return LOST
-        if whole > every and not runs_closed(cut):
+        if not linear.block(q, s, io, cut, m * every, every, places, n, angles, blocks, at, seen):
+            return linear.LOST
+        if whole > every and not linear.runs_closed(cut):
             for i in range(n):
                 for j in range(n):
                     blocks[at + i * n + j] -= blocks[at + n * n + i] * blocks[at + n * n + n + j]
@@ -132,12 +118,12 @@ def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
     n = phases_of(p, q, s, io, stage, blocks, places, seen)
     if n <= 0:
         return n
-    count = int(repeats(q, stage) / interval(q, stage))
+    count = int(linear.repeats(q, stage) / linear.interval(q, stage))
     kept = spread(n, count, blocks, keep)
     if kept > MOST_STATES:
-        return TOO_LONG
+        return linear.TOO_LONG
     joined(n, count, kept, blocks, keep, a, b, c)
-    if count > 1 or runs_closed(cut_of(q, stage)):
+    if count > 1 or linear.runs_closed(linear.cut_of(q, stage)):
         for i in range(kept):
             for j in range(kept):
                 a[i * kept + j] += b[i] * c[j]
@@ -170,9 +156,8 @@ def figures(
         for i in range(n):
             for j in range(n):
                 work[i * n + j] = a[i * n + j] - closed * b[i] * c[j]
-        found = eigenvalues(n, work, exchanged, state, real, imaginary)
-        if found == 0:
-            return LOST
+        if not eigenvalues(n, work, exchanged, state, real, imaginary):
+            return linear.LOST
         copied(n, real, 0, poles, 2 * side * n)
         copied(n, imaginary, 0, poles, (2 * side + 1) * n)
     return one_loop(
@@ -220,20 +205,20 @@ def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
     n = phases_of(p, q, s, io, linear.COMMAND, blocks, places, seen)
     if n <= 0:
         return n
-    every = interval(q, linear.COMMAND)
+    every = linear.interval(q, linear.COMMAND)
     if every > linear.MOST_TICKS:
         return linear.TOO_LONG
     for i in range(n):
         total = 0.0
-        for k in range(every * SEEN):
-            total += abs(seen[k * (MOST + 1) + i])
+        for k in range(every * linear.SEEN):
+            total += abs(seen[k * (linear.MOST + 1) + i])
         blocks[n * n + n + i] = total
     kept = spread(n, 1, blocks, keep)
     joined(n, 1, kept, blocks, keep, a, b, c)
-    for k in range(every * SEEN):
+    for k in range(every * linear.SEEN):
         for i in range(n):
             if keep[i] >= 0.0:
-                seen[k * (MOST + 1) + int(keep[i])] = seen[k * (MOST + 1) + i]
+                seen[k * (linear.MOST + 1) + int(keep[i])] = seen[k * (linear.MOST + 1) + i]
     return kept
 
 
@@ -243,15 +228,15 @@ def signal_interval(q, signal, every):
     if signal == linear.VOLTAGE or signal == linear.BESIDE_VOLTAGE:
         return 1
     if (signal == linear.CURRENT_COMMAND or signal == linear.BESIDE_CURRENT) and q[layout.HAS_VELOCITY] > 0.0:
-        return speed_interval(q)
+        return linear.speed_interval(q)
     return every
 
 
 @kernel
 def seen_at(n, seen, signal, k, state):
     """A signal in front of a limiter at tick k, as a pair."""
-    at = (k * SEEN + signal) * (MOST + 1)
-    real, imaginary = seen[at + MOST], 0.0
+    at = (k * linear.SEEN + signal) * (linear.MOST + 1)
+    real, imaginary = seen[at + linear.MOST], 0.0
     for i in range(n):
         real += seen[at + i] * state[2 * i]
         imaginary += seen[at + i] * state[2 * i + 1]
@@ -286,7 +271,7 @@ def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
     """
     for g in range(count):
         states_at(n, a, b, b, False, xs[g], work, state)
-        for signal in range(SEEN):
+        for signal in range(linear.SEEN):
             largest, step = 0.0, signal_interval(q, signal, every)
             k = 0
             while k < every:

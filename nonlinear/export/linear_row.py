@@ -10,6 +10,7 @@ import math
 import numpy as np
 
 from actuator_lti.compiled.kernel import kernel
+from actuator_lti.design.over_angle import ROUNDED
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.elastic_modes import enter_mode, put_output
 from nonlinear._kernels.start import init
@@ -31,9 +32,6 @@ UNLIMITED = np.array([
     place for name, place in layout.LIMIT.items()
     if name not in ("overload", "profile")  # switched off above
 ])  # fmt: skip
-
-
-ROUNDED = 1e-15  # as in the linear loops: what rounding leaves of a slope
 
 
 @kernel

@@ -1,11 +1,9 @@
 """The drive as WebAssembly, built by ``make wasm`` and kept in the package with the hash of its sources.
 
 The module is a wasi reactor without imports: the tick of the drive, its loops found by running that tick
-(`nonlinear.export.linear_loops`), and the figures of a loop by the kernels of
-`actuator_lti.batch`.  Rows lie in
-its memory; functions that end in ``_at`` say where.  A host writes the row of a run
-(`nonlinear.row.parameters.design_row`) at ``p_at()``.  Then ``start()`` and ``tick()`` run it, with inputs
-and
+(`nonlinear.export.linear_loops`), and the figures of a loop by the kernels of `actuator_lti.batch`. Rows lie
+in its memory; functions that end in ``_at`` say where. A host writes the row of a run
+(`nonlinear.row.parameters.design_row`) at ``p_at()``. Then ``start()`` and ``tick()`` run it, with inputs and
 outputs at ``io_at()``, places as in ``nonlinear._kernels.layout``; ``loop(stage, timed)`` computes a loop,
 its figures at ``figures_at(stage)`` (`actuator_lti.batch._quoted`) and ``row_at(stage)``
 (`actuator_lti.batch._figures`), ``respond(stage, count)`` its response at the angles of ``x_at()``, and
@@ -24,7 +22,7 @@ from actuator_lti.batch import _figures, _quoted, _response, _run, _withheld
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.program import Program, emit_c
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from nonlinear.export import linear, linear_loops
 from nonlinear.export.program import ENTRIES, HEAD, header_text, template
 

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
 
 if TYPE_CHECKING:
     from actuator_lti.design import Design
+    from actuator_lti.files.reading import Tree
     from analyses.request import Kind
 
 

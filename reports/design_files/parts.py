@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 from actuator_lti.design import read_design_text
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import read_toml
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, read_toml
 
 if TYPE_CHECKING:
     from actuator_lti.design.model import Design

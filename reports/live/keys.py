@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
 from nonlinear.export.statement import Term
 from nonlinear.export.trace import Tape, row_statements

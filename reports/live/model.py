@@ -16,7 +16,7 @@ from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.tones import LEAST_UPDATES
 from analyses.monte_carlo.judging import in_populations

@@ -9,8 +9,7 @@ from actuator_lti.design.mistakes import lines_of
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import overridden_text, write_design
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import parse_toml
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, parse_toml
 
 MARK = "@@changed@@"
 Patch = tuple[int, int, str, str]

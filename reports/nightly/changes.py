@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.finite import finite
 from reports.nightly.figures import Figure
 from reports.nightly.history import History

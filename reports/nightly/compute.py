@@ -8,7 +8,7 @@ from typing import Any
 from actuator_lti.design.loader import read_design_text
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.comparison.variants import compare
 from analyses.isolation import drain
 from analyses.monte_carlo.run import MonteCarloSettings, monte_carlo

@@ -9,7 +9,7 @@ from typing import Any, TypeGuard
 
 from actuator_lti.asked.quantities import reserve
 from actuator_lti.asked.verdict import Tally
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from reports.document_schema import GOES_ON
 from reports.nightly.text import one_line
 from reports.verdict_summary import role, verdict_words, walk, why

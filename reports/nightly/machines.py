@@ -4,7 +4,7 @@ import json
 from dataclasses import asdict
 from xml.etree import ElementTree as Xml
 
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from reports.html import environment
 from reports.nightly import changes
 from reports.nightly.changes import Comparison, cause_lines

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from reports.charts import style
 from reports.charts.chart import Chart
 from reports.charts.svg import page_svg

@@ -19,8 +19,7 @@ from typing import Any
 from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.design import design_hash, write_design
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import shown_path
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree, shown_path
 from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, study_of, study_or_design

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.slugs import hashed
 from reports.nightly.cache import Cache
 from reports.nightly.changes import Between, Comparison

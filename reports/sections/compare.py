@@ -9,7 +9,7 @@ from typing import Any
 from actuator_lti.asked.quantities import shown_unit, unit_words
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.files.atomic import write_text
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from analyses.comparison.found import FigureName
 from analyses.comparison.variants import Compared, Comparison
 from analyses.specification.requirements import RequirementVerdict

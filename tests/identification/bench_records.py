@@ -18,7 +18,7 @@ NOISE_A = 0.02
 
 def bare(name: str) -> model.Design:
     """A shipped design without what is told of its values."""
-    return replace(load_design(name), parameters=FrozenMap(), requirements=(), correlations=(), facts=())
+    return replace(load_design(name), parameters=FrozenMap({}), requirements=(), correlations=(), facts=())
 
 
 def motion(seed: int, *, load_Nm: float = 0.0, design: model.Design | None = None) -> Trajectory:

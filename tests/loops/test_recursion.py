@@ -15,6 +15,7 @@ from actuator_lti import assemble_loops
 from actuator_lti.design import load_design, model, with_values
 from actuator_lti.drive.profile import CommandMean, profile_note
 from actuator_lti.loops import PeriodicLoop, exact_margins, periodic_loop
+from actuator_lti.loops.periodic import GAINS, first_border
 from actuator_lti.systems.resolvent import responses
 from analyses.linear.loop_figures import all_loop_figures
 from nonlinear.bench.operating_motion import on_its_stand, on_the_bench
@@ -150,6 +151,17 @@ def test_the_fundamental_is_that_of_a_long_run(angle: float) -> None:
 def test_its_modes_are_those_of_a_product() -> None:
     wanted = (0.9 - 2.0 * 0.3) * (0.7 - 2.0 * 0.2) * (1.1 - 2.0 * 0.1)
     assert PeriodicLoop(SYSTEMS, 1.0).modes(2.0) == pytest.approx([wanted], rel=1e-14)
+
+
+@pytest.mark.parametrize("above", [1e-4, 1e-6, 1e-9])
+def test_a_border_is_found_however_narrow_what_lies_behind_it(above: float) -> None:
+    """The mode over a period is (1 + above) g (6 - g)/9: beyond 1 near g = 3 alone, and then from 7.24 on."""
+    size = (1.0 + above) / 9.0
+    first, second = ((np.array([[a]]), np.array([[b]]), np.eye(1)) for a, b in ((0.0, -size), (6.0, 1.0)))
+    loop = PeriodicLoop([first, second], 1.0)
+    assert loop.radius(1.0) == pytest.approx(5.0 * size, rel=1e-14)
+    upper = first_border(lambda g: loop.radius(g) - 1.0, GAINS, inf, 50)
+    assert upper == pytest.approx(3.0 * (1.0 - sqrt(above / (1.0 + above))), rel=1e-7)
 
 
 @pytest.mark.parametrize("point", ["u", "i_ref", "w_ref"])

@@ -8,7 +8,7 @@ import pytest
 
 from actuator_lti.design import QUANTITIES, load_design, parameter_value, read_design_text
 from actuator_lti.design.loader import design_text, shipped_designs
-from actuator_lti.files.tree import Tree
+from actuator_lti.files.reading import Tree
 from reports import document as doc
 from reports import scripts
 from reports.glossary import TERMS, glossary, meaning
