@@ -208,7 +208,7 @@ def _fill(
         blocks = stage_blocks(wired, stage)
         _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
         for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE])) if len(blocks) > 1 else ():
-            alone = shown([block.of(k) for block in blocks])  # a mode at rest that moves is taken out
+            alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
             _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:
             of_loop = rows[:, [fig.STABLE, fig.RADIUS]]
