@@ -104,7 +104,7 @@ def test_many_drives_are_each_of_them_alone(name: str, load: float) -> None:
 
 @pytest.mark.parametrize("stages", [(), ("position",)])
 def test_the_speed_command_is_clamped_whoever_gives_it(stages: tuple[str, ...]) -> None:
-    """By hand, and where the simulator ends up, of a speed drive too; without a velocity loop nothing does."""
+    """By hand, and where the simulator ends up, a speed drive too; without a velocity loop nothing does."""
     design, load = without(amber(), *stages, gain=0.2), 4.0
     capacity, w, friction = capability(design, load), design.limits.speed_rad_s, design.friction
     torque = friction.dry_torque_Nm + friction.load_coefficient * load + friction.viscous() * w
