@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
-from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
@@ -169,11 +169,9 @@ def _settings(
     there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
         known, step = object_of(problem.design, path), step_of_gain(problem.design, path)
-        field = field_of(path)
-        assert field is not None
         yield GainSetting(
             path=path,
-            unit=field.unit(structure),
+            unit=FIELDS[template_of(path)].unit(structure),
             before=parameter_value(before, path) if path in there else None,
             by_rule=rules.values.get(path),
             tuned=exact,
