@@ -17,15 +17,7 @@ from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import (
-    MOST_DESIGNS,
-    Problem,
-    asked_for,
-    limit_of,
-    loop_requirements,
-    problem_of,
-    size_of,
-)
+from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, loop_requirements, problem_of
 from analyses.tuning.result import (
     BindingRequirement,
     GainSetting,
@@ -151,8 +143,8 @@ def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple
     made = []
     for requirement, distances in zip(problem.requirements, result.T, strict=True):
         worst = int(np.argmin(distances))
-        relative, limit = float(distances[worst]), limit_of(requirement)
-        distance = relative * size_of(requirement) if -3.0 < relative < np.inf else None
+        relative, limit = float(distances[worst]), requirement.bound
+        distance = relative * requirement.size if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
         value = None if distance is None else limit + way * distance
         corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
