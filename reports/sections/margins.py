@@ -17,7 +17,7 @@ from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words
-from reports.terminal import Brief, SideBySide
+from reports.terminal import Brief, side_by_side
 
 EVIDENCE: dict[str, doc.State] = {
     "certified": {"text": "certified", "status": "pass"},
@@ -119,7 +119,7 @@ def brief(result: Margins) -> Brief:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
         told += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [SideBySide(head, tables), *more, *judged["blocks"]], notes)
+    return Brief(first["result"], [side_by_side(head, tables), *more, *judged["blocks"]], notes)
 
 
 def _named(result: Margins) -> dict[str, LoopFigures]:
