@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 
 from actuator_lti.design.model import Design
-from reports.charts.paint import COLOURS
+from reports.charts.chart import COLOURS
 from reports.charts.pen import Pen
 from reports.numbers import seconds
 

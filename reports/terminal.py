@@ -28,31 +28,18 @@ HEADS = {"met": "PASS", "not met": "FAIL", "not proven": "NOT PROVEN"}
 
 
 @dataclass(frozen=True)
-class SideBySide:
-    """Tables of the same rows as one: a line a figure, a column a row of the blocks."""
-
-    title: str
-    blocks: Sequence[Mapping[str, Any]]
-
-
-@dataclass(frozen=True)
 class Brief:
     """What the terminal prints of an analysis whose sections are too long for it."""
 
     words: str
-    blocks: Sequence[Mapping[str, Any] | SideBySide]
+    blocks: Sequence[Mapping[str, Any]]
     notes: Sequence[str] = ()
 
 
-def print_blocks(blocks: Sequence[Mapping[str, Any] | SideBySide], notes: Sequence[str] = ()) -> None:
+def print_blocks(blocks: Sequence[Mapping[str, Any]], notes: Sequence[str] = ()) -> None:
     out = console()
     for block in blocks:
-        if isinstance(block, SideBySide):
-            side = SideBySide(block.title, [certain(one) for one in block.blocks])
-            laid = _side_by_side(side)
-            out.print(laid if _fits(laid, out) else _one_by_one(side))
-        else:
-            _print(certain(block), out)
+        _print(certain(block), out)
     for note in dict.fromkeys(notes):
         out.print(Text(f"note: {note}", style="yellow"))
 
@@ -81,11 +68,7 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     if block["kind"] == "verdicts":
         block, wrapped = verdict_table(block), VERDICT_WRAPPED
     if block["kind"] == "table":
-        laid = table(block, wrapped)
-        if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
-            laid = table(block, wrapped, narrow=True)
-        if not _fits(laid, out):
-            laid = table(block, VERDICT_WRAPPED, narrow=True)
+        laid = _laid(block, wrapped, out)
         out.print(laid if _fits(laid, out) else stacked(block))
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
@@ -99,6 +82,15 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     elif block["kind"] == "details":
         for inner in block["blocks"]:
             _print(inner, out)
+
+
+def _laid(block: Mapping[str, Any], wrapped: int, out: Console) -> Table:
+    if block.get("turned"):
+        return _turned(block)
+    laid = table(block, wrapped)
+    if Measurement.get(out, out.options.update(width=10_000), laid).maximum > out.width:
+        laid = table(block, wrapped, narrow=True)
+    return laid if _fits(laid, out) else table(block, VERDICT_WRAPPED, narrow=True)
 
 
 def table(block: Mapping[str, Any], wrapped: int, *, narrow: bool = False) -> Table:
@@ -146,32 +138,27 @@ def _list(text: Text, said: Iterable[tuple[Mapping[str, Any], Any]]) -> None:
         text.append(f"{label} ".lstrip()).append_text(cell).append(f" {column['unit']}".rstrip())
 
 
-def _one_by_one(side: SideBySide) -> Text:
-    """Write the columns of a side by side table one below the other, a figure after the other."""
-    cells: dict[str, list[tuple[Mapping[str, Any], Any]]] = {}
-    for block in side.blocks:
+def side_by_side(title: str, blocks: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """Tables of the same rows as one, printed turned where there is room: a line a figure, a column a row."""
+    head, columns, rows = blocks[0]["columns"][0], list[doc.Column](), dict[str, dict[str, Any]]()
+    for block in blocks:
         first, *others = block["columns"]
+        columns += others
         for row in block["rows"]:
-            cells.setdefault(str(row[first["key"]]), []).extend((one, row.get(one["key"])) for one in others)
-    text = Text().append(side.title, style="bold")
-    for name, said in cells.items():
-        text.append(f"\n{name}: ")
-        _list(text, said)
-    return text.append("\n")
+            one = rows.setdefault(row[first["key"]], {head["key"]: row[first["key"]]})
+            one |= {column["key"]: row.get(column["key"]) for column in others}
+    return {**doc.table(title, [head, *columns], rows.values()), "turned": True}
 
 
-def _side_by_side(side: SideBySide) -> Table:
-    """Lay tables of the same rows out as one: a line a figure, a column a row of the blocks."""
-    made = _empty(side.title)
+def _turned(block: Mapping[str, Any]) -> Table:
+    first, *others = block["columns"]
+    made = _empty(block["caption"])
     made.add_column("")
-    named = [{str(row[block["columns"][0]["key"]]): row for row in block["rows"]} for block in side.blocks]
-    names = list(dict.fromkeys(name for rows in named for name in rows))
-    for name in names:
-        made.add_column(Text(name), justify="right")
-    for block, rows in zip(side.blocks, named, strict=True):
-        for column in block["columns"][1:]:
-            own = (rows[name].get(column["key"]) if name in rows else "" for name in names)
-            made.add_row(Text(_label(column)), *(_cell(value, column["format"]) for value in own))
+    for row in block["rows"]:
+        made.add_column(_cell(row[first["key"]], first["format"]), justify="right")
+    for column in others:
+        cells = (_cell(row.get(column["key"], ""), column["format"]) for row in block["rows"])
+        made.add_row(Text(_label(column)), *cells)
     return made
 
 

@@ -14,7 +14,7 @@ from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.periodic import fundamental
+from actuator_lti.loops.periodic import fundamental, shown
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
@@ -130,8 +130,9 @@ def linear_figures(
     ``operating_point``, ``load_Nm``, ``speed_amplitude_rad_s``, ``direction``: as in
     `actuator_lti.assemble_loops`.
     ``time_figures``: whether to follow the step responses as well (most of the time).
-    ``held``: give an inner loop that its load drives away by itself, in a drive that is stable as a whole,
-    the figures of the same loop with the rotor held (current) or the load moment held (velocity), if stable.
+    ``held``: give an inner loop that its load, or what holds its torque over a tick, drives away by itself,
+    in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
+    load moment held (velocity), if stable.
     ``threads``: that share the designs.
     ``progress``: called with (designs done, designs in all).
 
@@ -174,18 +175,26 @@ def linear_figures(
 
 def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
     """Put the figures of a held loop in the place of one that is unstable only by itself."""
-    place, stable = LOOPS.index(loop), out[:, :, fig.STABLE]
-    whole = stable[:, LOOPS.index(population.design.controller.outermost)] == 1.0
-    chosen = np.flatnonzero(whole & pushes_away(population.stacked, at) & (stable[:, place] == 0.0))
-    if not chosen.size:
-        return
-    some = population.part(chosen)
-    operating = replace(at, rotor="locked") if loop == "current" else replace(at, torques_held=True)
-    rows = np.full((some.count, *out.shape[1:]), np.nan)
-    for group in some.alike():
-        _fill(wire(some.part(group).stacked, operating), group, time_figures, rows, only=loop)
-    held = rows[:, place, fig.STABLE] == 1.0
-    out[chosen[held], place] = rows[held, place]
+    place, stable = LOOPS.index(loop), out[:, :, fig.STABLE] == 1.0
+    outermost = LOOPS.index(population.design.controller.outermost)
+    lost = stable[:, outermost] & (out[:, place, fig.STABLE] == 0.0)
+
+    def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
+        some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
+        for group in some.alike():
+            _fill(wire(some.part(group).stacked, operating), group, time_figures, result, only=loop)
+        return result[:, place]
+
+    away = lost & pushes_away(population.stacked, at)
+    others = np.flatnonzero(lost & ~away)
+    if others.size:  # by the hold of their own torques over a tick alone
+        away[others] = rows(others, replace(at, torques_at_once=True))[:, fig.STABLE] == 1.0
+    chosen = np.flatnonzero(away)
+    if chosen.size:
+        alone = replace(at, rotor="locked") if loop == "current" else replace(at, torques_held=True)
+        held = rows(chosen, alone)
+        found = held[:, fig.STABLE] == 1.0
+        out[chosen[found], place] = held[found]
 
 
 def _fill(
@@ -196,8 +205,11 @@ def _fill(
         rows = np.full((len(chosen), out.shape[2]), np.nan)
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
-        loop = fundamental(stage_blocks(wired, stage))
-        _figures_of(loop, lead, time_figures and response is None, rows)
+        blocks = stage_blocks(wired, stage)
+        _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE])) if len(blocks) > 1 else ():
+            alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
+            _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:
             of_loop = rows[:, [fig.STABLE, fig.RADIUS]]
             _figures_of(response, np.nan, time_figures, rows)

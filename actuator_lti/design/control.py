@@ -211,6 +211,12 @@ class PositionLoop:
         """Whether a step's own change acts at once, by a derivative or a feed-forward."""
         return any(getattr(self, name) > 0.0 for name in ("derivative_time_s", *FEED_FORWARD))
 
+    @property
+    def feeds_back_its_angle(self) -> bool:
+        """Whether the angle of its sensor is all that it takes of the drive."""
+        own = "output_angle" if self.sensor == "output" else "angle"
+        return self.law is None or {*self.law.inputs} <= {"error", "command", own}
+
 
 @dataclass(frozen=True, kw_only=True)
 class Command:

@@ -35,7 +35,7 @@ __all__ = [
     "plot_bode", "plot_map", "plot_nyquist", "plot_onset", "plot_run", "plot_step", "style",
 ]  # fmt: skip
 
-# Those of the reports (`reports.charts.paint`), of Okabe and Ito, darkened for white paper.
+# Those of the reports (`reports.charts.chart`), of Okabe and Ito, darkened for white paper.
 COLOURS = ("#0072b2", "#c46200", "#00805f", "#8e4585", "#c0392b", "#3a8fc4", "#7a5c1e", "#1f2933", "#66727f")
 RED, GREEN, INK, MUTED = "#c0392b", "#00805f", "#1f2933", "#66727f"
 STYLE: dict[str, Any] = {

@@ -104,11 +104,12 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
 
 def _at_once(plant: Plant) -> Plant:
     """The same with its own torques in A, not held."""
-    A = plant.A.copy()
+    A, unit = plant.A, np.eye(len(plant.states))
     for own, B in ((plant.torque, plant.B_T), (plant.moment, plant.B_M)):
         for name, gain in own.items():
             for state, share in plant.rows.get(name, {name: 1.0}).items():
-                A[..., plant.states.index(state)] += B * (gain * share)
+                made = B * np.asarray(gain * share)[..., None]
+                A = A + made[..., None] * unit[plant.states.index(state)]
     return replace(plant, A=A, torque={}, moment={})
 
 

@@ -24,7 +24,7 @@ from actuator_lti.loops.tick import Block, TickProgram, mean_response, siso, use
 from actuator_lti.systems.resolvent import balanced
 from actuator_lti.systems.rest_mode import System, without_common_rest_mode
 
-_GAINS = np.geomspace(1.0, 1e4, 401)
+GAINS = np.geomspace(1.0, 1e4, 401)
 _AT_ONCE = 50
 _DELAY_STEPS_A_TICK = 4
 AT_REST = 1e-12  # from 1: an eigenvalue that no gain of those tried moves away is a mode at rest
@@ -210,23 +210,50 @@ def _without_rest(systems: list[System]) -> tuple[list[System], np.ndarray]:
     return systems, left
 
 
-def _first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
+def first_border(excess: Callable[[Any], Any], grid: np.ndarray, none: float, at_once: int = 1) -> float:
     """First root of ``excess`` (negative at grid[0]) along a grid, so many of its values asked at once."""
-    from scipy.optimize import brentq
-
+    found = np.atleast_1d(excess(grid[0]))
     for start in range(1, len(grid), at_once):
         part = grid[start : start + at_once] if at_once > 1 else grid[start]
-        over = np.flatnonzero(excess(part) >= 0)
-        if over.size:
-            first = start + int(over[0])
-            return float(brentq(excess, grid[first - 1], grid[first], xtol=1e-15, rtol=1e-13))
+        found = np.append(found, excess(part))
+        for k in range(max(start - 1, 1), len(found)):
+            if found[k] >= 0.0:
+                return _root(excess, grid[k - 1], grid[k])
+            if k + 1 < len(found) and _may_reach_zero(found[k - 1 : k + 2]):
+                top = _top(excess, grid[k - 1], grid[k + 1])
+                if excess(top) >= 0.0:
+                    return _root(excess, grid[k - 1], top)
     return none
+
+
+def _may_reach_zero(three: np.ndarray) -> bool:
+    """Whether what is negative at three even places may reach zero between them.
+
+    A parabola through them rises above the largest by at most an eighth of the second difference.
+    """
+    before, middle, after = three
+    bend = 2.0 * middle - before - after
+    return bool(abs(after - before) <= 2.0 * bend and -three.max() <= bend)
+
+
+def _root(excess: Callable[[Any], Any], low: float, high: float) -> float:
+    from scipy.optimize import brentq
+
+    return float(brentq(excess, low, high, xtol=1e-15, rtol=1e-13))
+
+
+def _top(excess: Callable[[Any], Any], low: float, high: float) -> float:
+    from scipy.optimize import minimize_scalar
+
+    bounds, within = sorted((low, high)), 1e-9 * abs(high - low)
+    return float(minimize_scalar(lambda x: -excess(x), bounds=bounds, options={"xatol": within}).x)
 
 
 def exact_margins(loops: Loops, point: str, longest_delay_ticks: float = 50.0) -> ExactMargins:
     """Gain and delay margins of a sampled loop at a break point, periodic or not, by eigenvalues.
 
-    Found by stepping outwards (1.0233 in gain, a quarter tick in delay) to the first border and polishing it.
+    Found by stepping outwards (1.0233 in gain, a quarter tick in delay) to the first border, or to what peaks
+    between two steps near it, and polishing it.
 
     Raises `InputError`: if the loops are not sampled, or have no such break point.
     """
@@ -248,8 +275,8 @@ def _margins_of(wired: Drive, point: str, longest_delay_ticks: float) -> ExactMa
     nan = float("nan")
     if radius >= 1:
         return ExactMargins(False, nan, nan, nan if point == "u" else None, radius)
-    upper = _first_border(lambda g: moved.radius(g) - 1, _GAINS, float("inf"), _AT_ONCE)
-    lower = _first_border(lambda g: moved.radius(g) - 1, 1 / _GAINS, 0.0, _AT_ONCE)
+    upper = first_border(lambda g: moved.radius(g) - 1, GAINS, float("inf"), _AT_ONCE)
+    lower = first_border(lambda g: moved.radius(g) - 1, 1 / GAINS, 0.0, _AT_ONCE)
     delay = _delay_border(wired, longest_delay_ticks, moved) if point == "u" else None
     return ExactMargins(True, upper, lower, delay, radius)
 
@@ -273,7 +300,7 @@ def _delay_border(wired: Drive, longest_ticks: float, now: PeriodicLoop) -> floa
 
     step = 1 / _DELAY_STEPS_A_TICK
     grid = np.array([0.0, *np.arange(step, longest_ticks, step)])
-    return _first_border(excess, grid, float("inf")) * Ts
+    return first_border(excess, grid, float("inf")) * Ts
 
 
 def _states(systems: Sequence[System]) -> int:

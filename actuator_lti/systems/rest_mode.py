@@ -26,8 +26,8 @@ def without_rest_mode(
     """Take out a mode at zero frequency that the output does not see, or the input does not drive.
 
     It is hidden where A v = ``at`` v and C v = 0 hold within the rounding of the entries (or the same of the
-    transposed system), ``at`` 1 for a sampled system, 0 for a continuous one. Then x - v x_j, j an integrator
-    with v_j = 1, obeys equations without x_j. Returned is also which states are kept, bool (n,).
+    transposed system), ``at`` 1 for a sampled system, 0 for a continuous one. Then x - v x_j with v_j = 1
+    obeys equations without x_j. Returned is also which states are kept, bool (n,).
     """
     ((A, B, C),), kept = without_common_rest_mode([(A, B, C)], at)
     return A, B, C, kept
@@ -55,10 +55,10 @@ def without_common_rest_mode(
 
 
 def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.ndarray] | None:
-    """A mode at rest over the integrator that is the largest part of it, a row a tick; ``None`` if none.
+    """A mode at rest over the state that is the largest part of it, a row a tick; ``None`` if none.
 
-    Any integrator may have found it, but by one that takes part by 1e-10 only it would leave the difference
-    of large numbers. Over several ticks any state may: a held one is written anew in one of them.
+    Any integrator may have found it (over several ticks any state: a held one is written anew in one of
+    them), but over one that takes part by 1e-10 only it would leave the difference of large numbers.
     """
     As, Cs = (np.stack([each[k] for each in systems]) for k in (0, 2))
     if As.shape[1] < 2 or not (np.isfinite(As).all() and np.isfinite(Cs).all()):
@@ -71,9 +71,8 @@ def _own(systems: Sequence[System], at: float, alone: bool) -> tuple[int, np.nda
     if not found:
         return None
     parts = np.abs(found) / balanced(As[0])[1]
-    shares = parts[:, integrators] / parts.max(axis=1, keepdims=True)
-    k, largest = np.unravel_index(np.argmax(shares), shares.shape)
-    j = int(integrators[largest])
+    k, largest = np.unravel_index(np.argmax(parts / parts.max(axis=1, keepdims=True)), parts.shape)
+    j = int(largest)
     v = _on_its_way(As, found[k])
     return (j, v / v[:, [j]]) if v[:, j].all() else None
 

@@ -1,10 +1,10 @@
 """Everything that is said of a loop in one place: margins, bandwidth, peaks, step.
 
 A load whose moment grows with its own deflection (a pendulum upright, a fin ahead of its centre of pressure)
-moves away by itself, and so does a rotor whose friction falls with the speed. A current loop alone, or a P
-velocity loop alone, does not stop that; the loops around them do. Such a loop is unstable in itself and no
-fault of the drive: it is judged with the rotor locked (current loop), or with the load's moment held
-(velocity loop).
+moves away by itself, and so does a rotor whose friction falls with the speed, or on a spring that the sampled
+form holds over a tick. A current loop alone, or a P velocity loop alone, does not stop that; the loops around
+them do. Such a loop is unstable in itself and no fault of the drive: it is judged with the rotor locked
+(current loop), or with the load's moment held (velocity loop).
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from actuator_lti.asked.quantities import MOST_RESONANCE_DB
 from actuator_lti.bandwidth import Bandwidth, Peaks, closed_loop_bandwidth, peaks
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.drive.operating import RotorState, pushes_away
-from actuator_lti.drive.plant import motor_plant
 from actuator_lti.drive.profile import CommandMean, command_mean, profile_note
+from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError, NumericalError
-from actuator_lti.loops import Loop, Loops
+from actuator_lti.loops import Loop, Loops, sampled
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.commanded import commanded_bandwidth, commanded_step
 from actuator_lti.margins import StabilityMargins, stability_margins
@@ -34,15 +34,12 @@ HELD = {"current": "rotor locked", "velocity": "load moment held"}
 OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
 """How it stands then."""
 AWAY = "the load, cogging or falling friction drives it away"
+ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
 
 
-def held_loop(loops: Loops, name: str) -> Loop | None:
-    """The inner loop with the rotor locked, or with the load's moment held; ``None`` where there is none."""
+def held_loop(loops: Loops, name: str) -> Loop:
+    """The inner loop with the rotor locked, or with the load's moment held."""
     at = loops.operating
-    if name not in HELD or name == loops.design.controller.outermost:
-        return None
-    if not pushes_away(loops.design, at):  # the loop's own fault
-        return None
     held = replace(at, rotor="locked") if name == "current" else replace(at, torques_held=True)
     return loops_at(loops.design, held, loops.form, loops.inner_loops).present[name]
 
@@ -51,11 +48,6 @@ def other_loops(loops: Loops, design: Design, *, rotor: RotorState = "free") -> 
     """The loops of another design, or with another rotor, in the same form at the same operating point."""
     at = replace(loops.operating, rotor=rotor, torques_held=False)
     return loops_at(design, at, loops.form, loops.inner_loops)
-
-
-def by_itself(name: str) -> str:
-    """What is said of such a loop."""
-    return f"with the {HELD[name]}; by itself, {OPEN[name]}, {AWAY}"
 
 
 Figure = TypeVar("Figure")
@@ -102,6 +94,11 @@ class LoopFigures:
     def judged(self) -> LoopFigures:
         """The figures that the drive is judged by: those of `held` where there are some."""
         return self if self.held is None else self.held
+
+    @property
+    def by_itself(self) -> str:
+        """What is said of a loop that is unstable by itself."""
+        return f"{OPEN[self.loop.name]}, as {ACTIVE if self.by_hold else AWAY}"
 
     @property
     def sound(self) -> bool | None:
@@ -222,42 +219,46 @@ def all_loop_figures(
                 raise
             refused.append(f"{name} loop, {loops.form}, {loops.operating_point}: {error}")
     outermost = result.get(loops.design.controller.outermost)
-    if outermost is not None and outermost.stable:  # loops that are unstable only by themselves
-        for name, one in result.items():
-            if one.margins.stable is False and (kept := held_loop(loops, name)) is not None:
-                found = partial(loop_figures, kept, step=step, certify=certify)
-                held = one.locked or _if_there_is(found, [])
-                result[name] = replace(one, held=held if held is not None and held.stable else None)
-    return _with_ticks_told(loops, result) if certify and locked else result
+    whole = outermost is not None and outermost.stable
+    for name, one in result.items():
+        lost = whole and one.margins.stable is False
+        if lost or (certify and locked):
+            one = _with_hold_told(loops, one)
+        if lost and (one.by_hold or pushes_away(loops.design, loops.operating)):  # else its own fault
+            kept = partial(loop_figures, held_loop(loops, name), step=step, certify=certify)
+            held = one.locked or _if_there_is(kept, [])
+            one = replace(one, held=held if held is not None and held.stable else None)
+        result[name] = one
+    return result
 
 
 MATTERS = 0.01  # of a margin
 
 
-def _with_ticks_told(loops: Loops, figures: dict[str, LoopFigures]) -> dict[str, LoopFigures]:
+def _with_hold_told(loops: Loops, figures: LoopFigures) -> LoopFigures:
     """The same with a note where the drive's own torques, held over a tick (model.md section 6), matter."""
-    plant = motor_plant(loops.design, loops.operating)
-    acting = [word for word, own in (("cogging", plant.torque), ("load torque", plant.moment)) if own]
-    if loops.form != "sampled" or not acting:
+    if loops.tick_system is None:
         return figures
-    at_once = loops_at(
-        loops.design, replace(loops.operating, torques_at_once=True), loops.form, loops.inner_loops
-    )
-    others = all_loop_figures(at_once, step=False, refused=[])
-    why = f"if {' and '.join(acting)} acted at every instant, as in the motor"
-    held = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
-    for name, other in others.items():
-        if name in figures and (said := _differing(figures[name].judged.margins, other.judged.margins)):
-            notes = (*figures[name].notes, f"{name} loop: {said} {why}; {held}")
-            by_hold = figures[name].sound is False and other.sound is True
-            figures[name] = replace(figures[name], notes=notes, by_hold=by_hold)
-    return figures
+    name, plant = figures.loop.name, loops.tick_system.program.drive.plant
+    acting = [word for word, own in (("cogging", plant.torque), ("load torque", plant.moment)) if own]
+    if not acting:
+        return figures
+    motor = wire(loops.design, replace(loops.operating, torques_at_once=True))
+    loop = sampled.loop(motor, name, motor.inside(name) if loops.inner_loops == "open" else ())
+    other = _if_there_is(lambda: stability_margins(loop.plain_open), [])
+    if other is None or not (said := _differing(figures.margins, other)):
+        return figures
+    note = f"{name} loop: {said} if {' and '.join(acting)} acted at every instant, as in the motor; {ACTIVE}"
+    by_hold = figures.margins.stable is False and other.stable is True
+    return replace(figures, notes=(*figures.notes, note), by_hold=by_hold)
 
 
 def _differing(margins: StabilityMargins, other: StabilityMargins) -> str:
     """What matters of other margins."""
     if other.stable is not margins.stable:
         return "stable" if other.stable else "not stable"
+    if not other.stable:
+        return ""
     words = {"gain margin": ("gain_margin_db", "dB"), "phase margin": ("phase_margin_deg", "deg")}
     said = []
     for what, (key, unit) in words.items():

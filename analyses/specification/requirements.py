@@ -19,7 +19,7 @@ from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.linear.loop_figures import LoopFigures, all_loop_figures, by_itself
+from analyses.linear.loop_figures import HELD, LoopFigures, all_loop_figures
 
 if TYPE_CHECKING:
     from analyses.specification.asked_figures import AskedFigures
@@ -138,7 +138,8 @@ def _judge_loop(
     if value is None:
         reason = "not found in the band of this loop"
     if found.held is not None and requirement.rotor != "locked":
-        reason = ", ".join(filter(None, (reason, by_itself(name))))
+        held = f"with the {HELD[name]}; by itself, {found.by_itself}"
+        reason = ", ".join(filter(None, (reason, held)))
     return _verdict(requirement, name, value, reason, rotor)
 
 

@@ -96,6 +96,15 @@ class Bench:
         wired = wire(self.design)
         return (*wired.stages, *wired.points, *paths)
 
+    def repeats(self, name: str) -> bool:
+        """Whether a break point is the outermost loop again: where that is cut, or all that it feeds back."""
+        if name not in wire(self.design).points:
+            return False
+        here, whole = self.setup(name), self.setup(self.design.controller.outermost)
+        position = self.design.controller.position
+        at_output = name == "output" and position is not None and position.feeds_back_its_angle
+        return (here.bias, here.held) == (whole.bias, whole.held) and (here.point == whole.point or at_output)
+
     def loop(self, name: str) -> Loop:
         """The linear loop of a stage; of the current with the rotor locked, as it is tested."""
         if name == "current":

@@ -70,14 +70,6 @@ class Place:
         """Relative difference that is agreement, by the error stated of the whole response."""
         return max(WITHIN, SURE * self.tangent.stated_error)
 
-    def repeats(self, other: "Place | None") -> bool:
-        """Whether the same loop is seen here, in both writings."""
-        if other is None or self.tangent.hold_s != other.tangent.hold_s:
-            return False
-        z = np.exp(1j * GRID)
-        pairs = ((self.predicted, other.predicted), (self.tangent.closed, other.tangent.closed))
-        return all(np.max(relative(here(z), there(z))) <= WITHIN for here, there in pairs)
-
     def within_at(self, angle: float) -> float:
         """The same of the response at an angle a sample: a faint or a sharp part is known less well."""
         z = np.array([np.exp(1j * angle)])

@@ -12,7 +12,6 @@ from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
-from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.assemble import loops_at
@@ -161,8 +160,8 @@ class _Work:
         return made
 
     def _small_signals(self) -> tuple[list[Row], dict[str, Place]]:
-        """Rows of every place, and the places; a break point of the outermost loop is this loop again."""
-        rows, outermost = list[Row](), self.design.controller.outermost
+        """Rows of every place, and the places; of a break point that repeats a loop what that lacks."""
+        rows = list[Row]()
         places: dict[str, Place] = {}
         self.bench.setup(self.bench.names[0])  # a drive without an operating motion cannot be tested
         for name in self.bench.names:
@@ -172,8 +171,8 @@ class _Work:
                 continue
             places[name] = place
             made = self._part(f"checks at {name}", partial(small_signal, place), None)
-            if made is not None and name in wire(self.design).points and place.repeats(places.get(outermost)):
-                made = [row for row in made if row.name == "delay_margin"]  # that a loop does not have
+            if made is not None and self.bench.repeats(name):
+                made = [row for row in made if row.name == "delay_margin" or row.verdict is Verdict.NOT_MET]
             rows += [_unproven(name, self.notes)] if made is None else made
             self._step()
         onsets = self._part("checks at onsets", self._onsets, None)

@@ -16,7 +16,21 @@ from pydantic import AfterValidator, Discriminator, Field, PlainValidator
 
 from actuator_lti.files.reading import shown
 from reports.charts.axis import Axis
-from reports.charts.paint import COLOURS
+
+COLOURS = {
+    "ink": "#1f2933",
+    "muted": "#66727f",
+    "grid": "#dde2e7",
+    "paper": "#fefefe",
+    "c1": "#0072b2",
+    "c2": "#c46200",
+    "c3": "#00805f",
+    "c4": "#8e4585",
+    "c5": "#c0392b",
+    "c6": "#3a8fc4",
+    "c7": "#7a5c1e",
+}
+"""Those of Okabe and Ito: on a page its variables, with these as fallback, on paper these themselves."""
 
 Values = Sequence[float | None] | Sequence[float] | np.ndarray
 
@@ -44,7 +58,7 @@ Way = Literal["x", "y"]
 
 @dataclass(frozen=True, kw_only=True)
 class Look:
-    """How an item is painted; ``colour`` is a key of `reports.charts.paint.COLOURS`."""
+    """How an item is painted; ``colour`` is a key of `COLOURS`."""
 
     colour: Colour = "c1"
     dash: int = 0

@@ -7,8 +7,7 @@ import numpy as np
 from reports.charts.axis import minor_ticks
 from reports.charts.chart import Curve, Item, Note, Panel, Rule, Shape
 from reports.charts.labels import Room, distance, text_box
-from reports.charts.paint import MARKER_PATHS
-from reports.charts.pen import FAR, Frame, Pen
+from reports.charts.pen import FAR, MARKER_PATHS, Frame, Pen
 from reports.visible import escape
 
 TICK, LABEL, TITLE = 10.5, 11.5, 12.0

@@ -8,12 +8,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from reports.charts.axis import Axis
-from reports.charts.chart import Look
+from reports.charts.chart import COLOURS, Look
 from reports.charts.labels import LINE_EM
-from reports.charts.paint import COLOURS, DASHES, HATCH_PATHS, MARKER_PATHS, paint
 from reports.visible import escape
 
 FAR = 1e5
+DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")  # lengths of dash and gap
+MARKER_PATHS = {
+    "o": "M-1 0a1 1 0 1 0 2 0a1 1 0 1 0-2 0z",
+    "s": "M-.9-.9h1.8v1.8h-1.8z",
+    "D": "M0-1.2L1.2 0L0 1.2L-1.2 0z",
+    "^": "M0-1.1L1.1 .9H-1.1z",
+    "v": "M0 1.1L1.1-.9H-1.1z",
+    "<": "M-1.1 0L.9-1.1V1.1z",
+    ">": "M1.1 0L-.9-1.1V1.1z",
+    "+": "M-1 0H1M0-1V1",
+    "x": "M-.8-.8L.8 .8M-.8 .8L.8-.8",
+    ".": "M-.6 0a.6 .6 0 1 0 1.2 0a.6 .6 0 1 0-1.2 0z",
+    "2": "M0 0V-1M0 0L-.87 .5M0 0L.87 .5",
+}
+HATCH_PATHS = {
+    "//": "M-1 1L1-1M0 6L6 0M5 7L7 5",
+    "--": "M0 3H6",
+    "||": "M3 0V6",
+    "\\\\": "M-1 5L1 7M0 0L6 6M5-1L7 1",
+    "+": "M0 3H6M3 0V6",
+    "x": "M0 0L6 6M0 6L6 0",
+}
 
 
 @dataclass(frozen=True)
@@ -53,14 +74,11 @@ class Pen:
 
     def style(self, **wanted: str) -> str:
         """Write colours and widths: as style on a page, where variables count, else as attributes."""
-        resolved = {
-            key.replace("_", "-"): paint(value, self.page) if value in COLOURS else value
-            for key, value in wanted.items()
-            if value != ""
-        }
-        if self.page:
-            return 'style="' + ";".join(f"{key}:{value}" for key, value in resolved.items()) + '"'
-        return " ".join(f'{key}="{value}"' for key, value in resolved.items())
+        said = [(key.replace("_", "-"), value) for key, value in wanted.items() if value != ""]
+        if not self.page:
+            return " ".join(f'{key}="{COLOURS.get(value, value)}"' for key, value in said)
+        variables = {name: f"var(--{name},{colour})" for name, colour in COLOURS.items()}
+        return 'style="' + ";".join(f"{key}:{variables.get(value, value)}" for key, value in said) + '"'
 
     def line(self, path: str, look: Look, more: str = "") -> str:
         stroke = self.style(

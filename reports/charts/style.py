@@ -19,6 +19,21 @@ __all__ = ["Chart", "Panel", "hertz", "time_unit", "to_minus"]  # besides what s
 Style = dict[str, Any]  # how an item is drawn: fields of `reports.charts.chart.Look` and of a curve, by name
 
 
+def plot(
+    height: float, x: str = "", y: str = "", log: str = "", *, width: float = WIDE, by_point: bool = False,
+    **more: Any,
+) -> tuple[Chart, Panel]:  # fmt: skip
+    """A chart of one panel; see `Chart.panel`, and `Chart` for what else it takes."""
+    chart = Chart(width=width, height=height, **more)
+    return chart, chart.panel(x, y, log, by_point=by_point)
+
+
+def stack(height: float, *heights: float, width: float = WIDE, **more: Any) -> tuple[Chart, list[Panel]]:
+    """A chart of panels one below the other; see `Chart.column`."""
+    chart = Chart(width=width, height=height, **more)
+    return chart, chart.column(*heights)
+
+
 def series(k: int) -> Style:
     return {"colour": SERIES[k % 7], "dash": k % 7}
 

@@ -13,7 +13,7 @@ NOW: style.Style = {"colour": style.BLUE, "width": 2.0}
 BEFORE: style.Style = {"colour": style.MUTED, "width": 1.6, "dash": 1}
 PINNED = tuple(zip("ABC", style.SERIES[1:], strict=False))
 HERTZ = (1.0, 1000.0)
-FOLLOWED = "live"  # the loop whose figures share a cursor
+FOLLOWED: style.Style = {"width": style.HALF, "loop": "live"}  # the loop whose figures share a cursor
 BORDERS = {one.words: COLOURS[name] for name, one in LIMITERS.items() if line_of(one) is not None}
 
 
@@ -43,8 +43,7 @@ def _both(panel: Panel, *, pinned: bool = True, measured: bool = False) -> None:
 
 
 def _bode() -> Chart:
-    chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
-    top, bottom = chart.column(1.15, 1.0)
+    chart, (top, bottom) = style.stack(370.0, 1.15, 1.0, **FOLLOWED)
     for panel, label, low, high, level in (
         (top, "magnitude, dB", -60.0, 40.0, 0.0),
         (bottom, "phase, deg", -360.0, 0.0, -180.0),
@@ -58,7 +57,7 @@ def _bode() -> Chart:
 
 
 def _nyquist() -> Chart:
-    chart = Chart(width=style.HALF, height=370.0, loop=FOLLOWED)
+    chart = Chart(height=370.0, **FOLLOWED)
     panel = style.nyquist_plane(chart)
     _both(panel, measured=True)
     style.critical_point(panel)
@@ -66,8 +65,7 @@ def _nyquist() -> Chart:
 
 
 def _sensitivity() -> Chart:
-    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    panel = chart.panel(y="magnitude, dB")
+    chart, panel = style.plot(250.0, y="magnitude, dB", **FOLLOWED)
     for name, colour, dash in (("S", style.ORANGE, 0), ("T", style.GREEN, 4)):
         for letter, pinned in PINNED:
             panel.curve(*EMPTY, f"{name} {letter}", colour=pinned, width=1.5, dash=dash)
@@ -79,8 +77,7 @@ def _sensitivity() -> Chart:
 
 
 def _difference() -> Chart:
-    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    top, bottom = chart.column(1.0, 1.0)
+    chart, (top, bottom) = style.stack(250.0, 1.0, 1.0, **FOLLOWED)
     for panel, label in ((top, "magnitude, dB"), (bottom, "phase, deg")):
         panel.curve(*EMPTY, "measured over model", colour=style.ORANGE, width=1.6)
         panel.rule_y(0.0, colour=style.INK)
@@ -91,8 +88,7 @@ def _difference() -> Chart:
 
 
 def _step() -> Chart:
-    chart = Chart(width=style.HALF, height=250.0, loop=FOLLOWED)
-    panel = chart.panel("time, ms", "linear response to a unit step")
+    chart, panel = style.plot(250.0, "time, ms", "linear response to a unit step", **FOLLOWED)
     panel.curve(*EMPTY, "command", colour=style.INK, width=1.0)
     _both(panel)
     panel.x.limits(0.0, 1.0)
@@ -104,8 +100,7 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
     traces = {"w": "speed", **({"i": "current"} if electrical else {}), "u": "voltage"}
     labels = [f"output, {unit}"]
     labels += [f"{words}, {SIGNALS[name].unit_for(axis)}" for name, words in traces.items()]
-    chart = Chart(width=style.HALF, height=170.0 + 105.0 * len(traces))
-    panels = chart.column(*([1.5] + [1.0] * len(traces)))
+    chart, panels = style.stack(170.0 + 105.0 * len(traces), *([1.5] + [1.0] * len(traces)), width=style.HALF)
     panels[0].curve(*EMPTY, "command", colour=style.INK, width=1.0)
     panels[0].curve(*EMPTY, "measured record", colour=style.ORANGE, width=2.6, opacity=0.6)
     panels[0].curve(*EMPTY, "residual", colour=style.RED, width=1.2)
@@ -119,8 +114,7 @@ def _run(unit: str, axis: Axis, electrical: bool) -> Chart:
 
 
 def _border(unit: str) -> Chart:
-    chart = Chart(width=style.HALF, height=265.0)
-    panel = chart.panel(y=f"command amplitude, {unit}", log="y")
+    chart, panel = style.plot(265.0, y=f"command amplitude, {unit}", log="y", width=style.HALF)
     panel.curve(*EMPTY, "lowest, as designed", **BEFORE)
     panel.curve(*EMPTY, "lowest, as changed", **{**NOW, "width": 2.6})
     for name, colour in BORDERS.items():

@@ -15,6 +15,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
 from actuator_lti.errors import InputError
+from analyses.records.single_rows import NORMAL
 from reports.nightly.figures import Figure
 from reports.nightly.text import one_line, to_seconds
 
@@ -114,7 +115,7 @@ def change_points(values: np.ndarray, tolerance: float) -> tuple[ChangePoint, ..
     x = values[there]
     if len(x) < 2 or np.ptp(x) <= tolerance:
         return ()
-    noise = float(np.median(np.abs(np.diff(x)))) / (0.6745 * math.sqrt(2.0))
+    noise = NORMAL * float(np.median(np.abs(np.diff(x)))) / math.sqrt(2.0)
     scale = max(noise, tolerance / 3.0, 1e-12 * float(np.max(np.abs(x))))
     ends, z = [1], (x - x[0]) / scale
     if len(x) > 2:

@@ -171,8 +171,7 @@ def from_rest(sweep: RestSweep, axis: str) -> list[doc.Section]:
 
 
 def _chart(sweep: RestSweep) -> style.Chart:
-    chart = style.Chart(width=style.WIDE, height=500.0)
-    top, bottom, off = chart.column(3, 3, 2)
+    chart, (top, bottom, off) = style.stack(500.0, 3, 3, 2)
     look: style.Style = {"colour": style.BLUE, "marker": "o", "size": 6.0, "hollow": True, "line": False}
     top.curve(sweep.frequency_hz, style.decibels(sweep.measured), "simulated from rest", **look)
     bottom.curve(sweep.frequency_hz, style.phases(sweep.measured), "simulated from rest", **look)

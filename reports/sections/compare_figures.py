@@ -64,8 +64,7 @@ def _step(name: str, title: str, drawn: tuple[Compared, ...]) -> list[doc.Block]
     shown = [(label, step) for label, step in steps if step is not None]
     if not shown:
         return []
-    chart = style.Chart(width=style.WIDE, height=410.0, title=f"{title}, step")
-    panel = chart.panel(y="response to a unit step")
+    chart, panel = style.plot(410.0, y="response to a unit step", title=f"{title}, step")
     scale = style.time_axis(panel, max(float(step.time_s[-1]) for _, step in shown))
     for k, (label, step) in enumerate(shown):
         time, response = np.asarray(step.time_s), np.asarray(step.response)
@@ -126,8 +125,7 @@ def _tornado(
     ends = [v for bar in bars for v in (bar.low, bar.high)]
     low, high = min(ends), max(ends)
     near = limit is not None and low - 3 * abs(base - low) <= limit <= high + 3 * abs(high - base)
-    chart = style.Chart(width=style.WIDE, height=90.0 + 27.0 * len(bars), legend=True)
-    panel = chart.panel(f"{words}, {unit}" if unit else words)
+    chart, panel = style.plot(90.0 + 27.0 * len(bars), f"{words}, {unit}" if unit else words, legend=True)
     look: style.Style = {"colour": style.ORANGE, "fill": "none", "hatch": "//", "width": 1.2}
     for k, bar in enumerate(bars):
         panel.bar(float(k), base, bar.low, "parameter low", **look)

@@ -130,8 +130,7 @@ def signal_figure(signal: SignalComparison, first: str = "") -> doc.Block:
     rows = style.kept_rows([signal.measured, signal.modelled, difference])
     name = _named(signal.name)
     time = signal.time_s[rows]
-    chart = style.Chart(width=style.WIDE, height=380.0)
-    upper, lower = chart.column(2.2, 1.0)
+    chart, (upper, lower) = style.stack(380.0, 2.2, 1.0)
     upper.curve(time, signal.measured[rows], "measured", colour=style.BLUE)
     upper.curve(time, signal.modelled[rows], "model", colour=style.ORANGE, width=1.4, dash=1)
     upper.y.label = f"{name.lower()}, {signal.unit}"

@@ -87,8 +87,7 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     shown = [case for case in result.cases if case.name != "oscillatory-command"]  # a band of ink
     counts = [int(np.searchsorted(case.time_s, last)) for case in shown]
     last = max(float(case.time_s[count - 1]) for case, count in zip(shown, counts, strict=True))
-    chart = style.Chart(width=style.WIDE, height=460.0, legend=True)
-    top, bottom = chart.column(1.2, 1.0)
+    chart, (top, bottom) = style.stack(460.0, 1.2, 1.0, legend=True)
     per_s = style.time_axis(bottom, last)
     for k, (case, count) in enumerate(zip(shown, counts, strict=True)):
         keep = np.unique(np.linspace(0, count - 1, min(count, _SHOWN)).astype(int))

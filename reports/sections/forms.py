@@ -11,7 +11,7 @@ from analyses.linear.loop_survey import BreakPoint, OperatingPointFigures
 from analyses.linear.responses import curve, frequency_grid
 from reports import document as doc
 from reports.charts import style
-from reports.charts.paint import HATCHES
+from reports.charts.pen import HATCH_PATHS
 from reports.numbers import to_minus
 from reports.sections.loop_charts import both, nyquist_hz
 from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, margin_row, response_row, worst_status
@@ -259,13 +259,13 @@ def _budget_chart(budgets: Mapping[str, DelayBudget]) -> style.Chart:
         {words: -one.items[key] for key, words in parts.items() if abs(one.items.get(key, 0.0)) > 0.05}
         for one in budgets.values()
     ]
-    names = list(dict.fromkeys(name for bar in bars for name in bar))
+    names, hatches = list(dict.fromkeys(name for bar in bars for name in bar)), ("", *HATCH_PATHS)
     for row, bar in enumerate(bars):
         ends = {1: 0.0, -1: 0.0}
         for name, deg in bar.items():
             side, k = (1 if deg >= 0 else -1), names.index(name)
             start, stop = ends[side], ends[side] + deg
-            panel.bar(float(row), start, stop, name, colour=style.SERIES[k % 7], hatch=HATCHES[k % 7])
+            panel.bar(float(row), start, stop, name, colour=style.SERIES[k % 7], hatch=hatches[k % 7])
             if abs(deg) > 8:
                 panel.note(style.to_minus(f"{deg:.0f}°"), ((start + stop) / 2, float(row)), pinned=True)
             ends[side] = stop

@@ -76,8 +76,7 @@ def _plan(plan: Plan) -> doc.Section:
     ]
     if plan.segments:
         rows = style.kept_rows([plan.command])
-        chart = style.Chart(width=style.WIDE, height=260.0)
-        panel = chart.panel("time, s", f"command at the output, {unit}")
+        chart, panel = style.plot(260.0, "time, s", f"command at the output, {unit}")
         panel.curve(plan.time_s[rows], plan.command[rows], "command", colour=style.BLUE)
         blocks.append(doc.figure("plan", chart, "Command of all motions, one after the other"))
     intro = (
@@ -98,8 +97,7 @@ def _two_mass(result: FrequencyResult) -> doc.Section:
     )
     hertz = lines.omega_rad_s / (2.0 * np.pi)
     for k, label in enumerate(("motor angle", "load angle")[: len(lines.names) - 1], 1):
-        chart = style.Chart(width=style.WIDE, height=320.0)
-        panel = chart.panel("frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
+        chart, panel = style.plot(320.0, "frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
         panel.points(hertz, np.abs(response(lines, k)[0]), "measured", colour=style.BLUE)
         panel.curve(hertz, np.abs(model[k - 1]), "two-mass model", **style.series(1))
         caption = f"Response of the {label} to the motor's torque: measured lines and the fitted model"
@@ -136,28 +134,22 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         f"{measured.frequency_hz[-1]:.4g} Hz, {SEEN[result.of]} of {result.loop}; least squares of the exact "
         f"sampled loop, {noise}.{f' {read[:1].upper()}{read[1:]}.' if read else ''}"
     )
-    own: list[doc.Shown] = [
-        (doc.column("own", "Design", format="sig:5"), lambda key: result.own[key]),
-        (
-            doc.column("ratio", "Over it", format="sig:3"),
-            lambda key: result.own[key] and fit[key] / result.own[key],
-        ),
+    own, axis = result.own, result.design.axis
+    more = [
+        doc.of(own.__getitem__, "own", "Design", format="sig:5"),
+        doc.of(lambda key: own[key] and fit[key] / own[key], "ratio", "Over it", format="sig:3"),
     ]
-    axis = result.design.axis
-    blocks = [identified.parameter_table("Identified values", fit, axis=axis, more=own)]
+    blocks = [identified.parameter_table("Identified values", fit, axis=axis, more=more)]
     both = decibels_and_degrees(measured.response, result.modelled)
     for label, found, fitted in zip(("magnitude, dB", "phase, deg"), *both, strict=True):
-        chart = style.Chart(width=style.WIDE, height=280.0)
-        panel = chart.panel("frequency, Hz", label, "x")
+        chart, panel = style.plot(280.0, "frequency, Hz", label, "x")
         panel.points(measured.frequency_hz, found, "measured", colour=style.BLUE)
         panel.curve(measured.frequency_hz, fitted, "identified design", **style.series(1))
         what = label.partition(",")[0].capitalize()
         words = f"{what} of the {SEEN[result.of]} of {result.loop}, measured and fitted"
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
-    values = "; ".join(
-        f"{parameter(name).key} {identified.value_words(fit, name, result.design.axis)}" for name in fit.names
-    )
-    values += identified.constant_words(fit, result.design.axis)
+    found = (f"{parameter(name).key} {identified.value_words(fit, name, axis)}" for name in fit.names)
+    values = "; ".join(found) + identified.constant_words(fit, axis)
     return identified.judged(
         "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
     )

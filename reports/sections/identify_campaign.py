@@ -176,8 +176,7 @@ def run_table(result: CampaignResult) -> doc.Block:
 
 def surface_figure(fit: SurfaceFit) -> doc.Block:
     """Runs and fitted lines over speed, a line for each load; runs that were left out are ringed."""
-    chart = style.Chart(width=style.WIDE, height=380.0, legend=True)
-    panel = chart.panel("motor speed, rad/s", "friction torque at the motor, mN m")
+    chart, panel = style.plot(380.0, "motor speed, rad/s", "friction torque at the motor, mN m", legend=True)
     line = np.linspace(0.0, max(p.speed_rad_s for p in fit.points), 2)
     levels: list[float] = []  # loads that differ by more than 0.5 N m, up to ten
     for load in sorted(p.load_Nm for p in fit.points):
@@ -274,8 +273,7 @@ def _window(record: Record, start_s: float, stop_s: float) -> style.Chart:
     labels = {"speed": "speed, rad/s", "current": "current, A", "torque": "torque, N m"}
     shown = [name for name in labels if name in record.signals]
     rows = style.kept_rows([record[name] for name in shown])
-    chart = style.Chart(width=style.WIDE, height=60.0 + 120.0 * len(shown))
-    panels = chart.column(*(1.0 for _ in shown))
+    chart, panels = style.stack(60.0 + 120.0 * len(shown), *(1.0 for _ in shown))
     for k, (panel, name) in enumerate(zip(panels, shown, strict=True)):
         panel.curve(record.time_s[rows], record[name][rows], colour=style.SERIES[k % 7], width=1.1)
         panel.band_x(start_s, stop_s, colour=style.RED, opacity=0.1)

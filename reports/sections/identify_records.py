@@ -226,8 +226,7 @@ def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[
 def _over_time(part: RecordFit, unit: str) -> style.Chart:
     from scipy.signal import welch
 
-    chart = style.Chart(width=style.WIDE, height=300.0)
-    left = chart.panel("time, s; rows left out are gaps", f"residual, {unit}")
+    chart, left = style.plot(300.0, "time, s; rows left out are gaps", f"residual, {unit}")
     right = chart.panel("frequency, Hz", f"{unit}/√Hz", "xy")
     whole = np.full(len(part.keep), np.nan)
     whole[part.keep] = part.residual
@@ -253,8 +252,7 @@ def _correlation(tests: Sequence[ResidualTest]) -> style.Chart:
 
 
 def _friction(part: RecordFit, unit: str, rate: str) -> style.Chart:
-    chart = style.Chart(width=style.WIDE, height=320.0)
-    panel = chart.panel(f"speed, {rate}", f"friction, {unit}", by_point=True)
+    chart, panel = style.plot(320.0, f"speed, {rate}", f"friction, {unit}", by_point=True)
     few = slice(None, None, max(1, len(part.speed) // 1500))
     order = np.argsort(part.speed)
     line = order[style.kept_rows([(part.friction - part.residual)[order]])]

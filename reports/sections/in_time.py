@@ -39,8 +39,7 @@ def _injection(sweeps: Sequence[BenchSweep]) -> doc.Section:
 
 
 def _sweep(sweep: BenchSweep) -> doc.Block:
-    chart = style.Chart(width=style.WIDE, height=400.0)
-    top, bottom = chart.column(1.1, 1.0)
+    chart, (top, bottom) = style.stack(400.0, 1.1, 1.0)
     phase = style.phases(sweep.linear)
     seen = phase + np.degrees(np.angle(sweep.open_loop / sweep.linear))
     size, size_seen = style.decibels(sweep.linear), style.decibels(sweep.open_loop)
@@ -82,8 +81,7 @@ def _in_time(validation: Validation) -> doc.Section:
 
 
 def _step(shown: StepShown) -> doc.Block:
-    chart = style.Chart(width=style.HALF, height=240.0)
-    panel = chart.panel(y="response to a unit step")
+    chart, panel = style.plot(240.0, y="response to a unit step", width=style.HALF)
     time = shown.time_s * style.time_axis(panel, float(shown.time_s[-1]))
     some, few = (slice(None, None, max(1, time.size // most)) for most in (400, 40))
     panel.curve(time[some], shown.linear[some], "linear", colour=style.BLUE)
@@ -97,8 +95,7 @@ def _step(shown: StepShown) -> doc.Block:
 
 
 def _margin(shown: MarginShown) -> doc.Block:
-    chart = style.Chart(width=style.HALF, height=240.0)
-    panel = chart.panel(y="amplitude of the critical mode")
+    chart, panel = style.plot(240.0, y="amplitude of the critical mode", width=style.HALF)
     scale = style.time_axis(panel, max(float(run.time_s[-1]) for run in (shown.inside, shown.outside)))
     for run, words, k in ((shown.inside, "1 % inside", 0), (shown.outside, "1 % outside", 3)):
         look = style.series(k)

@@ -46,8 +46,7 @@ def section(design: Design, border: Onset) -> doc.Section:
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
     title = "limit reached at this amplitude"
-    chart = style.Chart(width=style.WIDE, height=370.0, legend=True, legend_title=title)
-    panel = chart.panel(y=f"command amplitude, {unit}", log="y")
+    chart, panel = style.plot(370.0, y=f"command amplitude, {unit}", log="y", legend=True, legend_title=title)
     hertz = border.omega_rad_s / (2.0 * np.pi)
     lowest = scale * border.amplitude_rad
     there = np.isfinite(lowest)
@@ -154,9 +153,9 @@ EVERY = 2  # a glyph in every second column
 
 
 def map_chart(result: LargeSignals, out: Unit) -> style.Chart:
-    title = "waveform; first reached, linear loop"
-    made = style.Chart(width=style.WIDE, height=500.0, legend=True, legend_title=title)
-    panel = made.panel("command frequency, Hz", f"command amplitude, {out.unit}", "xy")
+    legend: style.Style = {"legend": True, "legend_title": "waveform; first reached, linear loop"}
+    amplitude = f"command amplitude, {out.unit}"
+    made, panel = style.plot(500.0, "command frequency, Hz", amplitude, "xy", **legend)
     shown, scale = result.map, out.scale
     x, y = shown.frequency_hz, scale * shown.amplitude_rad
     xe, ye = _edges(x), _edges(y)

@@ -78,8 +78,7 @@ def sensitivity(title: str, design: Design, name: str, figures: LoopFigures, gri
     asked = [one for one in design.requirements if one.quantity == "sensitivity_peak"]
     limits = style.known(one.maximum for one in asked if one.loop in (name, "every", None))
     grid_hz, values = grid / (2.0 * np.pi), []
-    chart = style.Chart(width=style.HALF, height=225.0, loop=name)
-    panel = chart.panel(y="magnitude, dB")
+    chart, panel = style.plot(225.0, y="magnitude, dB", width=style.HALF, loop=name)
     drawn = (
         ("S", figures.loop.plain_sensitivity, peaks.sensitivity_rad_s, peaks.sensitivity_db, style.ORANGE),
         ("T", figures.loop.plain_closed, peaks.complementary_rad_s, peaks.complementary_db, style.BLUE),
@@ -119,8 +118,7 @@ def step(
         drawn["rotor locked"] = locked
     responses = [_response(label, one, end) for label, one in drawn.items()]
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 225.0)
-    chart = style.Chart(width=width, height=height, loop=name)
-    panel = chart.panel(y="response to a unit step")
+    chart, panel = style.plot(height, y="response to a unit step", width=width, loop=name)
     last, held = float(responses[0][1][-1]), loop_figures.loop.period_s is not None
     scale = style.time_axis(panel, last)
     for k, (label, time, response) in enumerate(responses):

@@ -30,8 +30,7 @@ def open_bode(
     title: str, figures: LoopFigures, grid: np.ndarray, *, name: str = "", small: bool = False
 ) -> doc.Block:
     width, height = (style.SMALL, 280.0) if small else (style.HALF, 410.0)
-    chart = style.Chart(width=width, height=height, loop=name)
-    top, bottom = chart.column(1.15, 1.0)
+    chart, (top, bottom) = style.stack(height, 1.15, 1.0, width=width, loop=name)
     drawn, shown = curve(figures.loop.plain_open, grid), 1 if small else LABELLED
     gains, phases = seen_margins(figures.margins, drawn)
     marks = [0.0, *(level for level, _ in gains[:1])]
@@ -142,8 +141,7 @@ def closed_bode(
     curves = [(first, answer_curve(figures, grid))]
     curves += [("to the reference", answer_curve(other, grid))] if other is not None else []
     curves += [("rotor locked", curve(locked.plain_response, grid))] if locked and locked.stable else []
-    chart = style.Chart(width=style.HALF, height=410.0, loop=name)
-    top, bottom = chart.column(1.0, 1.0)
+    chart, (top, bottom) = style.stack(410.0, 1.0, 1.0, width=style.HALF, loop=name)
     both(curves, nyquist_hz(figures), top, bottom, span=60.0, top_room=0.15)
     bottom.rule_y(-90.0, dash=1)
     corner, lag = (finite(band.minus3db_hz), finite(band.minus90deg_hz)) if band else (None, None)
@@ -203,8 +201,7 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
 def nichols(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
     """Draw gain over phase, and about each critical point in reach where S or T exceeds 6 dB."""
     one = nichols_curve(figures.loop.plain_open, grid, NICHOLS_SPAN_DB)
-    chart = style.Chart(width=style.WIDE, height=360.0, legend=True)
-    panel = chart.panel("phase, deg", "magnitude, dB", by_point=True)
+    chart, panel = style.plot(360.0, "phase, deg", "magnitude, dB", by_point=True, legend=True)
     shown = np.abs(one.magnitude_db) <= NICHOLS_SPAN_DB
     phase, gain = (np.asarray(values)[shown].tolist() for values in (one.phase_deg, one.magnitude_db))
     low, high = min(phase, default=-360.0), max(phase, default=0.0)

@@ -9,7 +9,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.files.reading import Tree
 from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.finite import finite
-from analyses.linear.loop_figures import AWAY, HELD, OPEN, LoopFigures
+from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.loop_survey import AT_REST, OperatingPointFigures, at_rest
 from analyses.margins.run import Margins
 from analyses.specification.weakest import Spread, figures_of, spread
@@ -17,7 +17,7 @@ from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words
-from reports.terminal import Brief, SideBySide
+from reports.terminal import Brief, side_by_side
 
 EVIDENCE: dict[str, doc.State] = {
     "certified": {"text": "certified", "status": "pass"},
@@ -119,7 +119,7 @@ def brief(result: Margins) -> Brief:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
         told += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [SideBySide(head, tables), *more, *judged["blocks"]], notes)
+    return Brief(first["result"], [side_by_side(head, tables), *more, *judged["blocks"]], notes)
 
 
 def _named(result: Margins) -> dict[str, LoopFigures]:
@@ -211,12 +211,10 @@ def _cogging(result: Margins) -> str:
 
 
 def _hold(result: Margins) -> str:
-    """Loops that are unstable only as a slope over the angle is held over a tick, and what the drive is."""
-    alone = [LOOPS[name].lower() for name, one in result.loops.items() if one.by_hold]
-    whole = result.loops.get(result.design.controller.outermost)
-    drive = "; the drive with all loops closed is stable" if whole is not None and whole.sound else ""
+    """Loops that fail only as a slope over the angle is held over a tick."""
+    alone = [LOOPS[name].lower() for name, one in result.loops.items() if one.by_hold and not one.sound]
     held = "only as the slope of a torque over the angle, held over a tick, is slightly active"
-    return f" ({', '.join(alone)}: {held}{drive})" if alone else ""
+    return f" ({', '.join(alone)}: {held})" if alone else ""
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:
@@ -413,7 +411,7 @@ def by_itself_notes(named: Mapping[str, LoopFigures]) -> list[str]:
         "left out."
         for label, step in returned
     ] + [
-        f"{label}: unstable by itself, {OPEN[figures.loop.name]}, as {AWAY}. With all loops "
+        f"{label}: unstable by itself, {figures.by_itself}. With all loops "
         f"closed the drive is stable. The loop is judged with the {HELD[figures.loop.name]}: stable."
         for label, figures in named.items()
         if figures.held is not None

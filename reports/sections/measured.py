@@ -87,8 +87,7 @@ def _margins(of: StabilityMargins) -> doc.Block:
 
 
 def _bode(one: Measured) -> doc.Block:
-    chart = style.Chart(width=style.WIDE, height=410.0)
-    top, bottom = chart.column(1.15, 1.0)
+    chart, (top, bottom) = style.stack(410.0, 1.15, 1.0)
     f, reach = one.frequency_hz, np.minimum(one.radius / np.abs(one.measured), 0.999)
     found, model = decibels_and_degrees(one.measured, one.model)
     around = np.degrees(np.arcsin(reach))

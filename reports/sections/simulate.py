@@ -118,8 +118,7 @@ def chart_of(run: Trajectory) -> style.Chart:
         ("voltage, V", [("voltage", run.voltage_V), *command.get("voltage", [])], _limiters("u")),
     ]
     rows = style.kept_rows([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
-    chart = style.Chart(width=style.WIDE, height=60.0 + 150.0 * len(parts), legend=True)
-    panels = chart.column(*(1.0 for _ in parts))
+    chart, panels = style.stack(60.0 + 150.0 * len(parts), *(1.0 for _ in parts), legend=True)
     scale = style.time_axis(panels[-1], float(run.time_s[rows][-1]))
     time = run.time_s[rows] * scale
     for panel, (label, signals, limiters) in zip(panels, parts, strict=True):

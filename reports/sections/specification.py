@@ -97,8 +97,7 @@ def _planes(result: Specification) -> list[doc.Block]:
         load = one.figures.load_Nm
         moves = [move for move in result.manoeuvres if move.load_Nm == load]
         title = f"{'Force' if linear else 'Torque'} and speed of the motor, load {load:g} {unit}"
-        chart = style.Chart(width=style.WIDE, height=400.0, title=title, legend=True)
-        panel = chart.panel(speed_label, torque_label, by_point=True)
+        chart, panel = style.plot(400.0, speed_label, torque_label, by_point=True, title=title, legend=True)
         level = [c.torque_Nm[0] for c in result.plane.bounds if c.torque_Nm[0] == c.torque_Nm[-1]]
         top = strong * float(max([*level, *(move.peak_torque_Nm for move in moves)], default=1.0))
         widest = fast * _fastest(result, moves)

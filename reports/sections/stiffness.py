@@ -63,8 +63,7 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
     shown = [curve for curve in result.curves if np.isfinite(curve.stiffness_Nm_rad).all()]
     if not shown:
         return []
-    chart = style.Chart(width=style.WIDE, height=420.0)
-    top, bottom = chart.column(1.2, 1.0)
+    chart, (top, bottom) = style.stack(420.0, 1.2, 1.0)
     top.y.log, top.y.label, bottom.y.label = True, f"stiffness, {unit}", "phase, deg"
     phases = [style.phases(curve.stiffness_Nm_rad) for curve in shown]
     for k, (curve, phase) in enumerate(zip(shown, phases, strict=True)):

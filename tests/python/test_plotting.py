@@ -12,7 +12,7 @@ from analyses.large_signal.classify import CAUSES
 from analyses.large_signal.map import amplitude_map
 from analyses.linear.loop_survey import LoopSurvey
 from nonlinear import commands, simulate
-from reports.charts import paint, style
+from reports.charts import chart, style
 from tests.refusals import refused
 
 
@@ -108,7 +108,7 @@ def test_cells_keep_their_colours_when_some_are_missing_and_pages_have_the_same(
     assert [tuple(np.round(drawn.cmap(k)[:3], 2)) for k in (1, 2)] == [
         tuple(round(int(COLOURS[k][i : i + 2], 16) / 255, 2) for i in (1, 3, 5)) for k in (2, 3)
     ]
-    assert set(COLOURS) == {paint.COLOURS[name] for name in (*style.SERIES, "ink", "muted")}
+    assert set(COLOURS) == {chart.COLOURS[name] for name in (*style.SERIES, "ink", "muted")}
 
 
 def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:

@@ -13,7 +13,7 @@ import pytest
 
 from reports import document as doc
 from reports.cli.app import PANELS, flowed
-from reports.terminal import SideBySide, print_blocks
+from reports.terminal import print_blocks, side_by_side
 from tests.command_line import commands
 
 NO_DESIGN = {"designs", "keys", "pdf", "nightly", "objects import", "init"}  # nightly, pdf: a study, a report
@@ -115,7 +115,7 @@ def printed(monkeypatch, capsys) -> Callable[..., str]:
 def test_side_by_side_tables_are_stacked_rather_than_broken(width: int, printed) -> None:
     heads = (("name", "Loop", ""), ("gain", "Gain margin", "dB"), ("pm", "Phase", "deg"))
     rows = [{"name": f"Variant-{k}", "gain": 10.5 + k, "pm": f"{k}23456789"} for k in range(9)]
-    out = printed(width, SideBySide("A head", [doc.table("A", [doc.column(*one) for one in heads], rows)]))
+    out = printed(width, side_by_side("A head", [doc.table("A", [doc.column(*one) for one in heads], rows)]))
     assert all(row["name"] in out and row["pm"] in out for row in rows)
     if width < 100:
         assert not re.search(r"^\s*\w\s*$", out, re.M)

@@ -13,7 +13,7 @@ from actuator_lti import assemble_loops, load_design, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.model import Design, FrictionPoint, Requirement
 from actuator_lti.drive.operating import level
-from analyses.linear.loop_figures import all_loop_figures, held_loop
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import survey_loops
 from analyses.margins import margins
 from analyses.specification.requirements import evaluate_requirements, tally
@@ -43,6 +43,19 @@ def falling_friction(slope_Nm_rad: float = 0.0) -> Design:
     return pushed(slope_Nm_rad, friction=friction, requirements=())
 
 
+def overfed(slope_Nm_rad: float = -1.0) -> Design:
+    """1.3 times the back-EMF fed forward, J s (R + Kp) < 0.3 kM kE at s = 0: the rotor runs away."""
+    law = {"integral_time_s": None, "back_emf_feedforward": 1.3}
+    return pushed(slope_Nm_rad, controller={"current": law}, requirements=())
+
+
+def on_a_spring(slope_Nm_rad: float = -1000.0) -> Design:
+    """Without friction, its back-EMF fed forward: the pole of a held spring grows by K Ts^2/(4 J N^2)."""
+    friction = {"viscous_Nms_rad": 0.0}
+    control, small = {"current": {"back_emf_feedforward": 0.5}}, {"full_deflection_rad": 0.005}
+    return pushed(slope_Nm_rad, friction=friction, controller=control, requirements=(), validation=small)
+
+
 def held_phase_margin_deg(design: Design) -> float:
     """PI(z) (1 - a)/(R (z - a)) behind the delay, a = exp(-R T/L): the winding alone, its voltage held."""
     motor, law, T = design.effective_motor, design.controller.current, design.controller.period_s
@@ -64,9 +77,9 @@ def test_the_current_loop_is_judged_with_the_rotor_held() -> None:
     current, expected = figures["current"], held_phase_margin_deg(design)
     assert (current.margins.stable, current.sound) == (False, True)  # J s^2 + Cv s - k: a root on the right
     assert figures["position"].stable
-    assert held_loop(assemble_loops(design), "position") is None
     # without a load that pushes, an unstable current loop inside a stable drive stays what it is
-    assert held_loop(assemble_loops(pushed(-1.0)), "current") is None
+    own = all_loop_figures(assemble_loops(overfed()))
+    assert [(one.stable, one.held) for one in own.values()] == [(False, None), (True, None), (True, None)]
     assert current.judged.margins.phase_margin_deg == pytest.approx(expected, abs=1e-6)
     asked = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
     verdicts = evaluate_requirements(replace(design, requirements=(asked,)), figures)
@@ -105,6 +118,7 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
     ("design", "held", "verdict"),
     [
         (falling_friction(), ["current"], "met"),
+        (on_a_spring(), ["current"], "met"),
         (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
         # nothing around the current loop stops the load that pushes away
         (pushed(requirements=(), controller={"position": None, "velocity": None}), [], "not met"),
@@ -121,9 +135,9 @@ def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[st
 
 
 def test_many_designs_at_once_are_judged_alike() -> None:
-    slopes = np.array([-1.0, 0.0, 1.0, 100.0])
-    for make in (pushed, p_velocity, falling_friction):
-        many = linear_figures(Population(make(1.0), {"load.moment_slope": slopes}, 4), held=True)
+    slopes = np.array([-1000.0, -1.0, 0.0, 1.0, 100.0])
+    for make in (pushed, p_velocity, falling_friction, on_a_spring, overfed):
+        many = linear_figures(Population(make(1.0), {"load.moment_slope": slopes}, len(slopes)), held=True)
         for k, slope in enumerate(slopes):
             single = all_loop_figures(assemble_loops(make(float(slope))))
             for name, one in single.items():

@@ -2,15 +2,17 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
+import control
 import numpy as np
 import pytest
 
-from actuator_lti import Design, load_design, onset
+from actuator_lti import Design, assemble_loops, load_design, onset
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import shipped_designs
 from actuator_lti.loops import ExactMargins
-from analyses.validation import CHECKS, validate
+from analyses.validation import CHECKS, places, validate
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.places import Bench
 from analyses.validation.row import Row
@@ -23,8 +25,8 @@ INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative 
 
 
 def rows(design: Design, model: Design | None = None) -> dict[str, Row]:
-    places = Bench(design, design if model is None else model).onsets()
-    return {row.name: row for place in places for row in small_signal(place)}
+    onsets = Bench(design, design if model is None else model).onsets()
+    return {row.name: row for place in onsets for row in small_signal(place)}
 
 
 @pytest.mark.parametrize("name", shipped_designs())
@@ -104,8 +106,8 @@ def test_cogging_in_front_of_a_coupling_with_play() -> None:
     assert result.passed
 
 
-def test_the_outermost_loop_is_listed_once() -> None:
-    """The drive of one loop has its delay margin at the voltage; a wrong break point is another loop."""
+def test_the_outermost_loop_is_listed_once(monkeypatch) -> None:
+    """The drive of one loop has its delay margin at the voltage; what a wrong break point says is kept."""
     rows = {name: validate(name, CHECKS).rows for name in ("joint", "ctms-motor-position")}
     seen = {name: {row.loop for row in of} - {"command", "load", "drive"} for name, of in rows.items()}
     assert seen == {
@@ -114,9 +116,30 @@ def test_the_outermost_loop_is_listed_once() -> None:
     }
     assert [row.name for row in rows["ctms-motor-position"] if row.loop == "u"] == ["delay_margin"]
     design = load_design("joint")
-    loop, point = (Bench(design, design).place(name) for name in ("position", "w_ref"))
-    assert point.repeats(loop)
-    assert not replace(point, predicted=lambda z: 1.01 * point.predicted(z)).repeats(loop)
+    bench = Bench(design, design)
+    assert [name for name in bench.names if bench.repeats(name)] == ["w_ref", "output"]
+    truly = places.periodic_loop
+
+    def wrong(loops: Any, name: str) -> Any:
+        loop = truly(loops, name)
+        return replace(loop, systems=[(A, 1.01 * B, C) for A, B, C in loop.systems])
+
+    monkeypatch.setattr(places, "periodic_loop", wrong)
+    contradicted = {row.loop for row in validate(design, CHECKS).rows if row.verdict is Verdict.NOT_MET}
+    assert contradicted == {"u", "i_ref", "w_ref", "output"}
+
+
+@pytest.mark.parametrize("more", ["", "angle", "output_angle", "output_speed", "twist"])
+def test_the_output_is_the_outermost_loop_where_its_angle_is_all_that_is_taken(more: str) -> None:
+    """By name, held against the responses: joint's sensor is the output's."""
+    joint = load_design("joint")
+    gains = [joint.controller.position_loop.gain, *([-1e-3] if more else [])]
+    law = control.ss([], [], [], [gains], assemble_loops(joint).position.period_s)
+    design = joint.with_law("position", law, ["error", *([more] if more else [])])
+    loops, z = assemble_loops(design), np.exp(1j * np.array([1e-3, 0.03, 0.3, 2.0]))
+    here, there = (loop.closed_loop(z) for loop in (loops.break_points["output"], loops.position))
+    assert Bench(design, design).repeats("output") is bool(np.allclose(here, there, rtol=1e-7))
+    assert Bench(design, design).repeats("w_ref")
 
 
 def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
