@@ -14,7 +14,7 @@ from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.periodic import fundamental
+from actuator_lti.loops.periodic import fundamental, shown
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
@@ -205,8 +205,11 @@ def _fill(
         rows = np.full((len(chosen), out.shape[2]), np.nan)
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
-        loop = fundamental(stage_blocks(wired, stage))
-        _figures_of(loop, lead, time_figures and response is None, rows)
+        blocks = stage_blocks(wired, stage)
+        _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE])) if len(blocks) > 1 else ():
+            alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
+            _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:
             of_loop = rows[:, [fig.STABLE, fig.RADIUS]]
             _figures_of(response, np.nan, time_figures, rows)

@@ -11,7 +11,6 @@ import operator
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
-from types import ModuleType
 from typing import Any
 
 from actuator_lti.compiled.form import Known
@@ -150,9 +149,8 @@ class _Body(Known):
         return ast.Constant(value) if type(value) in (int, float) else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
-        value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
-        return ast.Constant(value) if type(value) in (int, float) else node
+        value = self.number_at(node)
+        return node if value is None else ast.Constant(value)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         left, right, kind = self.visit(node.left), self.visit(node.right), type(node.op)

@@ -6,6 +6,8 @@ from math import inf
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
+import numpy as np
+
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.field import Axis, choice, day, label, limit, positive, quantities, quantity, text
 
@@ -80,6 +82,27 @@ class Requirement:
     source: Annotated[str, text("where the limit comes from")] = ""
     note: Annotated[str, text("any remark")] = ""
     unit: str
+
+    @property
+    def bound(self) -> Any:
+        """Its limit, the lower one where it has both."""
+        return self.maximum if self.minimum is None else self.minimum
+
+    @property
+    def size(self) -> float:
+        """What a distance is measured against: the limit itself, or the usual size of such a figure."""
+        return abs(self.bound) or QUANTITIES[self.quantity].size
+
+    def distance(self, value: Any) -> Any:
+        """Of a value, or an array of them, to the nearer limit, in its unit, positive on the good side.
+
+        >>> float(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0).distance(9.5))
+        3.5
+        """
+        least = -inf if self.minimum is None else self.minimum
+        most = inf if self.maximum is None else self.maximum
+        with np.errstate(invalid="ignore"):  # of a value that is itself unlimited, too
+            return np.fmin(value - least, most - value)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,7 +1,7 @@
 """The model driven by a record's own command, load and supply."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -185,15 +185,11 @@ def model_signals(
         if _off(part, goes) < _off(part, rest):
             initial = moving
             notes.append("the record begins in motion or under load, and so does the model")
-    apart = replace(driven, together=driving.MOST_TOGETHER)  # jumps in neighbouring rows: a curve, or steps
-    readings = [driven] if len(apart.steps) == len(driven.steps) else [driven, apart]
     whole = partial(run, at=initial, progress=progress)
-    made, series = min(
-        (_with_steps(one, time, measured, partial(whole, one)) for one in readings),
-        key=lambda each: _off(measured, each[1]),
-    )
-    between = "command smooth between samples but for its steps"
-    notes.append(f"model: {len(made.time_s)} ticks of {period * 1e6:g} us, {between}")
+    readings = driving.readings(driven, record)
+    tried = [(one, *_with_steps(one, time, measured, partial(whole, one))) for one in readings]
+    best, made, series = min(tried, key=lambda each: _off(measured, each[2]))
+    notes.append(f"model: {len(made.time_s)} ticks of {period * 1e6:g} us, command {best.between}")
     limits = {name: use.fraction for name, use in made.limits.items()}
     return {name: series[name] for name in measured}, limits
 

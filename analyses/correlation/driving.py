@@ -35,6 +35,9 @@ COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
 IN_MOTION = 0.02
 FIRST_ROWS = 5
 LEAST_FOR_A_SPLINE = 9
+SMOOTH, STRAIGHT, HELD = (
+    f"{how} between samples" for how in ("smooth but for its steps", "in straight lines", "held")
+)
 MOST_TOGETHER = 3  # jumps: five rows have four, and the slope that Akima's curve takes at the middle one
 
 
@@ -48,11 +51,26 @@ class Driven:
     design: Design  # the drive from that stage on: under a current command no speed loop acts
     notes: tuple[str, ...] = ()
     together: int = 1  # jumps from row to row, between standstills, that are steps each and no curve
+    between: str = SMOOTH
 
     @property
     def steps(self) -> Ints:
         """The first row behind each step."""
         return steps_at(self.values, self.together)
+
+
+def readings(driven: Driven, record: Record) -> list[Driven]:
+    """How a command may go on between its samples where the drive's ticks are more; as the record has it.
+
+    Jumps in neighbouring rows are a curve or steps; a curve is smooth, or the drive takes it in straight
+    lines or, as from a field bus, held until the next sample.
+    """
+    found = [driven, replace(driven, together=MOST_TOGETHER)]
+    if record.period_s > 1.5 * driven.design.controller.period_s:
+        found.append(replace(driven, together=len(record), between=HELD))
+        found.append(replace(driven, together=0, between=STRAIGHT))
+    other = [one for k, one in enumerate(found) if not k or len(one.steps) != len(found[k - 1].steps)]
+    return [one for one in other if record.between in ("", one.between)] or [driven]
 
 
 def command_names(design: Design) -> dict[str, str]:
@@ -106,11 +124,12 @@ def needed_command(design: Design, record: Record, signal: str | None = None) ->
 def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats) -> tuple[Floats, Floats]:
     """Times and values of the command at the drive's ticks.
 
-    Through the samples goes a smooth curve, as a feed-forward takes the slope: straight lines would give it
-    steps at the very instants of the record. A jump between two stretches that stand still is a step of the
-    command, and comes ``early_s`` (one for each) before the later sample.
+    Through the samples goes a smooth curve, as a feed-forward takes the slope, or straight lines, which give
+    it steps at the very instants of the record (see `readings`). A jump between two stretches that stand
+    still is a step of the command, and comes ``early_s`` (one for each) before the later sample.
     """
     period = driven.design.controller.period_s
+    curve = _lines if driven.between == STRAIGHT else _smooth
     ticks = np.asarray(np.arange(round(duration_s / period) + 1) * period, dtype=np.float64)
     values = np.empty_like(ticks)
     later = driven.steps
@@ -119,8 +138,12 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     edges[0] = 0
     for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
         part = slice(start, end)
-        values[first:last] = _smooth(time_s[part], driven.values[part], ticks[first:last])
+        values[first:last] = curve(time_s[part], driven.values[part], ticks[first:last])
     return ticks, values
+
+
+def _lines(time_s: Floats, values: Floats, at_s: Floats) -> Floats:
+    return np.interp(at_s, time_s, values)
 
 
 def _smooth(time_s: Floats, values: Floats, at_s: Floats) -> Floats:

@@ -122,15 +122,19 @@ def information_of(w: Floats, noise: Floats) -> Information:
 def events_of(w: Floats, noise: Floats) -> Information:
     """As `information_of`, of noise that comes in events: at a jump, a reversal, a limit, no two alike.
 
-    ``W'e e'W`` from the sums of ``w e`` over root n blocks of root n rows each, whatever their own sizes
-    (White's covariance, clustered; Liang and Zeger, Biometrika 73, 1986). The noise may be that of the first
+    Root n blocks of root n rows each, whatever their own sizes, each left out in turn: ``W'W`` times what the
+    values then move by takes the place of its sum of ``w e`` (jackknife; Bell and McCaffrey, Survey
+    Methodology 28, 2002), as one event bends the values towards itself. The noise may be that of the first
     rows only.
     """
-    blocks = max(int(np.sqrt(len(noise))), 2)
-    parts = np.array_split(w[: len(noise)] * noise[:, None], blocks)
-    sums = np.array([part.sum(axis=0) for part in parts])
-    grown = blocks / max(blocks - w.shape[1], 1) * len(w) / len(noise)
-    return Information(gram=w.T @ w, noise=grown * sums.T @ sums, rows=len(w), order=0)
+    size = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
+    rows = np.column_stack([w[: len(noise)] / size, noise])
+    parts = np.array_split(rows, max(int(np.sqrt(len(noise))), 2))
+    tables = np.array([part.T @ part for part in parts])
+    gram, own, sums = np.sum(tables, axis=0)[:-1, :-1], tables[:, :-1, :-1], tables[:, :-1, -1]
+    moved = np.linalg.pinv(gram - own, hermitian=True) @ sums[:, :, None]
+    sums = size * (gram @ moved)[:, :, 0] * np.sqrt(len(w) / len(noise) * (1.0 - 1.0 / len(parts)))
+    return Information(gram=w.T @ w, noise=sums.T @ sums, rows=len(w), order=0)
 
 
 def covariance_of(records: Sequence[Information]) -> Floats:

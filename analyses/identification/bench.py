@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
@@ -11,11 +11,10 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.errors import InputError
 from actuator_lti.types import Progress
-from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification import to_design, verdict
-from analyses.identification.asked import Settings, fixed_values, held_by_name
+from analyses.identification.asked import Settings, fixed_values
 from analyses.identification.design_values import (
     DesignValue,
     at_constant,
@@ -23,18 +22,12 @@ from analyses.identification.design_values import (
     with_found_constant,
     with_given_constant,
 )
-from analyses.identification.diagnosis import Diagnosed, diagnosed, without_flat_tops
-from analyses.identification.electrical import (
-    ElectricalFit,
-    electrical_values,
-    fit_electrical,
-    without_own_bias,
-)
-from analyses.identification.friction_map import fit_map
-from analyses.identification.inverse import fit_records, held_out_residual
-from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, LawChoice, Recipe
+from analyses.identification.diagnosis import Diagnosed, without_flat_tops
+from analyses.identification.electrical import ElectricalFit, electrical_values
+from analyses.identification.inverse import held_out_residual
+from analyses.identification.joint_model import JointModel, LawChoice
+from analyses.identification.motor_and_motion import by_voltage, held_values, motor_and_motion, names_of
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
-from analyses.identification.own_bias import without_bias
 from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.rows import is_loaded, recipe_for
 from analyses.records.consistency import Finding, because, check_record
@@ -43,8 +36,6 @@ from analyses.records.record import Record, prepared
 
 HELD_OUT_FACTOR = 1.5
 HELD_OUT_EXTRA = 0.02
-ROUNDS = 4
-SETTLED = 0.1  # standard errors by which the motor may still move
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,11 +87,12 @@ def identify_bench(
     findings = {record.name: check_record(plain, record) for record in (*used, *unseen)}
     with because(findings):
         if settings.electrical:
-            judged = _judged(plain, _by_voltage(plain, used, recipe)[0])
+            judged = _judged(plain, by_voltage(plain, used, recipe)[0])
             findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
     with because(findings):
-        start, electrical, right = _motor_and_motion(design, plain, used, settings, recipe)
-    held = _held(design, start, settings)
+        found = motor_and_motion(design, plain, used, settings, recipe)
+    start, electrical, right = found.start, found.electrical, found.right
+    held = held_values(design, start, settings)
     compared = design_values(design, right.model, right.records, start)
     model, both = _with_constant(start, right, compared, electrical)
     whole = [without_flat_tops(start, record, recipe) for record in unseen]
@@ -128,50 +120,6 @@ def identify_bench(
     )
 
 
-def _motor_and_motion(
-    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
-) -> tuple[Design, ElectricalFit | None, Diagnosed]:
-    """The motor as the voltage tells it, where that is asked, and the motion: in turn.
-
-    The motion needs kM; the motor is found less its own bias on records that are simulated with both.
-    """
-
-    def moved(start: Design) -> Diagnosed:
-        fit = partial(_fitted, start, settings, _held(design, start, settings), recipe)
-        return diagnosed(design, start, records, fit, recipe)
-
-    if not settings.electrical:
-        return plain, None, moved(plain)
-    start, found = _by_voltage(plain, records, recipe)
-    for _ in range(ROUNDS):
-        before, right = found, moved(start)
-        start, found = _by_voltage(plain, records, recipe, (start, right))
-        off = [abs(found[n] - before[n]) - SETTLED * found.std(n) for n in found.names if n in before.names]
-        if found.names == before.names and max(off) < 0.0:
-            break
-    return start, found, right
-
-
-def _by_voltage(
-    plain: Design,
-    records: Sequence[Record],
-    recipe: Recipe | None,
-    simulated: tuple[Design, Diagnosed] | None = None,
-) -> tuple[Design, ElectricalFit]:
-    """The design with what the voltage equation tells of its motor, and that fit.
-
-    Less its own bias where the records were simulated, with the motor of the design given beside them.
-    """
-    if simulated is None:
-        found = fit_electrical(plain, records, recipe)
-    else:
-        start, right = simulated
-        found = fit_electrical(plain, records, recipe, right.late_s)
-        found = without_own_bias(found, start, records, right.model.simulated, recipe)
-    told = f"voltage equation of {_names(records)}"
-    return to_design.design_with_fit(plain, electrical_values(plain, found), told), found
-
-
 def _judged(plain: Design, start: Design) -> Design:
     """The design that records are held against: its own, its kE as doubtful as what was found is off."""
     key, motor = parameter("back_emf").key, start.motor
@@ -183,10 +131,6 @@ def _judged(plain: Design, start: Design) -> Design:
         motor = replace(motor, back_emf_constant_Vs_rad=own)
     motor = replace(motor, resistance_ohm=plain.motor.resistance_ohm)
     return replace(start, motor=motor, parameters=FrozenMap(parameters))
-
-
-def _names(records: Sequence[Record]) -> str:
-    return ", ".join(record.name for record in records)
 
 
 def _with_constant(
@@ -208,7 +152,7 @@ def _made(
 ) -> tuple[Design, OutputErrorResult | None]:
     """The design with what was found, as its file gives it, and the refinement where one was asked for."""
     model, records = right.model, right.records
-    source = f"identified from {_names(records)}{at_constant(model, start)}"
+    source = f"identified from {names_of(records)}{at_constant(model, start)}"
     try:
         values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
         for record in records:
@@ -233,39 +177,6 @@ def _made(
         made = to_design.design_with_fit(made, refined, f"{source}, refined by simulation")
         made = made if both is None else to_design.with_correlations(made, both)
     return read_design_text(write_design(made)), refined
-
-
-def _held(design: Design, start: Design, settings: Settings) -> dict[str, float]:
-    """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
-    form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
-    names = (*NAMES[form], "load_coefficient")
-    whole = dict.fromkeys(to_design.INERTIAS, "inertia")
-    held = held_by_name(fixed_values(design, settings.fix), names, whole)
-    return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
-
-
-def _fitted(
-    start: Design,
-    settings: Settings,
-    held: Mapping[str, float],
-    recipe: Recipe | None,
-    records: Sequence[Record],
-) -> JointModel:
-    """The joint model as the settings ask, less its own bias."""
-    gravity = settings.gravity or start.load.gravity is not None
-    fit = fit_map if settings.friction == "map" else partial(fit_records, form=settings.friction)
-    model = fit(start, records, recipe=recipe, fixed=held, gravity=gravity)
-    parts = []
-    for part, record in zip(model.records, records, strict=True):
-        command = command_of(start, record)
-        more = {} if command is None else {command.signal: "command of the simulated drive"}
-        parts.append(replace(part, used={**more, **part.used}))
-
-    def made(model: JointModel) -> Design:
-        values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
-        return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
-
-    return without_bias(start, made, replace(model, records=tuple(parts)), records)
 
 
 def _items(

@@ -90,8 +90,8 @@ def design_values(
         with suppress(InputError):  # R and kE are not told apart
             electrical = fit_electrical(start, whole, model.asked)
             likes = [like for like in model.simulated if {"voltage", "current"} <= set(like.signals)]
-            likes = likes if len(likes) == len(whole) else []
-            electrical = without_own_bias(electrical, start, whole, likes, model.asked)
+            alike = replace(model, simulated=tuple(likes) if len(likes) == len(whole) else ())
+            electrical = without_own_bias(electrical, start, whole, alike, model.asked)
             if any(one_phase(start, record) for record in whole):  # R hangs on the voltage in between
                 del own["resistance"]
             found += [design_value(design, electrical, name, value or 0.0) for name, value in own.items()]

@@ -18,7 +18,7 @@ from analyses.estimation.least_squares import (
     told_apart,
 )
 from analyses.estimation.parameters import parameter
-from analyses.identification.joint_model import Recipe
+from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import motion_of, recipe_for
 from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
@@ -33,7 +33,7 @@ class ElectricalFit(Fit):
     """``u = R i + kE w + L di/dt + offset`` (equation 1); fixed is what the records do not show."""
 
     relative_residual: float
-    columns: tuple[str, ...]  # of the fit; an inductance that takes up a lag is not among the names
+    columns: tuple[str, ...]  # of the fit; an inductance that is not shown is not among the names
     at_once: Floats  # what a voltage that acts at once would change of the values
     bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
 
@@ -45,9 +45,9 @@ def fit_electrical(
 
     All signals pass the same filter without phase, by default that of each record's period. The recorded
     voltage is the drive's own, which acts later by the design's computing delay and half a tick; what this
-    shift does to the values is an error of theirs. The inductance is kept out where it is not five times its
-    standard error: a record sampled too slowly, or too calm, does not show it, and none is invented. A
-    current that is late by ``late_s`` (a filter, another clock) makes R times that of it.
+    shift does to the values is an error of theirs. The inductance is not told where it is not five times its
+    standard error (a record sampled too slowly, or too calm, does not show it) or what a current that is late
+    by ``late_s`` (a filter, another clock) makes of it, R times that; the others are found beside it.
     """
     control = design.controller
     shifts = control.computing_delay_s + 0.5 * control.period_s, 0.0
@@ -59,19 +59,20 @@ def fit_electrical(
     of_lag = whole["resistance"] * late_s
     if value > SHOWN * np.hypot(std, of_lag):
         return whole
-    rest = tuple(name for name in whole.names if name != "inductance")
     told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
-    if value > SHOWN * std:  # it takes up the lag, which leaves the others right
+    if value > SHOWN * std:
         told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
-        fit = whole.renamed({name: name for name in rest})
-        others = [whole.names.index(name) for name in rest]
-        again = replace(
-            whole, names=rest, values=fit.values, covariance=fit.covariance, at_once=whole.at_once[others]
-        )
-    else:
-        again = _fitted(late, early, rest)
     kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
-    return replace(again, fixed={**again.fixed, "inductance": kept})
+    rest = [name for name in whole.names if name != "inductance"]
+    fit, others = whole.renamed({name: name for name in rest}), [whole.names.index(name) for name in rest]
+    return replace(
+        whole,
+        names=fit.names,
+        values=fit.values,
+        covariance=fit.covariance,
+        at_once=whole.at_once[others],
+        fixed={**whole.fixed, "inductance": kept},
+    )
 
 
 def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ...]) -> ElectricalFit:
@@ -128,37 +129,41 @@ def without_own_bias(
     fit: ElectricalFit,
     start: Design,
     records: Sequence[Record],
-    simulated: Sequence[Record],
+    model: JointModel,
     recipe: Recipe | None = None,
 ) -> ElectricalFit:
     """The fit less what the same fit finds too much in records simulated with the motor of ``start``.
 
     Between the rows the voltage goes on in steps of the controller's tick, of which a row shows one: at a
     jump of the command it is far from the mean over its interval, and the same way each time, which no
-    residual tells. The simulated rows miss it alike (as `own_bias.without_bias` does for the motion); the
-    errors are those of what the two residuals do not share. A bias as large as half a value stays in it, and
-    in its error.
+    residual tells. The simulated rows (of the ``model`` of the motion; see `own_bias.without_bias`) miss it
+    alike; as instruments they also keep out the noise of the current. The errors are those of what the two
+    residuals do not share. A bias as large as half a value, or beside one of the motion that was not taken
+    off, stays in the value, and in its error.
     """
+    simulated = model.simulated
     if not simulated:
         return fit
     control, columns, motor = start.controller, fit.columns, start.effective_motor
     shift = control.computing_delay_s + 0.5 * control.period_s
     own, other = ([_rows(start, one, recipe, shift) for one in these] for these in (records, simulated))
+    own = [table[: len(like)] for table, like in zip(own, other, strict=True)]  # the part that is simulated
     truth = motor.resistance_ohm, motor.back_emf_constant_Vs_rad, motor.inductance_H, 0.0
     known = {name: value or 0.0 for name, value in zip(NAMES, truth, strict=True)}
-    values, again = (scaled_lstsq(*_columns(tables, columns)) for tables in (own, other))
+    z, again = _columns(other, columns)[0], scaled_lstsq(*_columns(other, columns))
+    w, u = _columns(own, columns)
+    values = scaled_lstsq(z.T @ w, z.T @ u)
     picked = [columns.index(name) for name in fit.names]
     bias = again[picked] - np.array([known[name] for name in fit.names])
-    if np.any(np.abs(bias) > LARGEST_BIAS * np.abs(fit.values) + fit.standard_errors):
+    if not model.bias or np.any(np.abs(bias) > LARGEST_BIAS * np.abs(fit.values) + fit.standard_errors):
         return replace(fit, covariance=fit.covariance + np.outer(bias, bias))
     told = []
-    for measured, model in zip(own, other, strict=True):
-        (w, rest), (_, like) = _residual(measured, columns, values), _residual(model, columns, again)
-        count = min(len(rest), len(like))  # of a long record the first part is simulated
-        told.append(events_of(w, rest[:count] - like[:count]))
+    for measured, modelled in zip(own, other, strict=True):
+        (_, rest), (z, like) = _residual(measured, columns, values), _residual(modelled, columns, again)
+        told.append(events_of(z, rest - like))
     return replace(
         fit,
-        values=fit.values - bias,
+        values=values[picked] - bias,
         covariance=covariance_of(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
         bias=dict(zip(fit.names, bias.tolist(), strict=True)),
     )

@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
-from analyses.correlation.driving import command_of
+from analyses.correlation.driving import SMOOTH, command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, events_of, information_of, scaled_lstsq
 from analyses.estimation.parameters import default_value
@@ -157,7 +157,8 @@ def _driven(design: Design, record: Record) -> Record:
     assert design.controller.position is not None  # _cannot has seen to it
     gain = design.controller.position.gain
     for _ in range(COMMAND_ROUNDS):  # learnt: the loop is about gain/(s + gain), what it lacks is added
-        driven = replace(record, signals={**record.signals, name: command / design.total_ratio})
+        signals = {**record.signals, name: command / design.total_ratio}
+        driven = replace(record, signals=signals, between=SMOOTH)
         off = wanted - place(_with_model_signals(design, driven))
         command = command + off + np.gradient(off, record.period_s) / gain
     return driven

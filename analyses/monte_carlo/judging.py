@@ -99,12 +99,7 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     values = np.stack([columns[name] for name in names])
     if QUANTITIES[requirement.quantity].absolute:
         values = np.abs(values)  # a margin counts in either direction
-    distances = np.full(values.shape, np.inf)  # of a value that is itself unlimited, too
-    with np.errstate(invalid="ignore"):
-        if requirement.minimum is not None:
-            distances = np.fmin(distances, values - requirement.minimum)
-        if requirement.maximum is not None:
-            distances = np.fmin(distances, requirement.maximum - values)
+    distances = requirement.distance(values)
     distances[np.isnan(values)] = -np.inf
     for k, name in enumerate(names):
         if (stable := columns.get(f"{name.partition('.')[0]}.stable")) is not None:

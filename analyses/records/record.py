@@ -65,6 +65,8 @@ class Record:
     ``left_out`` marks rows that no fit is to use. ``first_row`` is how many rows of the file come before the
     first, ``as_read`` the record as it was before it was put on a grid (None: it is that). ``settings`` are
     keys of a design, with their values, that were other than the design's while this record was taken.
+    ``between`` tells how the drive took its command between the rows (`driving.readings`; empty: as it meets
+    the record best).
     """
 
     name: str
@@ -82,6 +84,7 @@ class Record:
     first_row: int = field(default=0, repr=False)
     as_read: Record | None = field(default=None, repr=False)
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    between: str = ""
 
     def drive(self, design: Design) -> Design:
         """The design as it was set for this record."""

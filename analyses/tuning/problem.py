@@ -145,7 +145,7 @@ class Problem:
         out = np.empty((len(gains) * len(corners), len(self.requirements)))
         radius = np.fmax.reduce([linear.pole_radius(loop) for loop in linear.loops], initial=1.0)
         for k, requirement in enumerate(self.requirements):
-            result = judge(requirement, self.design, columns).distance / size_of(requirement)
+            result = judge(requirement, self.design, columns).distance / requirement.size
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * (radius - 1.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
 
@@ -164,18 +164,6 @@ class Problem:
         self.evaluations += count * many
         population = Population(self.design, values, count * many)
         return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
-
-
-def limit_of(requirement: Requirement) -> float:
-    """The limit that a requirement states (the lower one where it has both)."""
-    limit = requirement.minimum if requirement.minimum is not None else requirement.maximum
-    assert limit is not None
-    return limit
-
-
-def size_of(requirement: Requirement) -> float:
-    """What a distance is measured against: the limit itself, or the usual size of such a figure."""
-    return abs(limit_of(requirement)) or QUANTITIES[requirement.quantity].size
 
 
 def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:

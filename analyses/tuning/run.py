@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
-from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
@@ -17,15 +17,7 @@ from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import (
-    MOST_DESIGNS,
-    Problem,
-    asked_for,
-    limit_of,
-    loop_requirements,
-    problem_of,
-    size_of,
-)
+from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, loop_requirements, problem_of
 from analyses.tuning.result import (
     BindingRequirement,
     GainSetting,
@@ -151,8 +143,8 @@ def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple
     made = []
     for requirement, distances in zip(problem.requirements, result.T, strict=True):
         worst = int(np.argmin(distances))
-        relative, limit = float(distances[worst]), limit_of(requirement)
-        distance = relative * size_of(requirement) if -3.0 < relative < np.inf else None
+        relative, limit = float(distances[worst]), requirement.bound
+        distance = relative * requirement.size if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
         value = None if distance is None else limit + way * distance
         corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
@@ -169,11 +161,9 @@ def _settings(
     there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
         known, step = object_of(problem.design, path), step_of_gain(problem.design, path)
-        field = field_of(path)
-        assert field is not None
         yield GainSetting(
             path=path,
-            unit=field.unit(structure),
+            unit=FIELDS[template_of(path)].unit(structure),
             before=parameter_value(before, path) if path in there else None,
             by_rule=rules.values.get(path),
             tuned=exact,

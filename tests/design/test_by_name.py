@@ -50,7 +50,7 @@ from analyses.friction_effects import friction_effects
 from analyses.monte_carlo import monte_carlo
 from analyses.specification import specification
 from analyses.stiffness import stiffness
-from nonlinear import Drive, State, commands, simulate
+from nonlinear import Drive, commands, simulate
 from reports import report
 from tests.refusals import refused
 
@@ -121,25 +121,15 @@ BAD = {
     "a measured speed": lambda: Drive(DESIGN).control(0.0, 0.0, float("nan"), 0.0),
     "a bus voltage": lambda: Drive(DESIGN).control(0.0, 0.0, 0.0, 0.0, bus_V=float("nan")),
     "a state of nothing": lambda: Drive(DESIGN).set(np.nan * Drive(DESIGN).get()),
-    "a step's unit": lambda: commands.step("5 kg"),
-    "frequencies": lambda: commands.multisine(0.1, "abc", 1.0, 1e-4),
-    "times": lambda: commands.sampled("ab", 3.0),
     "record": lambda: commands.recorded(3),
-    "stop": lambda: commands.ramp(1.0, stop_s="x"),
     "command": lambda: simulate(DESIGN, lambda t: 0.1, 0.1),
-    "duration": lambda: simulate(DESIGN, commands.step(0.01), "0.1 s"),
-    "no duration": lambda: simulate(DESIGN, commands.step(0.01), float("nan")),
     "load text": lambda: simulate(DESIGN, commands.step(0.01), 0.1, "x"),
     "load function": lambda: simulate(DESIGN, commands.step(0.01), 0.1, lambda t: 1.0),
     "start": lambda: simulate(DESIGN, commands.step(0.01), 0.1, initial={"motor_angle_rad": 0.1}),
-    "start value": lambda: simulate(DESIGN, commands.step(0.01), 0.1, initial=State(voltage_V="12 V")),
     "bias": lambda: simulate(DESIGN, commands.step(0.01), 0.1, bias=0.1),
     "supply": lambda: simulate(DESIGN, commands.step(0.01), 0.1, supply=24.0),
-    "disturbance": lambda: simulate(DESIGN, commands.step(0.01), 0.1, disturbance_Nm="x"),
-    "probes": lambda: simulate(DESIGN, commands.step(0.01), 0.1, probes=["u"]),
     "rows": lambda: simulate(DESIGN, commands.step(0.01), 0.1, record_every=1.5),
     "events": lambda: simulate(DESIGN, commands.step(0.01), 0.1, max_events=None),
-    "tolerance": lambda: simulate(DESIGN, commands.step(0.01), 0.1, tanh_tolerance="x"),
     "limiter": lambda: simulate(DESIGN, commands.step(0.01), 0.001).limit_active("brake"),
     "drive": lambda: Drive(3),
     "tune": lambda: tune(3),

@@ -310,7 +310,6 @@ def test_a_lead_may_be_per_revolution_and_a_wrong_one_is_one_mistake() -> None:
     [
         ('axis = "linear"', 'axis = "rotary"', "axis"),
         ('"3 kg*cm^2"', '"3 N"', "rotor_inertia"),
-        ('lead = "10 mm"', 'lead = "10 rad"', "screw.lead"),
         ('[screw]\nlead = "10 mm"', "", "J as the mass"),
     ],
 )

@@ -5,6 +5,7 @@ import shutil
 from collections import Counter
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from actuator_lti.design import design_hash, load_design
@@ -107,22 +108,11 @@ def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(arguments, reason,
     assert reason in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        (("identify",), "Missing argument 'FILE...'"),
-        (("identify", "nowhere.toml"), "nowhere.toml: cannot be read: no such file"),
-        (("identify", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (("correlate", "emps", "nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (("correlate", "no-such-design", "nowhere.csv"), "no such design"),
-        (("identify", "r.csv", "--design", "emps", "--cutoff", "0"), "0 Hz: must be between 0 and 50 Hz"),
-    ],
-)
-def test_bad_input_is_one_line_and_status_2(arguments, reason, tmp_path, monkeypatch, cli) -> None:
-    monkeypatch.chdir(tmp_path)
-    rows = "".join(f"{k / 100},{k % 7},{k % 5}\n" for k in range(99))
-    Path("r.csv").write_text(f"time_s,position_m,force_N\n{rows}")
-    assert reason in cli.refused(*arguments)
+def test_a_cutoff_of_nothing_is_one_line_and_status_2(tmp_path, cli) -> None:
+    time = np.arange(99) / 100
+    record = write(tmp_path / "r.csv", {"time_s": time, "position_m": time % 0.07, "force_N": time % 0.05})
+    said = cli.refused("identify", record, "--design", "emps", "--cutoff", "0")
+    assert "0 Hz: must be between 0 and 50 Hz" in said
 
 
 def test_terminal_page_json_and_status_say_not_proven_alike(tmp_path, cli) -> None:

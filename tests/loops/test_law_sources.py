@@ -83,12 +83,6 @@ def test_what_is_not_real_is_refused_by_its_name(name: str, made: Any, tmp_path:
         assert said.endswith(f'law.file = "k.mat": {name}: must be real; allowed: finite real numbers'), said
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_what_is_not_finite_is_told_so(value: float) -> None:
-    said = refused(BASE.with_law, "velocity", ([[value]], [[1]], [[1]], [[0]], T), ["error"])
-    assert said == "A: must be finite; allowed: finite real numbers"
-
-
 EVERY = {"value": 8, "source": "data sheet", "grade": "C"}
 
 
@@ -153,7 +147,6 @@ def test_what_a_file_leaves_open_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "system",
     [
-        (np.array([[0.5j]]), [[1]], [[1]], [[0]], T),
         scipy.signal.StateSpace([[0.5j]], [[1]], [[1]], [[0]], dt=T),
         scipy.signal.ZerosPolesGain([0.2j], [0.5], 1.0, dt=T),
         scipy.signal.TransferFunction([1 + 1j], [1, 0.5], dt=T),

@@ -50,15 +50,7 @@ def test_nobody_waits_for_a_library_that_is_not_used(code: str) -> None:
 
 
 def test_a_report_with_validation_waits_for_no_library_that_it_does_not_use() -> None:
-    code = (
-        "from actuator_lti import load_design;"
-        "from analyses.validation import Settings, validate;"
-        "from reports.build import design_report;"
-        "from reports.html import page; from reports.sections.validation import section;"
-        "design = load_design('ilr33-amber');"
-        "page(design_report(design, section(validate(design, Settings(map_counts=(6, 8))))))"
-    )
-    assert not loaded(code) & PLOTTING
+    assert not loaded("from reports import html, report; html.page(report('ilr33-amber'))") & PLOTTING
 
 
 def test_margins_in_json_and_nothing_else(cli) -> None:
@@ -122,6 +114,11 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("compare emps --workers 2", "--workers 2: computes variants, and emps has none"),
         ("identify emps --set nothing", "allowed: KEY=VALUE"),
         ("correlate emps none.csv --set limits.voltage", "allowed: KEY=VALUE"),
+        ("identify", "Missing argument 'FILE...'"),
+        ("identify nowhere.toml", "nowhere.toml: cannot be read: no such file"),
+        ("identify nowhere.csv", "nowhere.csv: cannot be read: no such file"),
+        ("correlate emps nowhere.csv", "nowhere.csv: cannot be read: no such file"),
+        ("correlate no-such-design nowhere.csv", "no such design"),
         ("keys odrive", "objects import"),
         ("margins ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),
         ("report ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),

@@ -114,11 +114,11 @@ def test_report_in_python_is_the_command(tmp_path, monkeypatch) -> None:
     made = reports.report("ctms-motor-position", tmp_path / "python", validation=False, also=["duty"])
     for name in ("report.html", "report.json"):
         assert (tmp_path / "python" / name).read_bytes() == (tmp_path / "command" / name).read_bytes()
-    assert reports.report("ctms-motor-position", validation=False, also=["duty"]) == made
     mine = doc.section("mine", "Mine", [doc.text("of a record")])
     parts = reports.report("ctms-motor-position", validation=False, also=["duty"], added=[mine])["sections"]
     order = [part["id"] for part in parts]
     assert order.index("mine") < order.index("duty")  # as the command puts what it includes
+    assert [part for part in parts if part["id"] != "mine"] == made["sections"]  # without a folder, too
     refused(reports.report, "ctms-motor-position", also=["all"], words="also = 'all'")
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     refused(build_time, words="SOURCE_DATE_EPOCH")
@@ -171,12 +171,15 @@ def test_names_from_a_design_file_stay_text() -> None:
 
 
 @pytest.mark.parametrize("on_page", [True, False])
-def test_names_in_a_figure_stay_text(on_page: bool) -> None:
+def test_names_in_a_figure_stay_text_and_a_label_of_two_panels_is_said_once(on_page: bool) -> None:
     chart = Chart(title=HOSTILE, legend=True, legend_title=HOSTILE, loop=HOSTILE)
     panel = chart.panel(title=HOSTILE)
+    for one in (panel, chart.panel()):
+        one.curve([1, 2], [1, 2], "shared & <same>", marker="o")
     panel.curve([1, 2], [1, None], HOSTILE)
-    panel.bar(0.0, 0.0, 10.0, HOSTILE)
-    panel.rule_y(1.0, HOSTILE)
+    panel.bar(0.0, 0.0, 10.0, HOSTILE, hatch="//")
+    panel.rule_y(1.0, HOSTILE, colour="c5", dash=1)
+    panel.band_x(1.0, 1.2, HOSTILE)
     panel.note(HOSTILE, corner="top left")
     panel.x.label, panel.y.ticks = HOSTILE, [(1.0, HOSTILE)]
     block = doc.figure("curves", chart, caption="c", alt=HOSTILE)
@@ -184,6 +187,7 @@ def test_names_in_a_figure_stay_text(on_page: bool) -> None:
     assert "<script" not in svg
     words = ["".join(node.itertext()) for node in ElementTree.fromstring(svg).iter()]
     assert words.count(SEEN) >= 6
+    assert words.count("shared & <same>") == 1  # in the legend, of both panels
     assert ("var(--" in svg) is on_page
 
 

@@ -18,6 +18,7 @@ from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
 from reports.sections.monte_carlo import brief, section
+from tests.reports.live_page import opened
 
 
 @pytest.fixture(scope="module")
@@ -250,13 +251,9 @@ def test_pages_of_studies_stand_alone_and_show_every_figure(cli, browser, name, 
     assert ran.status in (0, 1), ran.err
     file = tmp_path / f"{name}.html"
     for size in ({"width": 1360, "height": 900}, {"width": 390, "height": 844}):
-        page = browser.new_context(offline=True, viewport=size).new_page()
         trouble = []
-        page.on("console", lambda message, seen=trouble: seen.append(message.text))
-        page.on("pageerror", lambda error, seen=trouble: seen.append(str(error)))
-        page.on("request", lambda request, seen=trouble: seen.append(request.url))
-        page.goto(file.as_uri())
-        assert trouble == [file.as_uri()]
+        page = opened(browser, file, trouble, live=False, viewport=size)
+        assert trouble == []
         assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
         drawn = page.locator("figure svg.plot")
         assert drawn.count() == file.read_text(encoding="utf-8").count('<svg class="plot"') > 0

@@ -1,0 +1,186 @@
+"""The motor by its voltage, the motion by its current, in turn; and how the drive took its command."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from scipy.stats import wilcoxon
+
+from actuator_lti.design.model import Design
+from actuator_lti.types import Floats
+from analyses.correlation.closed_loop import AXIS_SIGNALS
+from analyses.correlation.driving import SMOOTH, command_of, readings
+from analyses.estimation.fit import Fit
+from analyses.identification import to_design
+from analyses.identification.asked import Settings, fixed_values, held_by_name
+from analyses.identification.diagnosis import Diagnosed, diagnosed
+from analyses.identification.electrical import (
+    ElectricalFit,
+    electrical_values,
+    fit_electrical,
+    without_own_bias,
+)
+from analyses.identification.friction_map import fit_map
+from analyses.identification.inverse import fit_records
+from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
+from analyses.identification.own_bias import without_bias
+from analyses.records.record import Record
+
+ROUNDS = 4
+SETTLED = 0.1  # standard errors by which the motor may still move
+
+
+@dataclass(frozen=True, kw_only=True)
+class Found:
+    """The design with what the voltage told of its motor, that fit where it was asked for, and the motion."""
+
+    start: Design
+    electrical: ElectricalFit | None
+    right: Diagnosed
+
+
+def motor_and_motion(
+    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
+) -> Found:
+    """What the records tell, in each way in which the drive may have taken its commands between the rows.
+
+    The own bias of the fits hangs on it, and where it is taken off the wrong way, that way meets the records
+    better than the right one does: so each is followed to its end, and what then meets the records best is
+    taken. In the covariances every other counts by the probability that it is nearer.
+    """
+    commands = [(command_of(plain, record), record) for record in records]
+    ways = {one.between: None for own, record in commands if own for one in readings(own, record)}
+    tried = []
+    for way in ways or [SMOOTH]:
+        tried.append(_found(design, plain, [replace(one, between=way) for one in records], settings, recipe))
+        if not tried[0].right.model.simulated:  # no bias is taken off
+            return tried[0]
+    misses = _misses(plain, tried)
+    best = int(np.argmin(np.sum(misses, axis=1)))
+    taken = tried[best]
+    for other, more in zip(tried, misses - misses[best], strict=True):
+        if np.any(more):  # by ranks (Wilcoxon 1945), as one event may outweigh all other blocks
+            taken = _widened(plain, taken, other, float(wilcoxon(more, alternative="greater").pvalue))
+    return taken
+
+
+def _misses(design: Design, tried: Sequence[Found]) -> Floats:
+    """What the simulated records miss the signals by, shape (ways, blocks): the less, the likelier.
+
+    Half the squares over the mean square of the way that meets a signal best, summed over the signals and
+    over root n blocks of root n rows each.
+    """
+    sums = []
+    pairs = [zip(one.right.records, one.right.model.simulated, strict=False) for one in tried]
+    for ways in zip(*pairs, strict=False):
+        names = [name for name in AXIS_SIGNALS[design.axis] if name in ways[0][0].signals]
+        off = np.array([[own[name][: len(like)] - like[name] for name in names] for own, like in ways])
+        size = np.min(np.mean(off**2, axis=2), axis=0)
+        rows = np.sum(0.5 * off**2 / np.maximum(size, 1e-300)[:, None], axis=1)
+        blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
+        sums.append(np.transpose([np.sum(block, axis=1) for block in blocks]))
+    return np.concatenate(sums, axis=1)
+
+
+def _widened(plain: Design, taken: Found, other: Found, share: float) -> Found:
+    """What was taken, with another's difference in its covariances at the probability that it is right."""
+
+    def wider(fit: Fit, than: Fit) -> Floats:
+        moved = np.array([than[name] - fit[name] if name in than.names else 0.0 for name in fit.names])
+        return np.asarray(fit.covariance + share * np.outer(moved, moved))
+
+    model = taken.right.model
+    right = replace(taken.right, model=replace(model, covariance=wider(model, other.right.model)))
+    start, motor = taken.start, taken.electrical
+    if motor is not None and other.electrical is not None:
+        motor = replace(motor, covariance=wider(motor, other.electrical))
+        start = _with_motor(plain, motor, right.records)
+    return Found(start=start, electrical=motor, right=right)
+
+
+def _found(
+    design: Design, plain: Design, records: Sequence[Record], settings: Settings, recipe: Recipe | None
+) -> Found:
+    """The motor and the motion in turn.
+
+    The motion needs kM; the motor is found less its own bias on records that are simulated with both.
+    """
+
+    def moved(start: Design) -> Diagnosed:
+        fit = partial(_fitted, start, settings, held_values(design, start, settings), recipe)
+        return diagnosed(design, start, records, fit, recipe)
+
+    if not settings.electrical:
+        return Found(start=plain, electrical=None, right=moved(plain))
+    start, found = by_voltage(plain, records, recipe)
+    for _ in range(ROUNDS):
+        before, right = found, moved(start)
+        start, found = by_voltage(plain, records, recipe, (start, right))
+        off = [abs(found[n] - before[n]) - SETTLED * found.std(n) for n in found.names if n in before.names]
+        if found.names == before.names and max(off) < 0.0:
+            break
+    return Found(start=start, electrical=found, right=right)
+
+
+def by_voltage(
+    plain: Design,
+    records: Sequence[Record],
+    recipe: Recipe | None,
+    simulated: tuple[Design, Diagnosed] | None = None,
+) -> tuple[Design, ElectricalFit]:
+    """The design with what the voltage equation tells of its motor, and that fit.
+
+    Less its own bias where the records were simulated, with the motor of the design given beside them.
+    """
+    if simulated is None:
+        found = fit_electrical(plain, records, recipe)
+    else:
+        start, right = simulated
+        found = fit_electrical(plain, records, recipe, right.late_s)
+        found = without_own_bias(found, start, records, right.model, recipe)
+    return _with_motor(plain, found, records), found
+
+
+def _with_motor(plain: Design, found: ElectricalFit, records: Sequence[Record]) -> Design:
+    told = f"voltage equation of {names_of(records)}"
+    return to_design.design_with_fit(plain, electrical_values(plain, found), told)
+
+
+def names_of(records: Sequence[Record]) -> str:
+    """The names of records, in a list."""
+    return ", ".join(record.name for record in records)
+
+
+def held_values(design: Design, start: Design, settings: Settings) -> dict[str, float]:
+    """What is held, by the names of the model; a fixed rotor or load inertia fixes the whole."""
+    form: FrictionForm = "symmetric" if settings.friction == "map" else settings.friction
+    names = (*NAMES[form], "load_coefficient")
+    whole = dict.fromkeys(to_design.INERTIAS, "inertia")
+    held = held_by_name(fixed_values(design, settings.fix), names, whole)
+    return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
+
+
+def _fitted(
+    start: Design,
+    settings: Settings,
+    held: Mapping[str, float],
+    recipe: Recipe | None,
+    records: Sequence[Record],
+) -> JointModel:
+    """The joint model as the settings ask, less its own bias."""
+    gravity = settings.gravity or start.load.gravity is not None
+    fit = fit_map if settings.friction == "map" else partial(fit_records, form=settings.friction)
+    model = fit(start, records, recipe=recipe, fixed=held, gravity=gravity)
+    parts = []
+    for part, record in zip(model.records, records, strict=True):
+        command = command_of(start, record)
+        told = "command of the simulated drive" + f", {record.between}" * (record.between != SMOOTH)
+        more = {} if command is None else {command.signal: told}
+        parts.append(replace(part, used={**more, **part.used}))
+
+    def made(model: JointModel) -> Design:
+        values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
+        return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
+
+    return without_bias(start, made, replace(model, records=tuple(parts)), records)
