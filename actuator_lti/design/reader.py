@@ -310,7 +310,8 @@ class Reader:
     def number(self, field: Field, raw: Any, path: str) -> Any:
         """A number in SI."""
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
-            return self.refuse(path, raw, f"allowed: a number with its unit, as text{_example(field)}")
+            what = "a whole number" if field.kind == "integer" else "a number with its unit, as text"
+            return self.refuse(path, raw, f"allowed: {what}{_example(field)}")
         try:
             value = self.frame.quantity(raw, field)
         except InputError as error:

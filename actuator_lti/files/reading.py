@@ -47,7 +47,7 @@ _CONTROL_OF_KEYS = ("Cc", "Cf", "Cs")
 def shown(value: object, longest: int = 60) -> str:
     """A value as it may be printed: short, one line, no control characters."""
     if isinstance(value, dict | list):
-        return "a table" if isinstance(value, dict) else "a list"
+        return f"a{'' if value else 'n empty'} {'table' if isinstance(value, dict) else 'list'}"
     text = value if isinstance(value, str) else _written(value)
     text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[: longest + 1])
     text = text if len(text) <= longest else text[: longest - 3] + "..."
