@@ -31,17 +31,14 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 
 @dataclass
 class Problem:
-    """Requirements on the loops of a design, over the corners of its tolerances.
-
-    ``most`` designs may be looked at by a search, ``evaluations`` were so far. ``elements`` were added.
-    """
+    """Requirements on the loops of a design, over the corners of its tolerances."""
 
     design: Design
     requirements: tuple[Requirement, ...]
     variables: tuple[Variable, ...]
-    elements: tuple[Element, ...] = ()
-    most: int = MOST_DESIGNS
-    evaluations: int = 0
+    elements: tuple[Element, ...] = ()  # that were added
+    most: int = MOST_DESIGNS  # designs that a search may look at
+    evaluations: int = 0  # that were looked at so far
     # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
     # element neutral ones), and ends of what may be set
     paths: tuple[str, ...] = field(init=False)

@@ -67,19 +67,15 @@ class TradeOffPoint:
 
 @dataclass(frozen=True)
 class NonlinearCheck:
-    """A step of the tuned design in the nonlinear model, with every limit and friction.
-
-    ``settling_time_s`` is None where it does not stay within 2 % of the commanded angle; friction may leave
-    an error that no gain removes. ``limited`` names the limiters that acted, with their share of the time.
-    """
+    """A step of the tuned design in the nonlinear model, with every limit and friction."""
 
     corner: str
     amplitude_rad: float
     rise_time_s: float | None
     overshoot_percent: float
-    settling_time_s: float | None
-    final_error_percent: float
-    limited: str
+    settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
+    final_error_percent: float  # friction may leave one that no gain removes
+    limited: str  # the limiters that acted, with their share of the time
 
 
 @dataclass(frozen=True)
