@@ -17,6 +17,7 @@ from analyses.failures import failures
 from analyses.large_signal.tones import linear_steady_state, run_tones, tone
 from analyses.limit_cycles import limit_cycles
 from analyses.motion.settling import ending_of
+from analyses.specification.requirements import NOT_STATED
 
 
 def said_of(design: Design, frequency_hz: float | None) -> str:
@@ -63,22 +64,6 @@ class AskedFigures:
     corners = cached_property(lambda self: corners(self.design))
 
     @property
-    def hard_over_time_s(self) -> float:
-        """From the hard-over of the power stage to the stop; inf where it is not reached while watched."""
-        reached = self.failures.case("hard-over").to_stop_s
-        return inf if reached is None else reached
-
-    @property
-    def failure_deflection_rad(self) -> float:
-        """Largest deflection until detection over all failures."""
-        return max(case.at_detection_rad for case in self.failures.cases)
-
-    @property
-    def failure_moment_Nm(self) -> float:
-        """Largest moment in the train over all failures."""
-        return max(case.peak_moment_Nm for case in self.failures.cases)
-
-    @property
     def limit_cycle_rad(self) -> float | None:
         """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
         swing = self.cycles.hunting
@@ -102,7 +87,7 @@ class AskedFigures:
             value = quantity.read(self, self.design.axis)
         except InputError as error:
             return None, error.message
-        said = "" if value is not None else "the design does not state what this needs"
+        said = "" if value is not None else NOT_STATED
         if name == "limit_cycle":  # after which step that is
             said = "" if self.cycles.hunting is None else ending_of(self.design, self.cycles.hunting)
         return value, said

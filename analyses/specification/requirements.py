@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
 from math import inf
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
@@ -115,6 +116,21 @@ def judged(
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
     waiver = design.waiver_of
     return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+
+
+NOT_STATED = "the design does not state what this needs"
+
+
+def judged_by(design: Design, analysis: str, result: object) -> tuple[RequirementVerdict, ...]:
+    """Judge the requirements on what one analysis finds, ``failures`` or ``duty``, by its result."""
+
+    def found(name: str) -> tuple[float | None, str]:
+        value = QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis)
+        return value, NOT_STATED * (value is None)
+
+    own = {name for name, one in QUANTITIES.items() if one.reader.startswith(f"{analysis}.")}
+    asked = (one for one in design.requirements if one.quantity in own)
+    return tuple(verdict for one in asked for verdict in judged(design, one, {}, found))
 
 
 def _judge_loop(
