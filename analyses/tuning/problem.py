@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of
@@ -22,14 +22,7 @@ from analyses.monte_carlo.judging import in_populations, judge, loop_columns, lo
 from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
-GAINS = (
-    "control.current.gain",
-    "control.current.integral_time",
-    "control.velocity.gain",
-    "control.velocity.integral_time",
-    "control.position.gain",
-    "control.position.integral_time",
-)
+GAINS = tuple(f"control.{loop}.{key}" for loop in LOOPS for key in ("gain", "integral_time"))
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
 PLENTY = 10.0  # relative distance beyond which the search does not look
@@ -38,17 +31,14 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 
 @dataclass
 class Problem:
-    """Requirements on the loops of a design, over the corners of its tolerances.
-
-    ``most`` designs may be looked at by a search, ``evaluations`` were so far. ``elements`` were added.
-    """
+    """Requirements on the loops of a design, over the corners of its tolerances."""
 
     design: Design
     requirements: tuple[Requirement, ...]
     variables: tuple[Variable, ...]
-    elements: tuple[Element, ...] = ()
-    most: int = MOST_DESIGNS
-    evaluations: int = 0
+    elements: tuple[Element, ...] = ()  # that were added
+    most: int = MOST_DESIGNS  # designs that a search may look at
+    evaluations: int = 0  # that were looked at so far
     # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
     # element neutral ones), and ends of what may be set
     paths: tuple[str, ...] = field(init=False)
@@ -145,7 +135,7 @@ class Problem:
         out = np.empty((len(gains) * len(corners), len(self.requirements)))
         radius = np.fmax.reduce([linear.pole_radius(loop) for loop in linear.loops], initial=1.0)
         for k, requirement in enumerate(self.requirements):
-            result = judge(requirement, self.design, columns).distance / size_of(requirement)
+            result = judge(requirement, self.design, columns).distance / requirement.size
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * (radius - 1.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
 
@@ -164,18 +154,6 @@ class Problem:
         self.evaluations += count * many
         population = Population(self.design, values, count * many)
         return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
-
-
-def limit_of(requirement: Requirement) -> float:
-    """The limit that a requirement states (the lower one where it has both)."""
-    limit = requirement.minimum if requirement.minimum is not None else requirement.maximum
-    assert limit is not None
-    return limit
-
-
-def size_of(requirement: Requirement) -> float:
-    """What a distance is measured against: the limit itself, or the usual size of such a figure."""
-    return abs(limit_of(requirement)) or QUANTITIES[requirement.quantity].size
 
 
 def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:

@@ -105,7 +105,7 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
         if comparison.base.figures.get(key) is not None:
-            result[key] = r.minimum if r.minimum is not None else r.maximum
+            result[key] = r.bound
     if not result:
         margins = ("gain_margin", "phase_margin", "bandwidth")
         result = {f"{loop}.{q}": None for loop in comparison.base.loops for q in margins}

@@ -112,8 +112,7 @@ def gains(result: TuningResult) -> doc.Block:
 
 def confirmed(result: TuningResult) -> doc.Block:
     def limit(v: RequirementVerdict) -> float | None:
-        of = v.requirement
-        return in_shown(of.minimum if of.minimum is not None else of.maximum, of.unit)
+        return in_shown(v.requirement.bound, v.requirement.unit)
 
     columns = [
         doc.of("id", "label", "Requirement"),
