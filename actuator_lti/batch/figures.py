@@ -14,7 +14,7 @@ from actuator_lti.batch.parameters import Population
 from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
-from actuator_lti.loops.periodic import fundamental
+from actuator_lti.loops.periodic import fundamental, shown
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
@@ -24,16 +24,12 @@ _MOST_ORDER = 80
 
 @dataclass(frozen=True)
 class Crossovers:
-    """Crossovers of one loop of many designs, in order of frequency; NaN past the last one.
+    """Crossovers of one loop of many designs, in order of frequency; NaN past the last one."""
 
-    ``frequency_rad_s``, ``margin``, shape (count, 6): margin in deg (gain crossovers) or as ratio (phase
-    crossovers).
-    ``crossings``, shape (count,): how many there are; where it is more than 6 the rest is not listed.
-    """
-
+    # Shape (count, 6)
     frequency_rad_s: np.ndarray
-    margin: np.ndarray
-    crossings: np.ndarray
+    margin: np.ndarray  # in deg (gain crossovers) or as ratio (phase crossovers)
+    crossings: np.ndarray  # shape (count,): how many there are; past 6 they are not listed
 
 
 @dataclass(frozen=True)
@@ -45,17 +41,13 @@ class LinearFigures:
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
     are NaN, its delay margin is 0.
     Closed-loop figures of the position loop are from command to output, feed-forward included.
-
-    ``loops``: the loops that the structure has.
-    ``raw``, shape (count, 3, columns): what the compiled code wrote (see ``_figures``); angles are radians
-    per sample.
-    ``period_s``, shape (count, 3): sampling period of each loop.
     """
 
-    loops: tuple[str, ...]
+    loops: tuple[str, ...]  # that the structure has
     count: int
+    # Shape (count, 3, columns): what the compiled code wrote (`_figures`); angles are radians per sample
     raw: np.ndarray
-    period_s: np.ndarray
+    period_s: np.ndarray  # shape (count, 3): sampling period of each loop
 
     def stable(self, loop: str) -> np.ndarray:
         """Whether the closed loop is stable, bool, shape (count,)."""
@@ -205,8 +197,11 @@ def _fill(
         rows = np.full((len(chosen), out.shape[2]), np.nan)
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
-        loop = fundamental(stage_blocks(wired, stage))
-        _figures_of(loop, lead, time_figures and response is None, rows)
+        blocks = stage_blocks(wired, stage)
+        _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE])) if len(blocks) > 1 else ():
+            alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
+            _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:
             of_loop = rows[:, [fig.STABLE, fig.RADIUS]]
             _figures_of(response, np.nan, time_figures, rows)

@@ -209,6 +209,11 @@ class Block:
     D: np.ndarray
     states: tuple[str, ...]
 
+    def of(self, k: int) -> Block:
+        """That of one of the stacked designs."""
+        A, B, C, D = (part[k] if part.ndim > 2 else part for part in (self.A, self.B, self.C, self.D))
+        return replace(self, A=A, B=B, C=C, D=D)
+
     def pruned(self) -> Block:
         """Without the states that are not used, see `pruned`."""
         return pruned([self])[0]

@@ -11,6 +11,7 @@ from loop_designs import controlled, sprung
 from mpmath import lu_solve, matrix, mp
 
 from actuator_lti import closed_loop_bandwidth, load_design, stability_margins, step_figures
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import model
 from actuator_lti.drive.operating import Operating
 from actuator_lti.drive.wiring import wire
@@ -147,6 +148,10 @@ def test_a_mode_at_rest_that_moves_from_tick_to_tick_is_taken_out(every: int) ->
     m = stability_margins(loop.open_loop)
     assert m.stable is True
     assert m.evidence in ("checked", "certified")
+    gain = drive.controller.current.gain_V_A
+    many = linear_figures(Population(drive, {"control.current.gain": np.array([1.2, 1.0]) * gain}, 2))
+    assert many.stable("current").all()
+    assert many.quantity("phase_margin", "current")[1] == pytest.approx(m.phase_margin_deg, rel=1e-9)
     whole = cyclic([b.feedback() for b in blocks])
     open_again = replace(whole, A=whole.A + whole.B @ whole.C)
     for x in np.exp(1j * np.array([1e-3, 0.1, 3.0])):
