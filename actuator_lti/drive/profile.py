@@ -16,13 +16,10 @@ RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
 
 @dataclass(frozen=True)
 class CommandMean:
-    """Mean over the last samples of the command.
-
-    ``period_s``: of the position loop.
-    """
+    """Mean over the last samples of the command."""
 
     samples: int
-    period_s: float
+    period_s: float  # of the position loop
 
     @property
     def delay_s(self) -> float:
