@@ -51,8 +51,7 @@ class Asked:
                 raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
         near, stop, seen, end = self.deflection_rad, self.stop_rad, self.detection_s, self.watched_s
         if near > stop:
-            both = f"deflection {near:g} rad: must not be beyond the stop, {stop:g} rad"
-            raise InputError(f"{both} (on a linear axis m)")
+            raise InputError(f"deflection: must not be beyond the stop, it is {near / stop:.4g} times that")
         if seen > end:
             raise InputError(f"detection {seen:g} s: must not be after {end:g} s, the end")
         if not isfinite(self.load_Nm):

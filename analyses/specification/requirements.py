@@ -17,6 +17,7 @@ from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.design.suspicions import beyond_profile
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
@@ -53,8 +54,11 @@ def evaluate_requirements(
 
 
 def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
-    """Beside a bandwidth to the command what rate and acceleration of the command make of it."""
-    of, limits = verdict.requirement, (design.command.rate_rad_s, design.command.acceleration_rad_s2)
+    """Beside a bandwidth, a rate or an acceleration what the profile of the command makes of it."""
+    of, value = verdict.requirement, verdict.value
+    if value is not None and (profile := beyond_profile(design, of, value)):
+        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, profile))))
+    limits = (design.command.rate_rad_s, design.command.acceleration_rad_s2)
     if (of.quantity, verdict.loop) != ("bandwidth", "position") or of.to == "reference" or min(limits) == inf:
         return verdict
     from analyses.specification.asked_figures import said_of
