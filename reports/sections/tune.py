@@ -42,6 +42,8 @@ def write(result: TuningResult, folder: Path | None) -> list[str]:
 def summary(result: TuningResult) -> str:
     """What was found of what is searched for, and which of the other requirements are not met."""
     told = [_searched(result)]
+    if result.others and all(one.verdict is Verdict.MET for one in result.others):
+        told.append("The tuned design meets every other requirement.")
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         open_ones = (one for one in result.others if one.verdict == word and not one.passes)
         names = "; ".join(label(one, load_unit(result.before)) for one in open_ones)
