@@ -86,7 +86,7 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
     actuator_lti.errors.InputError: load_Nm = '4 N*m': must be a finite number, in SI
     """
     try:
-        number = float("nan" if isinstance(value, str | bytes) else value)
+        number = float("nan" if isinstance(value, str | bytes | bool) else value)
     except (TypeError, ValueError, OverflowError):
         number = float("nan")
     if not isfinite(number):

@@ -1,11 +1,12 @@
 """The drive one tick at a time, and its controller alone, for rigs, tests and hardware in the loop."""
 
+from contextlib import suppress
 from math import isfinite
 
 import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
-from actuator_lti.errors import InputError, NumericalError, finite_number
+from actuator_lti.errors import InputError, NumericalError, finite_number, shown
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.commands import numbers_of
@@ -20,12 +21,13 @@ NOTED_NAMES = {"output_angle": at.IO_OUTPUT, "twist": at.IO_TWIST, "coupling_tor
 """What a tick notes of its start, by name; twist and coupling torque are those of an elastic drive."""
 
 
-def _all_finite(command: float, load_Nm: float, torque_Nm: float) -> bool:
-    """Whether each is a finite real number, asked in every tick: as cheaply as can be."""
-    try:
-        return isfinite(command) and isfinite(load_Nm) and isfinite(torque_Nm)
-    except (TypeError, ValueError, OverflowError):
-        return False
+def _check(**given: float) -> None:
+    """Refuse what is no finite real number, asked in every tick: as cheaply as can be."""
+    with suppress(TypeError, ValueError, OverflowError):
+        if all(map(isfinite, given.values())):
+            return
+    for name, value in given.items():
+        finite_number(name, value)
 
 
 class Drive:
@@ -65,6 +67,9 @@ class Drive:
         self._p, self._s = parameters(row)
         self._io = np.zeros(at.IO_SIZE)
 
+    def __repr__(self) -> str:
+        return f"<Drive {self.design.name}: tick {self.value('tick'):.0f}>"
+
     def step(self, command: float, load_Nm: float = 0.0, torque_Nm: float = 0.0) -> None:
         """One tick of controller and plant.
 
@@ -74,9 +79,7 @@ class Drive:
         Raises `InputError`: for a command, load or torque that is no finite number. Raises `NumericalError`:
         if the drive has failed: too many events in a tick, or a state without bound.
         """
-        if not _all_finite(command, load_Nm, torque_Nm):
-            for name, value in (("command", command), ("load_Nm", load_Nm), ("torque_Nm", torque_Nm)):
-                finite_number(name, value)
+        _check(command=command, load_Nm=load_Nm, torque_Nm=torque_Nm)
         self._io[at.IN_COMMAND] = command
         if load_Nm or torque_Nm or self._p[at.RARE_LOAD]:
             self._p[at.RARE_LOAD] = 1.0
@@ -99,15 +102,20 @@ class Drive:
 
         ``output_angle_rad`` and ``output_speed_rad_s`` are needed where the output's sensor is used,
         ``bus_V`` where the supply is modelled.
+
+        Raises `InputError`: for one that is no finite number.
         """
+        _check(command=command, current_A=current_A, speed_rad_s=speed_rad_s, angle_rad=angle_rad)
         if output_angle_rad is None:
             output_angle_rad = angle_rad / self.design.total_ratio
         if output_speed_rad_s is None:
             output_speed_rad_s = speed_rad_s / self.design.total_ratio
+        bus_V = self.design.limits.voltage_V if bus_V is None else bus_V
+        _check(output_angle_rad=output_angle_rad, output_speed_rad_s=output_speed_rad_s, bus_V=bus_V)
         measured = (current_A, speed_rad_s, angle_rad, output_angle_rad, output_speed_rad_s)
         self._io[at.IN_COMMAND] = command
         self._io[at.IN_CURRENT : at.IN_OUTPUT_SPEED + 1] = measured
-        self._io[at.IN_BUS] = self.design.limits.voltage_V if bus_V is None else bus_V
+        self._io[at.IN_BUS] = bus_V
         return control_tick(self._p, self._s, self._io)
 
     def get(self) -> Floats:
@@ -120,6 +128,8 @@ class Drive:
         if given.size != self._s.size:
             message = f"state of {given.size} numbers: this drive has {self._s.size}"
             raise InputError(message, where=self.design.name)
+        if not (np.isfinite(given) | (given == self._s)).all():  # a limit that there is not is inf in it
+            raise InputError(f"state = {shown(state)}: must be finite", where=self.design.name)
         self._s[:] = given
 
     def value(self, name: str) -> float:

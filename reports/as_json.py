@@ -1,8 +1,7 @@
 """A result as plain data: fields and properties by their Python names, SI, designs by name and hash."""
 
 import re
-from collections.abc import Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import fields
 from math import degrees
 from pathlib import PurePath
 from typing import Any
@@ -30,24 +29,26 @@ _LINEAR = (
 def as_json(value: Any) -> Any:
     """Turn a result into what JSON knows; NaN and infinity become ``None``.
 
-    >>> as_json(1j), as_json(np.array([1.0, np.inf]))
-    ({'size': 1.0, 'phase_deg': 90.0}, [1.0, None])
+    >>> as_json([1j, float("inf")])
+    [{'size': 1.0, 'phase_deg': 90.0}, None]
     """
-    if isinstance(value, Design):
-        return {"name": value.name, "hash": design_hash(value)}
-    if is_dataclass(value) and not isinstance(value, type):
-        return _named(value)
-    if isinstance(value, complex | np.complexfloating):
-        return plain({"size": abs(value), "phase_deg": degrees(np.angle(value))})
-    if isinstance(value, Mapping):
-        return {str(key): as_json(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray) and not np.iscomplexobj(value):
-        return plain(value)
+    return plain(value, _known)
+
+
+def _known(value: Any) -> Any:
+    """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
+    if isinstance(value, complex):
+        return {"size": abs(value), "phase_deg": degrees(np.angle(value))}
     if isinstance(value, PurePath):
         return shown_path(value)
-    if isinstance(value, tuple | list | np.ndarray):
-        return [as_json(item) for item in value]
-    return plain(value)
+    if isinstance(value, Design):
+        return {"name": value.name, "hash": design_hash(value)}
+    if isinstance(value, LoopFigures):
+        return loop_json(value)
+    names = [each.name for each in fields(value) if each.repr]
+    for kind in type(value).__mro__:
+        names += [name for name, one in vars(kind).items() if isinstance(one, property)]
+    return {name: getattr(value, name) for name in dict.fromkeys(names)}
 
 
 def on_a_line(data: Any) -> Any:
@@ -67,16 +68,6 @@ def _on_a_line(name: str) -> str:
     for of, line in _LINEAR:
         name = of.sub(line, name)
     return name
-
-
-def _named(value: Any) -> Any:
-    """A result by its names, but the fields that ``repr`` leaves out; of a loop the figures."""
-    if isinstance(value, LoopFigures):
-        return plain(loop_json(value))
-    names = [each.name for each in fields(value) if each.repr]
-    for kind in type(value).__mro__:
-        names += [name for name, one in vars(kind).items() if isinstance(one, property)]
-    return {name: as_json(getattr(value, name)) for name in dict.fromkeys(names)}
 
 
 _OF_MARGINS = (
@@ -122,6 +113,7 @@ def _response_json(figures: LoopFigures) -> Tree:
         "bandwidth_hz": band.minus3db_hz if band else None,
         "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
         "resonance_peak_db": band.resonance_peak_db if band else None,
+        "resonance_hz": (band.resonance_hz or None) if band else None,
         **{name: getattr(step, name, None) for name in _OF_STEP},
     }
     alone = figures.loop.name == "position" and figures.of_feedback

@@ -59,10 +59,10 @@ __all__ = [
 ]  # fmt: skip
 
 
-def plain(value: Any) -> Any:
+def plain(value: Any, otherwise: Callable[[Any], Any] | None = None) -> Any:
     """Turn numpy values, tuples and mappings into what JSON knows; NaN and infinity become ``None``.
 
-    A TypeError for anything else (a complex number, an object): say which part of it is meant.
+    Anything else (a complex number, an object) ``otherwise`` makes into one of these; without it a TypeError.
 
     >>> plain({"a": (1, float("nan")), "b": np.float64(2.0)})
     {'a': [1, None], 'b': 2.0}
@@ -70,16 +70,17 @@ def plain(value: Any) -> Any:
     if value is None or isinstance(value, bool | str | int):
         return value
     if isinstance(value, np.generic):
-        return plain(value.item())
+        return plain(value.item(), otherwise)
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return [plain(item) for item in value.tolist()]
+        return {str(key): plain(item, otherwise) for key, item in value.items()}
     if isinstance(value, Iterable):
-        return [plain(item) for item in value]
-    raise TypeError(f"a report cannot hold a {type(value).__name__}")
+        items = value.tolist() if isinstance(value, np.ndarray) else value
+        return [plain(item, otherwise) for item in items]
+    if otherwise is None:
+        raise TypeError(f"a report cannot hold a {type(value).__name__}")
+    return plain(otherwise(value), otherwise)
 
 
 def column(

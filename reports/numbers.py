@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 MISSING = "–"
@@ -27,13 +27,8 @@ def show(value: Any, format: str = "text") -> str:
         return seconds(value / 1e3) if abs(value) >= 1e3 * LONG_S else significant(value, int(digits))
     if kind == "int":
         return to_minus(f"{value:.0f}")
-    if kind == "fix":
-        return fixed(value, int(digits))
-    if kind == "gain":
-        return gain_margin(value, int(digits))
-    if kind == "sig":
-        return significant(value, int(digits))
-    return short(value, int(digits) if kind == "short" else 4)
+    kinds: dict[str, Callable[[float, int], str]] = {"fix": fixed, "gain": gain_margin, "sig": significant}
+    return kinds.get(kind, short)(value, int(digits or 4))
 
 
 def fixed(value: float, decimals: int) -> str:

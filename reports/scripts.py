@@ -7,8 +7,7 @@ what it exports, in the order of the imports, which go one way. A module says th
 
 import re
 from functools import cache
-
-from jinja2 import Environment, PackageLoader
+from pathlib import Path
 
 IMPORT = re.compile(r'^import \{ ([\w, ]+) \} from "\./(\w+)\.js";\n', re.MULTILINE)
 ASIDE = re.compile(r"^[ \t]+|^//[^\n]*\n", re.MULTILINE)  # what a page does not need: indents, remarks
@@ -19,8 +18,7 @@ EXPORT = re.compile(r"^export (const|class) (\w+)", re.MULTILINE)
 @cache
 def asset(name: str) -> str:
     """Give the text of a style sheet or script that stands beside the templates."""
-    source, _, _ = PackageLoader("reports").get_source(Environment(autoescape=True), name)
-    return source
+    return (Path(__file__).parent / "templates" / name).read_text(encoding="utf-8")
 
 
 @cache

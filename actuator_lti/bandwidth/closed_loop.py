@@ -22,7 +22,7 @@ from actuator_lti.margins.distances import COMPLEMENTARY, INVERSE, MODULUS, Dist
 from actuator_lti.margins.exact.crossings import smallest
 from actuator_lti.margins.exact.loop import exact_loop, exact_polynomials
 from actuator_lti.margins.factored import factored
-from actuator_lti.margins.given import Given, given_of, unwarped, whole_samples
+from actuator_lti.margins.given import Given, given_of, of_scipy, unwarped, whole_samples
 from actuator_lti.margins.loop import RationalLoop, loop_of, rational_loop
 from actuator_lti.measured.response import is_measured
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
@@ -63,7 +63,7 @@ def closed_loop_bandwidth(system: Any, delay_s: float = 0.0, level: Level = "1/s
         if (plain := plain_behind_delay(system, delay_s)) is None:
             return _of_delays(system, delay_s, level)
         system, delay_s = plain
-    system = _without_rest_mode(system)
+    system = _without_rest_mode(of_scipy(system))
     loop, given = rational_loop(system), given_of(system)
     exact = exact_loop(given)
     seen = shown(exact, loop)

@@ -34,11 +34,15 @@ class Expressions:
 
     def emit(self, node: ast.expr) -> Text:
         """Text and kind of an expression."""
+        text: Text = self.translated(node)
+        return text
+
+    def translated(self, node: ast.AST) -> Any:
+        """What the method for this kind of node gives."""
         method = getattr(self, f"_{type(node).__name__}", None)
         if method is None:
             raise self.function.error(node, f"{type(node).__name__} is not in the subset")
-        text: Text = method(node)
-        return text
+        return method(node)
 
     def condition(self, node: ast.expr) -> str:
         """A test; whole numbers are compared with 0, floats must be compared in the source."""

@@ -124,12 +124,12 @@ class Known(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.expr:
         sides = [self.visit(each) for each in (node.left, *node.comparators)]
-        worth = [each.value if isinstance(each, ast.Constant) else self._number(each) for each in sides]
+        worth = [each.value if isinstance(each, ast.Constant) else self.number_at(each) for each in sides]
         if len(sides) == 2 and None not in worth and type(node.ops[0]) in _COMPARE:
             return ast.Constant(_COMPARE[type(node.ops[0])](*worth))
         return ast.copy_location(ast.Compare(sides[0], node.ops, sides[1:]), node)
 
-    def _number(self, node: ast.expr) -> Any:
+    def number_at(self, node: ast.expr) -> Any:
         """A named number of another module; None for anything else."""
         value = named(node, self.scope) if isinstance(node, ast.Attribute) else None
         return value if type(value) in (int, float) else None

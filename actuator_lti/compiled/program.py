@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.compiled.expressions import Constant, Expressions
+from actuator_lti.compiled.expressions import Constant
 from actuator_lti.compiled.form import Form, Known
 from actuator_lti.compiled.kernel import is_marked
 from actuator_lti.compiled.kinds import C_TYPES, EmitError, Function, Kind, c_float, c_name, tree_of
@@ -166,7 +166,7 @@ class Collector:
 
     def statements(self, function: Function) -> Statements:
         """What translates its body."""
-        return Statements(Expressions(function, self.call, self.constants, self.helpers))
+        return Statements(function, self.call, self.constants, self.helpers)
 
     def definition(self, function: Function, head: str, lines: list[str]) -> str:
         """Its definition in C."""

@@ -11,7 +11,6 @@ import operator
 from collections.abc import Callable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass, field
-from types import ModuleType
 from typing import Any
 
 from actuator_lti.compiled.form import Known
@@ -40,17 +39,14 @@ class Leftover:
 
 @dataclass
 class Residual:
-    """Follows kernels; what it leaves is in ``functions``, callees first.
+    """Follows kernels."""
 
-    ``look`` gives the number at a place of a row, by the row's argument, which is called alike in every
-    function, or None; ``replaced`` what stands for a call of a kernel, of its arguments and the function that
-    calls it; ``constants`` named ones that have another value here.
-    """
-
+    # The number at a place of a row, by the row's argument, which is called alike in every function, or None
     look: Callable[[str, int], float | None]
+    # What stands for a call of a kernel, of its arguments and the function that calls it
     replaced: Mapping[Any, Replaced] = field(default_factory=dict)
-    constants: Mapping[str, float] = field(default_factory=dict)
-    functions: dict[str, Leftover] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)  # named ones that have another value here
+    functions: dict[str, Leftover] = field(default_factory=dict)  # what it leaves, callees first
     _done: dict[tuple[Any, ...], Leftover] = field(default_factory=dict)
 
     def follow(self, python: Any, known: Mapping[str, Any] | None = None) -> Leftover:
@@ -150,9 +146,8 @@ class _Body(Known):
         return ast.Constant(value) if type(value) in (int, float) else node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
-        module = self.scope.get(node.value.id) if isinstance(node.value, ast.Name) else None
-        value = getattr(module, node.attr, None) if isinstance(module, ModuleType) else None
-        return ast.Constant(value) if type(value) in (int, float) else node
+        value = self.number_at(node)
+        return node if value is None else ast.Constant(value)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
         left, right, kind = self.visit(node.left), self.visit(node.right), type(node.op)

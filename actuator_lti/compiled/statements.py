@@ -1,6 +1,7 @@
 """Statements of one function: kinds of its variables first, then its text in C."""
 
 import ast
+from typing import Any
 
 from actuator_lti.compiled.expressions import Expressions, bare, widened
 from actuator_lti.compiled.kinds import C_TYPES, Function, Kind, c_name
@@ -8,12 +9,11 @@ from actuator_lti.compiled.kinds import C_TYPES, Function, Kind, c_name
 INDENT = "    "
 
 
-class Statements:
+class Statements(Expressions):
     """Translates the body of one function, line by line."""
 
-    def __init__(self, expressions: Expressions) -> None:
-        self.function, self.expressions = expressions.function, expressions
-        self.want, self.emit = expressions.want, expressions.emit
+    def __init__(self, *parts: Any) -> None:
+        super().__init__(*parts)
         self.lines: list[str] = []
         self.depth = 1
         self.temporaries = 0
@@ -29,13 +29,12 @@ class Statements:
 
     def _block(self, nodes: list[ast.stmt]) -> None:
         for node in nodes:
-            method = getattr(self, f"_{type(node).__name__}", None)
-            if method is None:
-                raise self.function.error(node, f"{type(node).__name__} is not in the subset")
-            self.expressions.whole = _evaluated(node)
-            method(node)
+            self.whole = _evaluated(node)
+            self.translated(node)
 
-    def _indented(self, nodes: list[ast.stmt]) -> None:
+    def _opened(self, head: str, nodes: list[ast.stmt]) -> None:
+        """A block behind its head, its brace still to be closed."""
+        self._put(f"{head} {{")
         self.depth += 1
         self._block(nodes)
         self.depth -= 1
@@ -69,7 +68,7 @@ class Statements:
             text = f"(unsigned short){text}"
         else:
             text = f"(double){text}" if kind == "int" and text.isidentifier() else bare(widened(text, kind))
-        self._put(f"{self.expressions.element(target)} = {text};")
+        self._put(f"{self.element(target)} = {text};")
 
     def _written(self, target: ast.Subscript) -> str:
         """Note that a row is written; its name."""
@@ -103,7 +102,7 @@ class Statements:
             self._store(target, bare(text), kind)
 
     def _results(self, targets: ast.Tuple, call: ast.Call) -> None:
-        callee, texts = self.expressions.called(call)
+        callee, texts = self.called(call)
         kinds = callee.returns or ()
         self.want(
             len(kinds) == len(targets.elts), call, "the number of results differs from the number of targets"
@@ -124,26 +123,23 @@ class Statements:
     def _Expr(self, node: ast.Expr) -> None:
         if not isinstance(node.value, ast.Call):
             raise self.function.error(node, "an expression that does nothing")
-        callee, texts = self.expressions.called(node.value)
+        callee, texts = self.called(node.value)
         cast = "" if callee.returns is None else "(void)"
         self._put(f"{cast}{callee.c_name}({', '.join(texts)});")
 
     def _If(self, node: ast.If, word: str = "if") -> None:
-        self._put(f"{word} ({self.expressions.condition(node.test)}) {{")
-        self._indented(node.body)
+        self._opened(f"{word} ({self.condition(node.test)})", node.body)
         if len(node.orelse) == 1 and isinstance(node.orelse[0], ast.If):
-            self.expressions.whole = node.orelse[0].test
+            self.whole = node.orelse[0].test
             self._If(node.orelse[0], "} else if")
             return
         if node.orelse:
-            self._put("} else {")
-            self._indented(node.orelse)
+            self._opened("} else", node.orelse)
         self._put("}")
 
     def _While(self, node: ast.While) -> None:
         self.want(not node.orelse, node, "else after while is not in the subset")
-        self._put(f"while ({self.expressions.condition(node.test)}) {{")
-        self._indented(node.body)
+        self._opened(f"while ({self.condition(node.test)})", node.body)
         self._put("}")
 
     def _For(self, node: ast.For) -> None:
@@ -164,8 +160,7 @@ class Statements:
             self._put(f"const int {end} = {bare(last)};")
         self.function.variables[index.id] = "int"
         self.loops[index.id] = self.loops.get(index.id, 0) + 1
-        self._put(f"for (int {name} = {bare(first)}; {name} < {end}; {name} += 1) {{")
-        self._indented(node.body)
+        self._opened(f"for (int {name} = {bare(first)}; {name} < {end}; {name} += 1)", node.body)
         self._put("}")
         self.loops[index.id] -= 1
         if not self.loops[index.id]:
@@ -199,9 +194,9 @@ class Statements:
 
     def _several_results(self, node: ast.expr | None) -> list[tuple[str, Kind]]:
         """The results of another function, to be passed on; empty where it has one."""
-        if not isinstance(node, ast.Call) or self.expressions.built_in(node) is not None:
+        if not isinstance(node, ast.Call) or self.built_in(node) is not None:
             return []
-        callee, texts = self.expressions.called(node)
+        callee, texts = self.called(node)
         if callee.returns is None or len(callee.returns) == 1:
             return []
         name = self._named_result(callee, texts)

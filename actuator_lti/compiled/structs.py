@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from actuator_lti.compiled.expressions import ARITHMETIC, Expressions, Text, bare
+from actuator_lti.compiled.expressions import ARITHMETIC, Text, bare
 from actuator_lti.compiled.form import number
 from actuator_lti.compiled.kernel import kernel
 from actuator_lti.compiled.kinds import Function, Kind, c_float, c_name
@@ -70,8 +70,8 @@ class Rows:
     counts_per_unit: float = math.nan
 
 
-class _Members(Expressions):
-    """Expressions whose rows are structures."""
+class _Members(Statements):
+    """Statements and expressions whose rows are structures."""
 
     rows: Rows
 
@@ -126,29 +126,23 @@ class _Members(Expressions):
             return text, "int"
         return (f"((double){text})", "float") if (name, kind) == ("float", "count") else super()._Call(node)
 
+    def _store_element(self, target: ast.Subscript, text: str, kind: Kind) -> None:
+        self._written(target)
+        wanted = self.member(target).kind
+        if kind == "count" and wanted == "float":
+            text = bare(self.of_counts(text))
+        elif kind == "float" and wanted != "float":
+            text = _whole_text(text)
+        elif kind == "int" and wanted == "float":
+            text = f"(double){text}"
+        self._put(f"{self.element(target)} = {text};")
+
 
 def _as_whole(node: ast.expr) -> ast.expr:
     """A whole number that is written as a float, as one."""
     if isinstance(node, ast.Constant) and isinstance(node.value, float) and node.value.is_integer():
         return ast.Constant(int(node.value))
     return node
-
-
-class _MemberStatements(Statements):
-    """Statements that store into structures."""
-
-    def _store_element(self, target: ast.Subscript, text: str, kind: Kind) -> None:
-        expressions = self.expressions
-        assert isinstance(expressions, _Members)
-        self._written(target)
-        wanted = expressions.member(target).kind
-        if kind == "count" and wanted == "float":
-            text = bare(expressions.of_counts(text))
-        elif kind == "float" and wanted != "float":
-            text = _whole_text(text)
-        elif kind == "int" and wanted == "float":
-            text = f"(double){text}"
-        self._put(f"{expressions.element(target)} = {text};")
 
 
 def _whole_text(text: str) -> str:
@@ -175,7 +169,7 @@ class _MemberCollector(Collector):
     def statements(self, function: Function) -> Statements:
         members = _Members(function, self.call, self.constants, self.helpers)
         members.rows = self.rows
-        return _MemberStatements(members)
+        return members
 
     def head(self, function: Function) -> str:
         text = super().head(function)

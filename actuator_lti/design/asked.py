@@ -6,6 +6,8 @@ from math import inf
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
+import numpy as np
+
 from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design.field import Axis, choice, day, label, limit, positive, quantities, quantity, text
 
@@ -81,14 +83,33 @@ class Requirement:
     note: Annotated[str, text("any remark")] = ""
     unit: str
 
+    @property
+    def bound(self) -> Any:
+        """Its limit, the lower one where it has both."""
+        return self.maximum if self.minimum is None else self.minimum
+
+    @property
+    def size(self) -> float:
+        """What a distance is measured against: the limit itself, or the usual size of such a figure."""
+        return abs(self.bound) or QUANTITIES[self.quantity].size
+
+    def distance(self, value: Any) -> Any:
+        """Of a value, or an array of them, to the nearer limit, in its unit, positive on the good side.
+
+        >>> float(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0).distance(9.5))
+        3.5
+        """
+        least = -inf if self.minimum is None else self.minimum
+        most = inf if self.maximum is None else self.maximum
+        with np.errstate(invalid="ignore"):  # of a value that is itself unlimited, too
+            return np.fmin(value - least, most - value)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Waiver:
-    """Leave to go on while a requirement or a check is not proven; one that is not met stays so.
+    """Leave to go on while a requirement or a check is not proven; one that is not met stays so."""
 
-    ``requirement`` is the id as reports have it, ``id/loop`` of a requirement on every loop.
-    """
-
+    # As reports have it, ``id/loop`` of a requirement on every loop
     requirement: Annotated[str, text("id of the requirement or check")]
     reason: Annotated[str, label("reason for the waiver")]
     date: Annotated[str, day("day of the waiver")]
@@ -120,26 +141,20 @@ class Fact:
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution.
-
-    ``lower`` and ``upper`` are values of the parameter itself, not deviations.  ``text`` is the width as
-    written, kept so that a relative one ("50 %") follows a changed nominal.
-    """
+    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution."""
 
     kind: Literal["uniform", "normal", "truncated-normal"]
     half_width: float | None = None
     std: float | None = None
+    # Values of the parameter itself, not deviations
     lower: float = -inf
     upper: float = inf
-    text: str = ""
+    text: str = ""  # the width as written, so that a relative one ("50 %") follows a changed nominal
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One value of the design file with its pedigree: dotted key, text as written, SI value.
-
-    ``stated``: what the file has instead, where the value was computed from that.
-    """
+    """One value of the design file with its pedigree: dotted key, text as written, SI value."""
 
     path: str
     text: str
@@ -149,7 +164,7 @@ class Parameter:
     source: str = ""
     grade: str = ""
     tolerance: Tolerance | None = None
-    stated: str = field(default="", compare=False)
+    stated: str = field(default="", compare=False)  # what the file has, where it is computed from that
 
 
 FrozenMap = MappingProxyType
@@ -192,18 +207,13 @@ class ControllerObject(ObjectPlace):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerObjects:
-    """The controller's own settings that a design was imported from, also those that no key holds.
+    """The controller's own settings that a design was imported from, also those that no key holds."""
 
-    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges
-    and steps of its objects.
-    ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
-    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
-    index and subindex.
-    """
-
+    # Turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s, 9.549 (60/2 pi) if it is per rpm;
+    # the documents do not settle it
     velocity_gain_factor: float = 1.0
-    values: tuple[ControllerObject, ...] = ()
-    family: ObjectFamily = ""
+    values: tuple[ControllerObject, ...] = ()  # in the order of index and subindex
+    family: ObjectFamily = ""  # by which the drive is run: its gains have the ranges and steps of its objects
 
     @property
     def named(self) -> bool:

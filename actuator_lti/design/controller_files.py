@@ -12,7 +12,11 @@ p = w L, i = w R (firmware: main.h, encoder.cpp, motor.cpp). VESC and SimpleFOC 
 VESC: lo_current_max = l_current_max l_current_max_scale (mc_interface.c); the speed loop's output is taken
 times that and the scale once more (foc_math.c, firmware 5.3 and later). SimpleFOC: U = R I of a phase where
 the motor has its resistance, and with a KV the back-EMF besides, up to 2.3 by voltage (BLDCMotor.cpp), from
-2.4 by estimated_current (FOCMotor.cpp).
+2.4 by estimated_current (FOCMotor.cpp). Its voltage_limit is the amplitude of a phase, 12 V where nothing is
+set, as is the supply; the driver keeps each phase between 0 and its own limit (defaults.h, FOCMotor.cpp,
+BLDCDriver3PWM.cpp). An output_ramp of 0 is none (pid.cpp).
+
+What the D part of an EPOS4 is filtered by is no object of its export: derivative_filter stays as it is.
 """
 
 import re
@@ -50,14 +54,19 @@ _ARGUMENTS = ("pole_pairs", "phase_resistance", "KV_rating", "phase_inductance")
 class Setting:
     """One key of a design: a factor on one number of the file, or ``value`` of several, in the unit."""
 
-    def __init__(self, key: str, unit: str, value: Value, *names: str, when: Stage | None = None) -> None:
-        self.key, self.unit, self.names, self.when = key, unit, names, when
+    def __init__(
+        self, key: str, unit: str, value: Value, *names: str, when: Stage | None = None, said: str = ""
+    ) -> None:
+        self.key, self.unit, self.names, self.when, self.said = key, unit, names, when, said
         self.of = value if callable(value) else partial(mul, value)
 
     def holds(self, design: Design) -> bool:
         """Whether a design of these stages takes it: ``"-velocity"`` is one without a velocity loop."""
-        stages = design.controller.stages
-        return not self.when or (self.when.strip("-") in stages) != self.when.startswith("-")
+        return _holds(self.when, design)
+
+
+def _holds(when: Stage | None, design: Design) -> bool:
+    return not when or (when.strip("-") in design.controller.stages) != when.startswith("-")
 
 
 @dataclass(frozen=True)
@@ -70,8 +79,12 @@ class Format:
     settings: tuple[Setting, ...]
     fixed: Mapping[str, Any] = field(default_factory=dict)
     unfit: Callable[[Tree, Design], str] = lambda given, design: ""
-    also: Mapping[str, str] = field(default_factory=dict)
-    """Names that are understood without a key, each with what there is to say of it."""
+    also: Mapping[str, tuple[Stage | None, str]] = field(default_factory=dict)
+    """Names that are understood without a key, each with what there is to say of it, and when."""
+    off: tuple[str, ...] = ()
+    """Names without a key that are understood where they are 0: what they switch is off."""
+    newer: Mapping[str, str] = field(default_factory=dict)
+    """Parts of names of newer firmware, each with the older one that the settings are listed by."""
     assumed: Mapping[str, float] = field(default_factory=dict)
     """Numbers where the file has none."""
 
@@ -82,16 +95,18 @@ def _ratio(above: float, below: float) -> float:
 
 
 def _flat(tree: Any, prefix: str = "") -> Tree:
-    """Leaves of a tree by dotted name; ODrive's newer names as the older ones."""
+    """Leaves of a tree by dotted name."""
     result: Tree = {}
     for key, value in tree.items():
         result |= _flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
-    newer = {"axis0.config.motor.": "axis0.motor.config.", "current_soft_max": "current_lim",
-             "axis0.config.encoder_bandwidth": "axis0.encoder.config.bandwidth",
-             "inc_encoder0.config.cpr": "axis0.encoder.config.cpr"}  # fmt: skip
-    for name, older in newer.items():
-        result = {key.replace(name, older): value for key, value in result.items()}
     return result
+
+
+def _older(name: str, found: Format) -> str:
+    """The name that the settings of a format have for one of its file."""
+    for newer, older in found.newer.items():
+        name = name.replace(newer, older)
+    return name
 
 
 def _canopen(text: str, where: str) -> Tree:
@@ -120,7 +135,9 @@ def _sketch(text: str, where: str) -> Tree:
     if len(motors) > 1:
         raise InputError(f"sets several motors: {', '.join(motors)}; allowed: the lines of one of them")
     made = zip(_ARGUMENTS, ",".join(built.values()).split(","), strict=False)
-    found = {name: value.strip().rstrip("fF") for name, value in [*made, *(one[1:] for one in assigned)]}
+    named = ((name if owner in motors or name != "voltage_limit" else f"driver.{name}", value)
+             for owner, name, value in assigned)  # fmt: skip
+    found = {name: value.strip().rstrip("fF") for name, value in [*made, *named]}
     return {name: value for name, value in found.items() if value not in ("", "NOT_SET")}
 
 
@@ -162,7 +179,10 @@ FORMATS = (
         {"control.period": "125 us", "control.velocity.every": 1, "control.position.every": 1,
          "encoder.speed": "tracking", "encoder.bandwidth": "1000 rad/s",
          "encoder.filter_time": "0 s"},
-        _motor_type, {_TYPE: ""},
+        _motor_type, {_TYPE: (None, "")},
+        newer={"axis0.config.motor.": _MOTOR, "current_soft_max": "current_lim",
+               "axis0.config.encoder_bandwidth": _AXIS + "bandwidth",
+               "inc_encoder0.config.cpr": _AXIS + "cpr"},
     ),
     Format(
         "VESC motor configuration", re.compile(r"<MCConfiguration"),
@@ -193,7 +213,8 @@ FORMATS = (
             Setting("control.position.integral_time", "s", _ratio, "0x30A1.01", "0x30A1.02",
                     when="-velocity"),
             Setting("control.position.derivative_time", "s", _ratio, "0x30A1.03", "0x30A1.01",
-                    when="-velocity"),
+                    when="-velocity", said="its filter is no object of the export: "
+                    "control.position.derivative_filter stays as it is"),
             Setting("limits.continuous_current", "A", 1e-3, "0x3001.01"),
             Setting("limits.peak_current", "A", 1e-3, "0x3001.02"),
             Setting("limits.speed", "rad/s", RPM, "0x6080.00"),
@@ -201,6 +222,7 @@ FORMATS = (
         {"control.period": "40 us", "control.velocity.every": 10, "control.position.every": 10},
         lambda given, design: "" if {"velocity", "position"} - {*design.controller.stages} else
         "an EPOS4 has no velocity loop inside its position loop; allowed: a design without one of the two",
+        off=("0x30A1.04", "0x30A1.05", "0x30A2.03", "0x30A2.04"),  # feed-forward of speed and acceleration
     ),
     Format(
         "SimpleFOC settings", re.compile(r"\.(PID_velocity|P_angle|PID_current_q)\."), _sketch,
@@ -215,16 +237,23 @@ FORMATS = (
                   when="current"),
             Setting("encoder.filter_time", "s", 1.0, "LPF_velocity.Tf"),
             Setting("limits.peak_current", "A", A_dc, "current_limit", when="current"),
-            Setting("limits.voltage", "V", 1.0, "voltage_power_supply"),
+            Setting("limits.current_rate", "A/s", lambda ramp: A_dc * ramp or inf,
+                  "PID_velocity.output_ramp", when="current"),
+            Setting("limits.voltage", "V", lambda phase, *line: min(V_dc * phase, *line), "voltage_limit",
+                  "voltage_power_supply", "driver.voltage_limit"),
             Setting("limits.speed", "rad/s", 1.0, "velocity_limit"),
         ),
         {}, _torque_mode,
-        {"torque_controller": "", "pole_pairs": "",
-         "phase_resistance": "by voltage the gain is taken times it, as by the library up to 2.3; from 2.4 "
-         "on that is right by estimated_current only",
-         "KV_rating": "by voltage the library adds the back-EMF, which a design without [control.current] "
-         "has no key for: not carried over"},
-        {"phase_resistance": 1.0},
+        {"torque_controller": (None, ""), "pole_pairs": (None, ""),
+         "phase_resistance": ("-current", "by voltage the gain is taken times it, as by the library up to "
+         "2.3; from 2.4 on that is right by estimated_current only"),
+         "KV_rating": ("-current", "by voltage the library adds the back-EMF, which a design without "
+         "[control.current] has no key for: not carried over"),
+         "LPF_current_q.Tf": ("current", "the filter of the measured current has no key in a design: not "
+         "carried over")},
+        assumed={"phase_resistance": 1.0, "voltage_limit": 12.0, "voltage_power_supply": 12.0,
+                 "driver.voltage_limit": inf},
+        off=("PID_velocity.D", "PID_current_q.D", "PID_current_q.output_ramp"),
     ),
 )  # fmt: skip
 
@@ -239,31 +268,46 @@ def import_controller_file(path: Path, base: Design) -> Imported | None:
     if found is None:
         return None
     with in_file(where):
-        given = found.read(text, where)
+        raw = found.read(text, where)
+        spelled = {_older(name, found): name for name in raw}
+        given = {older: raw[name] for older, name in spelled.items()}
         if unfit := found.unfit(given, base):
             raise InputError(unfit)
-    overrides, used, notes = _overrides(found, given, base, path.name)
+    overrides, used, notes = _overrides(found, given, spelled, base, path.name)
     tables = {key.rpartition(".")[0] for key in overrides} | {table for _, table, _ in parts_of(base)}
     fixed = {
         key: value if key == "encoder.speed" else {"value": value, "source": found.words}
         for key, value in found.fixed.items()
         if key.rpartition(".")[0] in tables
     }
-    left = ", ".join(name for name in given if name not in (*used, *found.also)) or "none"
-    notes = [f"read as {found.words}", *notes, f"not understood, of {len(given)} settings: {left}"]
+    known = {*used, *found.also, *(name for name in found.off if _number(given.get(name)) == 0.0)}
+    left = ", ".join(name for older, name in spelled.items() if older not in known) or "none"
     design = with_overrides(base, changes := {**fixed, **overrides})
+    notes = [f"read as {found.words}", *notes, *_kept_delay(base, design)]
+    notes += [f"not understood, of {len(given)} settings: {left}"]
     changed = tuple(key for key in changes if key in design.parameters)
     return Imported(design=design, changed=changed, kept=(), notes=tuple(notes))
 
 
+def _kept_delay(base: Design, design: Design) -> list[str]:
+    """What becomes of the computing delay, which no file states, where the period changes."""
+    before, after = base.controller, design.controller
+    if before.period_s == after.period_s:
+        return []
+    text, ticks = si_text(after.computing_delay_s, "s"), after.computing_delay_s / after.period_s
+    return [f"control.computing_delay = {text} stays as it is: {ticks:.4g} ticks of the new period, "
+            f"{before.computing_delay_s / before.period_s:.4g} of the old"]  # fmt: skip
+
+
 def _overrides(
-    found: Format, given: Tree, base: Design, file: str
+    found: Format, given: Tree, spelled: Mapping[str, str], base: Design, file: str
 ) -> tuple[dict[str, Any], set[str], list[str]]:
     """What the file sets, with its sources; the names that were understood; remarks."""
     overrides: dict[str, Any] = {}
     used: set[str] = set()
-    notes = [f"{name} = {given[name]}: {said}" for name, said in found.also.items() if said and name in given]
-    for item in (one for one in found.settings if one.holds(base)):
+    notes = [f"{spelled[name]} = {given[name]}: {said}" for name, (when, said) in found.also.items()
+             if said and name in given and _holds(when, base)]  # fmt: skip
+    for item in (one for one in found.settings if one.holds(base) and given.keys() & {*one.names}):
         raw = {name: _number(given.get(name, found.assumed.get(name))) for name in item.names}
         numbers = {name: number for name, number in raw.items() if number is not None}
         lacking = [name for name in item.names if name not in numbers]
@@ -273,13 +317,18 @@ def _overrides(
             continue
         used |= {*item.names}
         value = float(item.of(*numbers.values()))
-        stated = ", ".join(f"{name} = {given[name]}" for name in item.names if name in given)
+        stated = ", ".join(
+            f"{spelled[name]} = {given[name]}" if name in given else f"{name} = {number:g}, not in the file"
+            for name, number in numbers.items()
+            if number != inf or name in given
+        )
         if value == _none(item.key):
             overrides[item.key] = None
             notes.append(f"{stated}: none, {item.key} is left out")
         elif value > 0.0 and isfinite(value):
             text = value if item.unit == "1" else si_text(value, item.unit.replace("A", "A dc"))
             overrides[item.key] = {"value": text, "source": f"{file}: {stated}"}
+            notes += [f"{stated}: {item.said}"] if item.said else []
         else:
             notes.append(f"{stated}: not taken, {item.key} stays as it is")
     return overrides, used, notes

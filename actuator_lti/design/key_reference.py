@@ -45,8 +45,7 @@ def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 
 def _entry(field: Field, structure: Structure) -> KeyEntry:
-    unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
-    unit = "of its quantity" if field.kind == "limit" else unit
+    unit = "of its quantity" if field.kind == "limit" else field.unit(structure)
     same: Tree = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})
@@ -75,16 +74,12 @@ def _allowed(field: Field, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Explained:
-    """One number of a file.
-
-    ``path``: its dotted key.
-    ``written``, ``read``: as the file has it, and in SI.
-    ``model``: as the equations have it: symbol and value, of the equivalent DC motor at its temperature.
-    """
+    """One number of a file, by its dotted key."""
 
     path: Annotated[str, "Key"]
-    written: Annotated[str, "Written"]
-    read: Annotated[str, "Read as"]
+    written: Annotated[str, "Written"]  # as the file has it
+    read: Annotated[str, "Read as"]  # in SI
+    # As the equations have it: symbol and value, of the equivalent DC motor at its temperature
     model: Annotated[str, "In the model as"]
 
 

@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import asdict, is_dataclass
 from dataclasses import fields as dataclass_fields
 from math import inf, isfinite
+from numbers import Integral, Real
 from typing import Any, cast
 
 import tomli_w
@@ -152,8 +153,19 @@ def with_overrides(design: Design, overrides: Mapping[str, Any]) -> Design:
     tree = design_tree(design)
     as_stated(tree, overrides)
     for path, value in overrides.items():
-        _override(tree, path, value, design)
+        _override(tree, path, _plain(value), design)
     return design_from_tree(tree, design.origin or design.name)
+
+
+def _plain(value: Any) -> Any:
+    """What a file may hold: real numbers of other kinds, as numpy's, are Python's."""
+    if isinstance(value, Mapping):
+        return {key: _plain(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [_plain(one) for one in value]
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return value
+    return int(value) if isinstance(value, Integral) else float(value)
 
 
 def with_filter(design: Design, stage: str, keys: Mapping[str, Any]) -> Design:
@@ -176,10 +188,12 @@ def overridden_text(design: Design, path: str, value: Any) -> str:
 
 def with_units(design: Design, values: Mapping[str, Any]) -> Tree:
     """The same changes as a design file writes them: plain numbers get the SI unit of their key."""
-    if not isinstance(values, Mapping) or not all(isinstance(path, str) for path in values):
+    if not isinstance(values, Mapping):
         raise InputError(f"values = {shown(values)}: allowed: dotted keys with their values, in a mapping")
-    result = dict(values)
-    for path, value in values.items():
+    result = {path: _plain(value) for path, value in values.items()}
+    for path, value in [*result.items()]:
+        if not isinstance(path, str):
+            raise InputError(f"key = {shown(path)}: allowed: a dotted key, such as limits.voltage")
         if (field := field_of(path)) is not None and field.kind == "quantity":
             unit = unit_in_file(design, path, field)
             if unit != "1" and isinstance(value, int | float) and not isinstance(value, bool):

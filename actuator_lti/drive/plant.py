@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design, Motor
-from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at, torque_slope
+from actuator_lti.drive.operating import (
+    CONTACT,
+    Operating,
+    moment_slope,
+    slope_at,
+    stiffness_there,
+    torque_slope,
+)
 from actuator_lti.errors import InputError
 
 Entries = dict[str, Any]
@@ -23,30 +30,24 @@ MatrixEntries = dict[tuple[str, str], Any]
 
 @dataclass(frozen=True)
 class Plant:
-    """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive.
+    """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive."""
 
-    ``states``: ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source;
-    ``("i",)`` with the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and
-    ``"twist"`` = th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no
-    inner loop sees.
-    ``A``, shape (..., n, n): without the load's own torques, see `moment`.
-    ``B_u``, ``B_T``, ``B_M``, shape (..., n): effect of the voltage (V, or the drive signal of a torque
-    source), of a torque in N m that accelerates the motor, and of a moment in N m that pushes the output
-    shaft forward.
-    ``torque``, ``moment``: the motor's own torque, and the load's own torque on the output shaft, as
-    combinations of states and rows; both are held over a tick. Empty where there is none, or it does not
-    reach the plant.
-    ``rows``: angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle
-    behind the coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees).
-    """
-
+    # ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source; ``("i",)`` with
+    # the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and ``"twist"`` = th/N_c -
+    # phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop sees
     states: tuple[str, ...]
-    A: np.ndarray
+    A: np.ndarray  # shape (..., n, n): without the load's own torques, see `moment`
+    # Shape (..., n): effect of the voltage (V, or the drive signal of a torque source), of a torque in N m
+    # that accelerates the motor, and of a moment in N m that pushes the output shaft forward
     B_u: np.ndarray
     B_T: np.ndarray
     B_M: np.ndarray
+    # The motor's own torque, and the load's own torque on the output shaft, as combinations of states and
+    # rows; both are held over a tick. Empty where there is none, or it does not reach the plant
     torque: Entries
     moment: Entries
+    # Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle behind the
+    # coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees)
     rows: dict[str, Entries]
 
 
@@ -174,10 +175,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
     assert coupling is not None
     J_m, J_l = design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
     N_c, N_r = design.ratio_to_coupling, design.ratio_behind_coupling
-    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
-    if len(coupling.pieces) > 1:
-        twist = at.twist_rad or coupling.twist_rad(at.load_Nm / N_r)
-        k = coupling.stiffness_at(twist)
+    k, c = stiffness_there(design, at), coupling.damping_Nms_rad
     A, B_u = _motor_side(motor, J_m, slope_at(design, at))
     names = ("i", "w", "th", "W", "twist") if motor.has_electrical_dynamics else ("w", "th", "W", "twist")
     spring = {} if at.point == "gap" else {"twist": k, "w": c / N_c, "W": -c}

@@ -12,57 +12,34 @@ from numpy.typing import NDArray
 
 from actuator_lti.bounds import CSV_COLUMNS, MAT_BYTES, TABLE_BYTES, TABLE_ROWS
 from actuator_lti.errors import InputError, in_file
+from actuator_lti.files import response_columns as column
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
-from actuator_lti.files.response_columns import (
-    PERIOD,
-    SI,
-    TABLE,
-    WHAT,
-    complex_values,
-    noise_of,
-    refuse_contradiction,
-    roles,
-    taken_as,
-    unit_of,
-)
-from actuator_lti.files.response_repeats import averaged
-from actuator_lti.measured.response import GAUSSIAN, MeasuredResponse
-from actuator_lti.types import Floats
+from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, NEIGHBOURS, MeasuredResponse, student
+from actuator_lti.types import Floats, Ints
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
 NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
 """Of a row that is left out and counted."""
+_COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # one value a row
 
 
 @dataclass(frozen=True)
 class RecordedResponse:
-    """A response as it was measured.
+    """A response as it was measured; arrays of shape (m,), NaN where something is not known."""
 
-    ``frequency_hz``, shape (m,): rising, above 0.
-    ``response``, shape (m,).
-    ``deviation``, shape (m,): root mean square of the complex error over the size of the value; not a number
-    where it is not known.
-    ``coherence``, shape (m,): ordinary coherence, 0 to 1; not a number where it is not known.
-    ``name``: of the file.
-    ``left_out``: rows without numbers, without coherence, or at 0 Hz.
-    ``radius``, shape (m,): of the circle about each value that holds the true one in 99 of 100 cases, over
-    the size of the value; not a number where the noise is not known. ``noise``: where it is from.
-    ``read_as``: how the columns of a file were taken. ``period_s``: sampling period of which it says that it
-    is; None where it says none.
-    """
-
-    frequency_hz: Floats
+    frequency_hz: Floats  # rising, above 0
     response: NDArray[np.complex128]
-    deviation: Floats
-    coherence: Floats
-    name: str
-    left_out: int = 0
+    deviation: Floats  # root mean square of the complex error over the size of the value
+    coherence: Floats  # ordinary coherence, 0 to 1
+    name: str  # of the file
+    left_out: int = 0  # rows without numbers, without coherence, or at 0 Hz
+    # Of the circle about each value that holds the true one in 99 of 100 cases, over the size of the value
     radius: Floats = field(default_factory=lambda: np.array(np.nan))
-    noise: str = ""
-    read_as: str = ""
-    period_s: float | None = None
+    noise: str = ""  # where the radius is from
+    read_as: str = ""  # how the columns of a file were taken
+    period_s: float | None = None  # sampling period of which it says that it is; None where it says none
 
     def refuse_other_period(self, loop: str, period_s: float | None) -> None:
         """Refuse data that say another sampling period than that of the loop, s."""
@@ -132,9 +109,9 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     with in_file(shown_path(source)):
         titled = True
         if Path(source).suffix.lower() != ".mat":
-            columns, titled = _table(read_text(source, WHAT, TABLE_BYTES))
+            columns, titled = _table(read_text(source, column.WHAT, TABLE_BYTES))
         else:
-            content = read_mat5(read_bytes(source, WHAT, MAT_BYTES))
+            content = read_mat5(read_bytes(source, column.WHAT, MAT_BYTES))
             columns = {name: values.ravel() for name, values in content.arrays.items()}
             for name, values in content.complexes.items():
                 columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}
@@ -149,16 +126,18 @@ def _table(text: str) -> tuple[dict[str, Floats], bool]:
     places, lines = [at for at, _ in every], [line for _, line in every]
     TABLE_ROWS.check(len(lines))
     if not lines:
-        raise InputError(f"is empty; allowed: a {TABLE}")
+        raise InputError(f"is empty; allowed: a {column.TABLE}")
     cut = next((sign for sign in ";\t," if sign in lines[0]), None)
     rows = [[word.strip().strip('"') for word in line.split(cut)] for line in lines]
     width = len(rows[0])
     CSV_COLUMNS.check(width)
     if width < 2:
-        raise InputError(f"line {places[0]} is no row of a table; allowed: a {TABLE}")
+        raise InputError(f"line {places[0]} is no row of a table; allowed: a {column.TABLE}")
     for line, row in zip(places, rows, strict=True):
         if len(row) != width:
-            raise InputError(f"{len(row)} columns in line {line}, {width} in the first; allowed: a {TABLE}")
+            raise InputError(
+                f"{len(row)} columns in line {line}, {width} in the first; allowed: a {column.TABLE}"
+            )
     head = rows.pop(0) if any(np.isnan(_number(word, cut)) for word in rows[0]) else None
     for line, row in zip(places[len(places) - len(rows) :], rows, strict=True):
         if wrong := [word for word in row if word.lower() not in NO_VALUE and np.isnan(_number(word, cut))]:
@@ -177,7 +156,7 @@ def _number(word: str, cut: str | None) -> float:
 
 
 def _response(columns: Mapping[str, Floats], name: str, averages: int | None) -> RecordedResponse:
-    found = roles(columns)
+    found = column.roles(columns)
     count = columns[found["frequency"]].size
     taken = {role: columns[own] for role, own in found.items() if columns[own].size in (1, count)}
     if short := [found[role] for role in found if role not in taken]:
@@ -186,23 +165,70 @@ def _response(columns: Mapping[str, Floats], name: str, averages: int | None) ->
     good = np.all([np.isfinite(values) for values in table.values()], axis=0)
     good &= (table.get("coherence", np.ones(count)) != 0.0) & (table["frequency"] != 0.0)
     table = {role: values[good] for role, values in table.items()}
-    units = {role: unit_of(role, own, table[role]) for role, own in found.items()}
-    f = table["frequency"] * SI[units["frequency"]]
+    units = {role: column.unit_of(role, own, table[role]) for role, own in found.items()}
+    f = table["frequency"] * column.SI[units["frequency"]]
     if f.size < 2 or not (f > 0.0).all():
         told = f"{f.size} rows of numbers, frequencies above 0 in {(f > 0.0).sum()}"
         raise InputError(f"{told}; allowed: two rows or more, each at a frequency above 0 Hz")
-    z, coherence = complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
+    z, coherence = column.complex_values(table, units), table.get("coherence", np.full(f.size, np.nan))
     if (odd := coherence[(coherence < 0.0) | (coherence > 1.0)]).size:
         per_cent = ", a ratio and not per cent" * bool((coherence[coherence > 1.0] <= 100.0).any())
         raise InputError(f"a coherence of {odd[0]:g}; allowed: 0 to 1{per_cent}")
     if not np.isfinite(z).all() or (z == 0.0).any():
         raise InputError("a value that is 0 or beyond the range of floats")
-    refuse_contradiction({own: columns[own] for own in columns if own not in found.values()}, f, z, good)
-    deviation, radius, noise = noise_of(table, units, averages)
-    left_out, told = count - int(good.sum()), taken_as(columns, found, units, known=bool(noise))
-    read = averaged(RecordedResponse(f, z, deviation, coherence, name, left_out, radius, noise))
+    beside = {own: columns[own] for own in columns if own not in found.values()}
+    column.refuse_contradiction(beside, f, z, good)
+    deviation, radius, noise = column.noise_of(table, units, averages)
+    left_out, told = count - int(good.sum()), column.taken_as(columns, found, units, known=bool(noise))
+    read = _averaged(RecordedResponse(f, z, deviation, coherence, name, left_out, radius, noise))
     if (few := read.frequency_hz).size < 2:
         raise InputError(f"every row is at {few[0]:.6g} Hz; allowed: two frequencies or more")
     if twice := f.size - few.size:
         told += f"; rows that repeat a frequency are averaged ({twice})"
-    return replace(read, read_as=told, period_s=float(table[PERIOD][0]) if PERIOD in table else None)
+    period_s = float(table[column.PERIOD][0]) if column.PERIOD in table else None
+    return replace(read, read_as=told, period_s=period_s)
+
+
+def _averaged(read: RecordedResponse) -> RecordedResponse:
+    """Each frequency once, rising, with the mean of its rows and the noise as they scatter.
+
+    The same value again is the same row, not another measurement.
+    """
+    f, z = read.frequency_hz, read.response
+    order = np.lexsort((z.imag, z.real, f))
+    kept = order[np.append(True, (np.diff(f[order]) != 0.0) | (np.diff(z[order]) != 0.0))]
+    once = replace(read, **{name: getattr(read, name)[kept] for name in _COLUMNS})
+    first = np.flatnonzero(np.diff(once.frequency_hz, prepend=-1.0) > 0.0)
+    if first.size == kept.size:
+        return once
+    count = np.diff(first, append=kept.size)
+
+    def mean(values: Floats) -> Floats:
+        return np.asarray(np.add.reduceat(values, first) / count)
+
+    z = np.asarray(np.add.reduceat(once.response, first) / count, dtype=np.complex128)
+    size, own = np.abs(z), np.abs(once.response)
+    deviation, radius = (
+        np.sqrt(mean((one * own) ** 2) / count) / size for one in (once.deviation, once.radius)
+    )
+    f, coherence = once.frequency_hz[first], mean(once.coherence)
+    made = replace(once, frequency_hz=f, response=z, deviation=deviation, coherence=coherence, radius=radius)
+    if np.isfinite(radius).all():
+        return made
+    off = np.abs(once.response - np.repeat(z, count)) ** 2 / np.repeat(size, count) ** 2
+    return _by_scatter(made, np.add.reduceat(off, first), count)
+
+
+def _by_scatter(read: RecordedResponse, squared: Floats, count: Ints) -> RecordedResponse:
+    """The noise as repeats nearby scatter, where they tell it as surely as neighbours do."""
+    width = min(NEIGHBOURS, count.size)
+    start = np.clip(np.arange(count.size) - width // 2, 0, count.size - width)
+    total, freedom = (
+        np.diff(np.append(0, np.cumsum(one))[np.stack((start, start + width))], axis=0)[0]
+        for one in (squared, count - 1)
+    )
+    if freedom.min() < NEIGHBOURS // 2:
+        return read
+    deviation = np.sqrt(total / freedom / count)
+    radius = deviation * student(freedom, CONFIDENCE)
+    return replace(read, deviation=deviation, radius=radius, noise="scatter of repeats")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -80,13 +81,25 @@ def _signs(count: int) -> Real:
     return np.random.default_rng(0).choice([-1.0, 1.0], count)
 
 
+def of_scipy(system: Any) -> Any:
+    """A system of scipy.signal under python-control's names; anything else as it is."""
+    if not type(system).__module__.startswith("scipy.signal"):
+        return system
+    held = system if hasattr(system, "A") else system.to_tf()
+    names = {"ninputs": held.inputs, "noutputs": held.outputs, "dt": held.dt or 0}
+    if held is system:
+        return SimpleNamespace(A=held.A, B=held.B, C=held.C, D=held.D, **names)
+    return SimpleNamespace(num=[[held.num]], den=[[held.den]], **names)
+
+
 def given_of(system: Any) -> Given:
-    """Read a SISO python-control state space or transfer function, proper and finite."""
-    if not hasattr(system, "ninputs"):
+    """Read a SISO state space or transfer function of python-control or scipy.signal, proper and finite."""
+    system = of_scipy(system)
+    if not hasattr(system, "ninputs") or not (hasattr(system, "num") or hasattr(system, "A")):
         inner = "; of a Loop its open_loop" if hasattr(system, "open_loop") else ""
         raise InputError(
-            f"{type(system).__name__}: a StateSpace, TransferFunction, DelaySystem or "
-            f"FrequencyResponseData{inner}"
+            f"{type(system).__name__}: allowed: a StateSpace, TransferFunction, DelaySystem or "
+            f"FrequencyResponseData, or a linear system of scipy.signal{inner}"
         )
     if system.ninputs != 1 or system.noutputs != 1:
         raise InputError(

@@ -9,12 +9,12 @@ among them. Points are taken as independent.
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import gammaincinv
 
 from actuator_lti.measured.bounds import CURVATURE, bend, unresolved_intervals
-from actuator_lti.measured.response import GAUSSIAN
+from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN
 from actuator_lti.types import Complex, Ints, Mask, Real
 
-_QUANTILE = 2.326  # of the normal distribution, 99 %
 _LINEAR = 0.5  # of the size: noise up to this is the same in log L
 
 
@@ -127,8 +127,6 @@ def _nearby(bent: Real) -> Real:
 def _largest(freedom: Real) -> Real:
     """Sum of squares of that many complex errors over the squared radius of one, in 99 of 100 cases.
 
-    A chi-square of twice the freedom (Wilson, Hilferty 1931).
+    Half a chi-square of twice the freedom.
     """
-    freedom = np.maximum(freedom, 1.0)
-    cube = 1.0 - 1.0 / (9.0 * freedom) + _QUANTILE / (3.0 * np.sqrt(freedom))
-    return np.asarray(freedom * cube**3 / GAUSSIAN**2)
+    return np.asarray(gammaincinv(np.maximum(freedom, 1.0), CONFIDENCE) / GAUSSIAN**2)

@@ -30,14 +30,10 @@ Columns = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Judged:
-    """One requirement over many designs; arrays of shape (count,).
+    """One requirement over many designs; arrays of shape (count,)."""
 
-    ``value`` is the figure that is limited, the worst of the loops, NaN where there is none; ``distance``
-    that to the limit, positive where met, -inf where a loop is unstable or the figure is missing.
-    """
-
-    value: np.ndarray
-    distance: np.ndarray
+    value: np.ndarray  # the figure that is limited, the worst of the loops, NaN where there is none
+    distance: np.ndarray  # to the limit, positive where met; -inf: unstable, or the figure is missing
     passed: np.ndarray
 
 
@@ -99,12 +95,7 @@ def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:
     values = np.stack([columns[name] for name in names])
     if QUANTITIES[requirement.quantity].absolute:
         values = np.abs(values)  # a margin counts in either direction
-    distances = np.full(values.shape, np.inf)  # of a value that is itself unlimited, too
-    with np.errstate(invalid="ignore"):
-        if requirement.minimum is not None:
-            distances = np.fmin(distances, values - requirement.minimum)
-        if requirement.maximum is not None:
-            distances = np.fmin(distances, requirement.maximum - values)
+    distances = requirement.distance(values)
     distances[np.isnan(values)] = -np.inf
     for k, name in enumerate(names):
         if (stable := columns.get(f"{name.partition('.')[0]}.stable")) is not None:

@@ -84,12 +84,6 @@ class AskedFigures:
         swing = self.cycles.hunting
         return 0.0 if swing is None else swing.limit_cycle_rad
 
-    @property
-    def limit_cycle_said(self) -> str:
-        """After which step that is; empty where every one ends at rest."""
-        swing = self.cycles.hunting
-        return "" if swing is None else ending_of(self.design, swing)
-
     def at_corners(self, quantity: Quantity) -> float:
         """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
         loops = [one.judged for corner in self.corners.corners for one in corner.figures.values()]
@@ -109,4 +103,6 @@ class AskedFigures:
         except InputError as error:
             return None, error.message
         said = "" if value is not None else "the design does not state what this needs"
-        return value, self.limit_cycle_said if name == "limit_cycle" else said
+        if name == "limit_cycle":  # after which step that is
+            said = "" if self.cycles.hunting is None else ending_of(self.design, self.cycles.hunting)
+        return value, said

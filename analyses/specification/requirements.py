@@ -179,17 +179,6 @@ def _verdict(
     )
     if value is None or math.isnan(value):
         return of
-    room = distance(requirement, value)
+    room = float(requirement.distance(value))
     reason = "nothing limits it" if value == inf else reason
     return replace(of, value=value, distance=room, verdict=Verdict.of(room >= 0.0), reason=reason)
-
-
-def distance(requirement: Requirement, value: float) -> float:
-    """Give the distance of a value to the nearer limit, in its unit, positive on the good side.
-
-    >>> distance(Requirement(id="a", quantity="gain_margin", unit="dB", minimum=6.0), 9.4)
-    3.4000000000000004
-    """
-    below = math.inf if requirement.minimum is None else value - requirement.minimum
-    above = math.inf if requirement.maximum is None else requirement.maximum - value
-    return min(below, above)

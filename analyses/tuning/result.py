@@ -1,12 +1,12 @@
 """What tuning returns; the tuned design once more, by certified margins and by nonlinear steps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
@@ -18,7 +18,7 @@ from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
-from analyses.specification.requirements import RequirementVerdict, judged
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, judged, tally
 from analyses.studies.sampling import as_values
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
@@ -67,26 +67,22 @@ class TradeOffPoint:
 
 @dataclass(frozen=True)
 class NonlinearCheck:
-    """A step of the tuned design in the nonlinear model, with every limit and friction.
-
-    ``settling_time_s`` is None where it does not stay within 2 % of the commanded angle; friction may leave
-    an error that no gain removes. ``limited`` names the limiters that acted, with their share of the time.
-    """
+    """A step of the tuned design in the nonlinear model, with every limit and friction."""
 
     corner: str
     amplitude_rad: float
     rise_time_s: float | None
     overshoot_percent: float
-    settling_time_s: float | None
-    final_error_percent: float
-    limited: str
+    settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
+    final_error_percent: float  # friction may leave one that no gain removes
+    limited: str  # the limiters that acted, with their share of the time
 
 
 @dataclass(frozen=True)
 class TuningResult:
     """A tuned design."""
 
-    feasible: bool  # whether every requirement on the loops is met at every corner, with the rounded gains
+    feasible: bool  # whether all that is searched for is met at every corner, with the rounded gains
     # As it came, and with the rounded gains
     before: Design
     design: Design
@@ -100,44 +96,53 @@ class TuningResult:
     notes: tuple[str, ...]
     aim: Aim = "least-change"
     placed: tuple[str, ...] = ()  # elements that were added, because gains alone do not meet the requirements
-    # The requirements on loops by certified margins: the tuned design, and each worst corner of one
+    # What was searched for, by certified margins: the tuned design, and each worst corner of one
     confirmed: tuple[RequirementVerdict, ...] = ()
+    others: tuple[RequirementVerdict, ...] = ()  # all other requirements, of the tuned design
     spent: bool = False  # whether the search ended at its bound: then there may be something better
     hunting: str = ""  # after which step the tuned drive does not come to rest; empty: it does
 
     @property
+    def verdict(self) -> Verdict:
+        """What was searched for, and all other requirements."""
+        return (Tally.of([Verdict.of(self.feasible)]) + tally(self.others)).verdict
+
+    @property
     def passed(self) -> bool:
-        """Whether it is feasible."""
-        return self.feasible
+        """Whether every requirement is met."""
+        return self.verdict.passes()
 
     def __str__(self) -> str:
-        head = "every requirement met" if self.feasible else "REQUIREMENTS CANNOT BE MET"
+        head = "what is tuned for is met" if self.feasible else "REQUIREMENTS CANNOT BE MET"
+        open_ones = (f"{one.verdict}: {one.id}" for one in self.others if not one.passes)
+        head = "every requirement met" if self.passed else head
         binding = (one for one in self.requirements if one.binds and one.distance)
         lines = [f"{self.design.name}: {head} over {self.corners} corners"]
         lines += [f"{g.path} = {g.rounded:.6g} {g.unit}" for g in self.gains]
-        return "\n".join([*lines, *(f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in binding)])
+        lines += [f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in binding]
+        return "\n".join([*lines, *open_ones])
 
 
 def confirm(
     tuned: Design, requirements: tuple[Requirement, ...], binding: tuple[BindingRequirement, ...]
 ) -> tuple[RequirementVerdict, ...]:
-    """Judge the tuned design, and each requirement's worst corner, by certified margins.
+    """Judge every requirement of the tuned design, and of some their worst corners, by certified margins.
 
-    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the same
-    requirements at their worst corners.
+    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the
+    ``requirements`` at their worst corners.
     """
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
-    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
+    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {}
     for item, result in zip(requirements, binding, strict=True):
         if result.corner:
             rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
-    verdicts: list[RequirementVerdict] = []
+    verdicts = [*evaluate_requirements(tuned, all_loop_figures(assemble_loops(tuned), certify=True))]
     for corner, asked in rows.items():
         design = with_values(tuned, together(tuned, dict(corner)), check=False)
         figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
         for requirement in asked:
             found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
-            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found] if corner else found
+            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found]
     return tuple(verdicts)
 
 
@@ -149,13 +154,13 @@ def hunting(tuned: Design) -> str:
     return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
-def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[NonlinearCheck, ...]:
+def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> Iterator[NonlinearCheck]:
     """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
     values = as_values(tuned, [f.path for f in problem.factors], points)
-    population, made = Population(tuned, values, len(names)), []
+    population = Population(tuned, values, len(names))
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):
@@ -164,5 +169,4 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[N
             limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
             overshoot, error = seen["overshoot"], seen["final_error"]
-            made.append(NonlinearCheck(corner, size, rise, overshoot, settling, error, limited))
-    return tuple(made)
+            yield NonlinearCheck(corner, size, rise, overshoot, settling, error, limited)

@@ -6,34 +6,19 @@ from itertools import combinations
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
+from actuator_lti.asked.quantities import with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
-from actuator_lti.design.fields import Structure, field_of
+from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Progress
-from analyses.monte_carlo.judging import in_populations, label
+from analyses.monte_carlo.judging import label
 from analyses.specification.requirements import RequirementVerdict
+from analyses.tuning import result
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import (
-    MOST_DESIGNS,
-    Problem,
-    asked_for,
-    limit_of,
-    loop_requirements,
-    problem_of,
-    size_of,
-)
-from analyses.tuning.result import (
-    BindingRequirement,
-    GainSetting,
-    TuningResult,
-    confirm,
-    hunting,
-    nonlinear_checks,
-)
+from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, gain_requirements, problem_of
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
@@ -42,14 +27,15 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 def tune(
     design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress = None
-) -> TuningResult:
-    """Find gains that meet the requirements on loops over all corners of the tolerances.
+) -> result.TuningResult:
+    """Find gains that meet the requirements that gains move over all corners of the tolerances.
 
     With the aim ``least-change`` those nearest to the design as it is (`analyses.tuning.least`); with
     ``reserve`` those that stay as far as possible from every limit, relative to the limit. Both search the
     exact sampled loops. Where gains alone do not do, the elements of ``place`` are tried, one, then two, then
     all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
-    say by how much it misses. What is returned is judged once more by certified margins.
+    say by how much it misses. What is returned is judged once more as `margins` does, by every requirement of
+    the design; what was searched for at its worst corners as well.
 
     ``progress`` is called with (stages done, stages in all).
 
@@ -58,7 +44,7 @@ def tune(
     design, settings = as_design(design), settings or TuningSettings()
     if not isinstance(settings, TuningSettings):
         raise InputError(f"settings = {shown(settings)}: allowed: TuningSettings")
-    wanted = loop_requirements(design, settings.requirements)
+    wanted = gain_requirements(design, settings.requirements)
     allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]
     stages = len(choices) + 3
@@ -71,7 +57,7 @@ def tune(
         tell(len(tried), stages)
     problem, solution = max(tried, key=lambda one: one[1].slack)
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
-    result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
+    distances = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     moved = {  # what did not move keeps its text and source
         item.path: float(value)
         for item, value in zip(problem.variables, gains, strict=True)
@@ -81,14 +67,15 @@ def tune(
     tuned = with_values(problem.design, moved)
     tuned = replace(tuned, name=f"{design.name}-tuned", requirements=stated)
     tell(len(choices) + 1, stages)
-    requirements = _binding(problem, gains, result, settings.aim)
-    confirmed = confirm(tuned, wanted, requirements)
+    requirements = tuple(_binding(problem, gains, distances, settings.aim))
+    verdicts = result.confirm(tuned, wanted, requirements)
+    confirmed = tuple(v for v in verdicts if v.requirement in wanted)
     tell(len(choices) + 2, stages)
-    checks = nonlinear_checks(tuned, problem, result) if settings.check else ()
+    checks = tuple(result.nonlinear_checks(tuned, problem, distances)) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(stages, stages)
-    feasible = bool(result.min() >= 0.0) and all(v.passes for v in confirmed)
-    return TuningResult(
+    feasible = bool(distances.min() >= 0.0) and all(v.passes for v in confirmed)
+    return result.TuningResult(
         feasible=feasible,
         before=design,
         design=tuned,
@@ -99,12 +86,13 @@ def tune(
         checks=checks,
         trade_off=curve,
         evaluations=sum(one.evaluations for one, _ in tried),
-        notes=tuple(_notes(problem, gains, result, confirmed)),
+        notes=tuple(_notes(problem, gains, distances, confirmed)),
         aim=settings.aim,
         placed=problem.elements,
         confirmed=confirmed,
+        others=tuple(v for v in verdicts if v.requirement not in wanted),
         spent=problem.spent,
-        hunting=hunting(tuned) if settings.check and feasible else "",
+        hunting=result.hunting(tuned) if settings.check and feasible else "",
     )
 
 
@@ -142,38 +130,36 @@ def _rounded(problem: Problem, solution: Solution, aim: Aim) -> Floats:
     return choices[best[int(np.argmax(whole))]]
 
 
-def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple[BindingRequirement, ...]:
+def _binding(
+    problem: Problem, gains: Floats, distances: Floats, aim: Aim
+) -> Iterator[result.BindingRequirement]:
     """Every requirement at its worst corner."""
-    smallest = float(result.min())
+    smallest = float(distances.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
     if aim == "least-change":  # nothing binds a design that meets all as it came
         enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
-    made = []
-    for requirement, distances in zip(problem.requirements, result.T, strict=True):
-        worst = int(np.argmin(distances))
-        relative, limit = float(distances[worst]), limit_of(requirement)
-        distance = relative * size_of(requirement) if -3.0 < relative < np.inf else None
+    for requirement, away in zip(problem.requirements, distances.T, strict=True):
+        worst = int(np.argmin(away))
+        relative, limit = float(away[worst]), requirement.bound
+        distance = relative * requirement.size if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
         value = None if distance is None else limit + way * distance
         corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
         binds = relative <= smallest + _BINDS and not enough
         at = {factor.path: float(here) for factor, here in corner}
         about = (requirement.id, label(requirement), requirement.unit)
-        made.append(BindingRequirement(*about, value, limit, distance, relative, binds, at))
-    return tuple(made)
+        yield result.BindingRequirement(*about, value, limit, distance, relative, binds, at)
 
 
 def _settings(
     problem: Problem, before: Design, rules: RuleGains, tuned: Floats, rounded: Floats
-) -> Iterator[GainSetting]:
+) -> Iterator[result.GainSetting]:
     there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
         known, step = object_of(problem.design, path), step_of_gain(problem.design, path)
-        field = field_of(path)
-        assert field is not None
-        yield GainSetting(
+        yield result.GainSetting(
             path=path,
-            unit=field.unit(structure),
+            unit=FIELDS[template_of(path)].unit(structure),
             before=parameter_value(before, path) if path in there else None,
             by_rule=rules.values.get(path),
             tuned=exact,
@@ -185,11 +171,11 @@ def _settings(
 
 
 def _notes(
-    problem: Problem, gains: Floats, result: Floats, confirmed: tuple[RequirementVerdict, ...]
+    problem: Problem, gains: Floats, distances: Floats, confirmed: tuple[RequirementVerdict, ...]
 ) -> Iterator[str]:
     """What was missed, what was not looked at, what a certified margin does not bear out."""
-    if result.min() < 0.0:
-        missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
+    if distances.min() < 0.0:
+        missed = [r.id for k, r in enumerate(problem.requirements) if distances[:, k].min() < 0.0]
         yield f"Cannot be met together, best compromise found misses: {', '.join(missed)}."
     yield (
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "
@@ -207,6 +193,3 @@ def _notes(
         if one.verdict != "met":
             said = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".6g")
             yield f"Not confirmed by certified margins: {one.id}: {said}"
-    of_loops = [item for item in problem.design.requirements if item.quantity in LOOP_QUANTITIES]
-    if names := [item.id for item in of_loops if not in_populations(item, problem.design)]:
-        yield f"Not searched for, as each takes a computation of one design: {', '.join(names)}."

@@ -14,6 +14,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from actuator_lti.design.fields import part_at, with_part
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.design.objects import OBJECTS, KnownObject, step_of
 from actuator_lti.drive.facts import resonance_rad_s
@@ -182,12 +183,10 @@ def place(design: Design, elements: tuple[Element, ...]) -> tuple[Design, list[V
         if element == "feedforward":
             variables += _feedforward(design)
             continue
-        velocity = design.controller.velocity
-        assert velocity is not None
-        item, own = _filter(design, element)
+        (item, own), velocity = _filter(design, element), part_at(design, "control.velocity")
         filters = (*velocity.filters, item)
-        control = replace(design.controller, velocity=replace(velocity, filters=filters))
-        design, path = replace(design, controller=control), f"control.velocity.filter.{len(filters)}."
+        design = with_part(design, "control.velocity", replace(velocity, filters=filters))
+        path = f"control.velocity.filter.{len(filters)}."
         variables += [replace(v, path=path + v.path, per=path + v.per if v.per else "") for v in own]
     return design, variables
 
@@ -198,9 +197,7 @@ def _filter(design: Design, element: Element) -> tuple[Filter, list[Variable]]:
     A notch begins at the resonance of motor and load on the coupling, without damping; without one in the
     middle of the band.
     """
-    velocity = design.controller.velocity
-    assert velocity is not None
-    high = END_OF_BAND * pi / (velocity.every * design.controller.period_s)
+    high = END_OF_BAND * pi / design.controller.period_of("velocity")
     low = high / 1000.0
     if element == "lowpass":
         lowpass = Filter(kind="lowpass", frequency_rad_s=high)

@@ -10,16 +10,7 @@ from actuator_lti.start.extras import package_version
 from actuator_lti.types import Floats
 from nonlinear._kernels import elastic_layout as elastic
 from nonlinear._kernels import layout as at
-from nonlinear.export.program import (
-    c_text,
-    filled,
-    header_text,
-    place_words,
-    replaced,
-    single,
-    source_hash,
-    source_text,
-)
+from nonlinear.export import program
 from nonlinear.native import parameters
 from nonlinear.row.elastic import is_elastic
 from nonlinear.row.parameters import design_row
@@ -58,15 +49,15 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
         _refuse_single(design)
     row = exported_row(design)
     p, s = parameters(row)
-    values = _values(design, row) | {"P": str(p.size), "S": str(s.size), "HASH": source_hash()}
-    texts = {"drive.h": header_text(), "drive.c": source_text()}
-    texts |= {f"{prefix}{name}": filled(name, values) for name in ("design.h", "design.c")}
+    values = _values(design, row) | {"P": str(p.size), "S": str(s.size), "HASH": program.source_hash()}
+    texts = {"drive.h": program.header_text(), "drive.c": program.source_text()}
+    texts |= {f"{prefix}{name}": program.filled(name, values) for name in ("design.h", "design.c")}
     if single_precision:
-        texts = {name: single(text) for name, text in texts.items()}
-    texts["main.c"] = filled("main.c", {"REAL": "float" if single_precision else "double"})
-    texts["README.md"] = filled("README.md", values | _readme(design, p, s, single_precision))
+        texts = {name: program.single(text) for name, text in texts.items()}
+    texts["main.c"] = program.filled("main.c", {"REAL": "float" if single_precision else "double"})
+    texts["README.md"] = program.filled("README.md", values | _readme(design, p, s, single_precision))
     names = {"prefix": prefix, "PREFIX": prefix.upper()}
-    return {name: replaced(text, names) for name, text in texts.items()}
+    return {name: program.replaced(text, names) for name, text in texts.items()}
 
 
 def refuse_prefix(prefix: str) -> None:
@@ -100,7 +91,7 @@ def stage_words(design: Design) -> tuple[str, str]:
 
 def _values(design: Design, row: Floats) -> dict[str, str]:
     """What stands for the words of ``design.h`` and ``design.c``."""
-    known = place_words()
+    known = program.place_words()
     lines = [
         f"    p[{place}] = {c_float(float(value))}; /* {plain(known[place])} */"
         for place, value in enumerate(row)
@@ -108,7 +99,7 @@ def _values(design: Design, row: Floats) -> dict[str, str]:
     ]
     return {
         "DESIGN": plain(design.name), "TITLE": plain(design.title),
-        "NAME": c_text(design.name), "REVISION": c_text(design.revision or ""),
+        "NAME": program.c_text(design.name), "REVISION": program.c_text(design.revision or ""),
         "DESIGN_HASH": design_hash(design), "VERSION": package_version(), "VALUES": "\n".join(lines),
     }  # fmt: skip
 

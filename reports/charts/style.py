@@ -142,10 +142,6 @@ def kept_rows(series: Sequence[np.ndarray], buckets: int = 300) -> np.ndarray:
     rows = len(series[0])
     if rows <= 2 * buckets:
         return np.arange(rows)
-    edges = np.linspace(0, rows, buckets + 1).astype(np.int64)
-    kept = {0, rows - 1}
-    for values in series:
-        for start, stop in pairwise(edges):
-            part = values[start:stop]
-            kept.update((int(start + np.argmin(part)), int(start + np.argmax(part))))
-    return np.array(sorted(kept), dtype=np.int64)
+    parts = [*pairwise(np.linspace(0, rows, buckets + 1).astype(np.int64))]
+    ends = [a + of(one[a:b]) for one in series for a, b in parts for of in (np.argmin, np.argmax)]
+    return np.unique([0, *ends, rows - 1])

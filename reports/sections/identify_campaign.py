@@ -249,8 +249,7 @@ def _ellipse(
 ) -> tuple[np.ndarray, np.ndarray]:
     part = covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(part)
-    turn = np.linspace(0.0, 2.0 * np.pi, 73)
-    circle = np.vstack([np.cos(turn), np.sin(turn)])
+    circle = style.TURN.real, style.TURN.imag
     x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
     return x, y
 

@@ -126,10 +126,9 @@ def _crossing(border: Onset, first: int, amplitude: float) -> float:
     """Interpolate, on logarithmic scales, where the border falls to an amplitude."""
     if first == 0 or not math.isfinite(border.amplitude_rad[first - 1]):
         return float(border.omega_rad_s[first])
-    above, below = border.amplitude_rad[first - 1], border.amplitude_rad[first]
-    part = math.log(above / amplitude) / math.log(above / below)
-    low, high = border.omega_rad_s[first - 1], border.omega_rad_s[first]
-    return float(low * (high / low) ** part)
+    both = [first, first - 1]  # the amplitude falls
+    known, omega = np.log(border.amplitude_rad[both]), np.log(border.omega_rad_s[both])
+    return float(np.exp(np.interp(math.log(amplitude), known, omega)))
 
 
 _LAST = (style.RED, style.SKY, style.INK, style.MUTED, style.BROWN, style.PURPLE)

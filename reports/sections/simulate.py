@@ -154,12 +154,7 @@ def spans(active: npt.NDArray[np.bool_], time_s: npt.NDArray[np.float64]) -> lis
     """
     edges = np.flatnonzero(np.diff(np.concatenate(([0], active.astype(np.int8), [0]))))
     end = float(time_s[-1]) + (float(time_s[1]) if time_s.size > 1 else 0.0)
-    times = np.append(time_s, end)
-    gap = LONGEST_GAP_S * end
-    out: list[list[float]] = []
-    for start, stop in zip(times[edges[::2]], times[edges[1::2]], strict=True):
-        if out and start - out[-1][1] < gap:
-            out[-1][1] = float(stop)
-        else:
-            out.append([float(start), float(stop)])
-    return out
+    times = np.append(time_s, end)[edges]
+    joined = 2 * np.flatnonzero(np.diff(times)[1::2] < LONGEST_GAP_S * end)
+    apart: list[list[float]] = np.delete(times, [joined + 1, joined + 2]).reshape(-1, 2).tolist()
+    return apart

@@ -83,7 +83,7 @@ CASES = {
     "truncated without bounds": (
         [(TOLERANCE, 'tolerance = { kind = "truncated-normal", std = "1 %" }')], ["lower or upper"],
     ),
-    "tolerance as a list": ([(TOLERANCE, "tolerance = []")], ["tolerance = a list", '"50 %"']),
+    "tolerance as a list": ([(TOLERANCE, "tolerance = []")], ["tolerance = an empty list", '"50 %"']),
     "correlation of a fixed value": (
         [(FACTS, '[[correlation]]\nfirst="load.inertia"\nsecond="gear.worm.ratio"\ncoefficient=0.5\n[[fact]]')],
         ['"gear.worm.ratio"', "keys with a tolerance"],

@@ -5,11 +5,22 @@ from contextlib import nullcontext
 from pathlib import Path
 from xml.etree import ElementTree
 
+import control
 import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_lti import InputError, assemble_loops, load_design, stability_margins, sweep, write_design
+from actuator_lti import (
+    InputError,
+    assemble_loops,
+    closed_loop_bandwidth,
+    load_design,
+    stability_margins,
+    step_figures,
+    sweep,
+    unwrapped_phase_deg,
+    write_design,
+)
 from actuator_lti.design import (
     design_hash,
     parameter_value,
@@ -76,6 +87,7 @@ def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
     refused(ask, "ilr33-ambre", words='nearest known: "ilr33-amber"')
 
 
+SQUARE = control.nlsys(None, lambda t, x, u, params: u**2, inputs=1, outputs=1)
 BAD = {
     "delay": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0]), delay_s="1 ms"),
     "counts of none": lambda: large_signals("ilr33-amber", counts=(0, 0)),
@@ -96,7 +108,19 @@ BAD = {
     "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),
     "form": lambda: assemble_loops(DESIGN, form=["sampled"]),
     "loop": lambda: assemble_loops(DESIGN)["speed"],
-    "scipy system": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0, 0.0])),
+    "nonlinear": lambda: stability_margins(SQUARE),
+    "nonlinear, bandwidth": lambda: closed_loop_bandwidth(SQUARE),
+    "nonlinear, step": lambda: step_figures(SQUARE),
+    "nonlinear, phase": lambda: unwrapped_phase_deg(SQUARE, 1.0),
+    "two inputs of scipy": lambda: stability_margins(
+        signal.lti([[0.0]], [[1.0, 1.0]], [[1.0]], [[0.0, 0.0]])
+    ),
+    "a controller's command": lambda: Drive(DESIGN).control(None, 0.0, 0.0, 0.0),
+    "a measured current": lambda: Drive(DESIGN).control(0.0, "a", 0.0, 0.0),
+    "a measured angle": lambda: Drive(DESIGN).control(0.0, 0.0, 0.0, [0.1]),
+    "a measured speed": lambda: Drive(DESIGN).control(0.0, 0.0, float("nan"), 0.0),
+    "a bus voltage": lambda: Drive(DESIGN).control(0.0, 0.0, 0.0, 0.0, bus_V=float("nan")),
+    "a state of nothing": lambda: Drive(DESIGN).set(np.nan * Drive(DESIGN).get()),
     "record": lambda: commands.recorded(3),
     "command": lambda: simulate(DESIGN, lambda t: 0.1, 0.1),
     "load text": lambda: simulate(DESIGN, commands.step(0.01), 0.1, "x"),
@@ -122,9 +146,41 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -> None:
-    with pytest.raises(InputError, match=r"allowed: |must be |one of |a StateSpace, ") as caught:
+    with pytest.raises(InputError, match=r"allowed: |must be |one of |has one input") as caught:
         BAD[name]()
     assert "\n" not in str(caught.value)
+
+
+def test_a_system_of_scipy_is_that_system() -> None:
+    """1/(s (s + 1)) has 51.827 deg, 1/(s + 1) a bandwidth of 1 rad/s and a rise of ln 9; integrators in z."""
+    pole, double = signal.lti([1.0], [1.0, 1.0]), [[0.0, 1.0], [0.0, -1.0]]
+    phase_deg = np.degrees(np.arctan(1.0 / np.sqrt(0.5 * (np.sqrt(5.0) - 1.0))))
+    matrices = signal.lti(double, [[0.0], [1.0]], [[1.0, 0.0]], [[0.0]])
+    for loop in (signal.lti([1.0], [1.0, 1.0, 0.0]), signal.lti([], [0.0, -1.0], 1.0), matrices):
+        assert stability_margins(loop).phase_margin_deg == pytest.approx(phase_deg, rel=1e-12)
+        assert unwrapped_phase_deg(loop, 1.0) == pytest.approx(-135.0, rel=1e-12)
+    assert closed_loop_bandwidth(pole.to_ss()).minus3db_rad_s == pytest.approx(1.0, rel=1e-12)
+    assert step_figures(pole).rise_time_s == pytest.approx(np.log(9.0), rel=1e-12)
+    sampled = stability_margins(signal.dlti([0.1], [1.0, -1.0], dt=0.1))
+    assert (sampled.period_s, sampled.gain_margin.ratio) == (0.1, pytest.approx(20.0, rel=1e-12))
+
+
+NUMPY = (np.int64, np.int32, np.uint8, np.float16, np.float32, np.float64, np.longdouble)
+
+
+@pytest.mark.parametrize("kind", NUMPY)
+def test_every_real_number_of_numpy_is_a_number(kind) -> None:
+    law = ([], [], [], [[60.0]], 2.0 * DESIGN.controller.period_s)
+    design = DESIGN.with_law("position", law, ["error"], every=kind(2), gain=kind(3)).with_values(
+        {"limits.voltage": kind(14), "control.velocity.every": kind(2)}
+    )
+    assert (design.controller.position.every, design.controller.position.law.gain) == (2, 3.0)
+    assert (design.limits.voltage_V, design.controller.velocity.every) == (14.0, 2)
+    (point,) = sweep(DESIGN, "limits.voltage", np.array([14], kind))
+    assert point.design.limits.voltage_V == 14.0
+    refused(
+        lambda: DESIGN.with_values({"control.velocity.every": True}), words="every = True: allowed: a whole"
+    )
 
 
 def test_loops_are_indexed_and_iterated_by_name() -> None:

@@ -49,6 +49,13 @@ SIMPLEFOC = """
   motor.PID_current_q.I= 300;
   driver.voltage_power_supply = 24;
 """
+LIMITED = (
+    SIMPLEFOC
+    + """
+  motor.voltage_limit = 8; driver.voltage_limit = 15; motor.PID_velocity.output_ramp = 1000;
+  motor.LPF_current_q.Tf = 0.001; motor.PID_velocity.D = 0;
+"""
+)
 BY_VOLTAGE = "// motor.torque_controller = TorqueControlType::foc_current;" + SIMPLEFOC.replace(
     "foc_current", "voltage"
 )
@@ -103,8 +110,13 @@ def taken(folder: Path, text: str, base: Design) -> Imported:
         (VESC.replace("<foc_f_", "<l_current_max_scale>0.5</l_current_max_scale><foc_f_"), "",
          (0.0138 * 2, 0.0138 / 18.1, PEAK * ERPM * 0.004 / 20 * 15, 0.5), {"limits.peak_current": PEAK * 30},
          ": foc_f_zv"),
-        (SIMPLEFOC, "", (6, 0.01, PEAK * 0.5, 0.05), {"encoder.filter_time": 0.005, "limits.voltage": 24},
-         ": none"),
+        (SIMPLEFOC, "", (6, 0.01, PEAK * 0.5, 0.05),
+         {"encoder.filter_time": 0.005, "limits.voltage": sqrt(3) * 12}, ": none"),
+        (LIMITED, "", (6,), {"limits.voltage": sqrt(3) * 8, "limits.current_rate": PEAK * 1000}, ": none"),
+        (LIMITED.replace("_limit = 8", "_limit = 20").replace("driver", "other"), "", (6,),
+         {"limits.voltage": 15}, ": none"),  # a phase between 0 and 15 V
+        (LIMITED.replace("_limit = 8", "_limit = 20") + "driver.voltage_limit = 30;", "", (6,),
+         {"limits.voltage": 24}, ": none"),
         (SIMPLEFOC.replace("foc_current", "dc_current"), "", (6, 0.01), {}, ": none"),
         # u_q = R i_q + U_emf of a phase
         (OF_RESISTANCE, "current", (None, None, sqrt(3) * 0.5 * 5.6, 0.05), {}, "PID_current_q.I"),
@@ -165,6 +177,7 @@ def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_pat
     assert any(note.endswith(f"not taken, control.{key} stays as it is") for note in result.notes)
 
 
+LIMITS = {"encoder.filter_time": "1 ms", "limits.current_rate": "1 A/s"}
 PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
 
 
@@ -176,24 +189,52 @@ PID = {"control.position.integral_time": "1 s", "control.position.derivative_tim
         (EPOS.replace("16000", "0"), "velocity", "control.position.derivative_time"),
         (SIMPLEFOC.replace("0.005f", "0"), "", "encoder.filter_time"),
         (ODRIVE.replace("10.0,", "Infinity,"), "", "limits.speed"),
+        (LIMITED.replace("1000", "0"), "", "limits.current_rate"),
     ],
 )
 def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, tmp_path: Path) -> None:
     """An integral gain of 0, no limit, no filter: nothing of the base stays in its place."""
-    base = with_overrides(without(stage), (PID if stage else {"encoder.filter_time": "1 ms"}))
+    base = with_overrides(without(stage), (PID if stage else LIMITS))
     result = taken(tmp_path, text, base)
     assert key in base.parameters
     assert key not in result.design.parameters
     assert any(note.endswith(f": none, {key} is left out") for note in result.notes)
 
 
-def test_what_a_sketch_says_of_its_motor_is_told(tmp_path: Path) -> None:
-    notes = taken(tmp_path, OF_RESISTANCE, without("current")).notes
-    for words in (
+def test_what_a_sketch_says_of_its_motor_is_told_where_it_applies(tmp_path: Path) -> None:
+    """By voltage the resistance and the KV count; with a current loop neither does, but its filter."""
+    by_voltage = (
         "KV_rating = 90: by voltage the library adds the back-EMF",
         "phase_resistance = 5.6: by voltage",
-    ):
-        assert any(note.startswith(words) for note in notes)
+    )
+    by_current = ("LPF_current_q.Tf = 0.001: the filter of the measured current",)
+    motor = "BLDCMotor motor = BLDCMotor(11, 5.6, 90);"
+    for text, stage, words in ((OF_RESISTANCE, "current", by_voltage), (motor + LIMITED, "", by_current)):
+        notes = taken(tmp_path, text, without(stage)).notes
+        for start in by_voltage + by_current:
+            assert any(note.startswith(start) for note in notes) == (start in words)
+
+
+def test_what_the_file_does_not_say_is_told(tmp_path: Path) -> None:
+    """The computing delay in ticks of the new period; a derivative's filter; a feed-forward that is off."""
+    base = with_overrides(
+        without("velocity"), {"control.period": "100 us", "control.computing_delay": "50 us"}
+    )
+    notes = taken(tmp_path, EPOS + "\n[30A1sub4]\nParameterValue=0", base).notes
+    kept = "control.computing_delay = 5e-05 s stays as it is: 1.25 ticks of the new period, 0.5 of the old"
+    assert kept in notes
+    assert any(note.endswith("control.position.derivative_filter stays as it is") for note in notes)
+    assert notes[-1].endswith(": 0x30A2.01, 0x30A2.02")
+    assert not any("delay" in note for note in taken(tmp_path, SIMPLEFOC, BASE).notes)
+
+
+def test_the_source_is_the_name_in_the_file(tmp_path: Path) -> None:
+    text = """{"axis0": {"config": {"motor": {"current_soft_max": 20.0, "current_hard_max": 36.0}}}}"""
+    result = taken(tmp_path, text, BASE)
+    assert result.design.parameters["limits.peak_current"].source.endswith(
+        "settings: axis0.config.motor.current_soft_max = 20.0"
+    )
+    assert result.notes[-1].endswith(": axis0.config.motor.current_hard_max")
 
 
 def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from analyses.identification.inverse import fit_records
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.studies.sampling import sampler_of
-from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.problem import gain_requirements, problem_of
 from examples.odrive_motor import find_chirp, fit_step, main, predict_chirp
 from tests.identification.bench_records import columns_of, motion, record_of, write
 
@@ -110,7 +110,7 @@ def test_what_was_identified_is_what_the_studies_draw(tmp_path, cli) -> None:
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
     size = np.sqrt(np.diag(wanted))
     assert np.cov((draws / size).T) == pytest.approx(wanted / np.outer(size, size), abs=0.05)
-    corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    corner = problem_of(design, gain_requirements(design), {"control.position.gain": 100.0})
     assert set(paths) <= {factor.path for factor in corner.factors}
     drawn = ("--samples", "64", "--no-worst", "--out", tmp_path / "mc", "--json")
     study = cli("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)
