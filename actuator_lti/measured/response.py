@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.plain_system import period_of
-from actuator_lti.types import Complex, Real
+from actuator_lti.types import Compared, Complex, Real
 
 CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
@@ -23,8 +23,8 @@ _FEWEST = 6  # points: of two residuals the median has one degree of freedom
 _UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
 
-@dataclass(frozen=True)
-class MeasuredResponse:
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse(Compared):
     """A measured loop L with the radius of a circle about each value that holds the true one.
 
     `stability_margins` takes it as it takes `control.FrequencyResponseData`; the ranges that it states are

@@ -32,6 +32,7 @@ from actuator_lti.design import (
 )
 from actuator_lti.design.loader import design_text
 from actuator_lti.loops.delay_budget import delay_budget
+from actuator_lti.margins import MeasuredResponse
 from analyses import (
     amplitude_map,
     compare,
@@ -320,6 +321,29 @@ def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
         {"friction.law": "tanh"},
     ):
         assert design_hash(with_overrides(AMBER, change)) != design_hash(AMBER)
+
+
+def test_results_can_be_compared_and_sent() -> None:
+    """Results with arrays are equal where their numbers are, nan as nan; loops are assembled again."""
+    grid = np.geomspace(0.1, 100.0, 20)
+    for made in (
+        lambda scale: step_figures(control.tf([scale], [1.0, 1.0])),
+        lambda scale: simulate(DESIGN, commands.step(0.01 * scale), 0.01),
+        lambda scale: MeasuredResponse.from_scatter(control.frd(scale / (1j * grid), grid)),
+    ):
+        result = made(1.0)
+        assert result == made(1.0) == pickle.loads(pickle.dumps(result))
+        assert result != made(2.0)
+        assert result != "another"
+    loops = assemble_loops(DESIGN, "continuous", "rest", load_Nm=2.0, inner_loops="open")
+    for sent in (pickle.loads(pickle.dumps(loops)), pickle.loads(pickle.dumps(survey_loops(DESIGN))).loops):
+        here = loops if sent.form == loops.form else assemble_loops(DESIGN)
+        assert sent.operating == here.operating
+        assert sent["position"].open_loop(1j) == here["position"].open_loop(1j)
+        path, own = sent.limiters["current"], here.limiters["current"]
+        assert path.response(1.0) == own.response(1.0)
+    assert repr(DESIGN) == "<Design ilr33-amber: rotary, position > velocity > current>"
+    assert repr(Drive(DESIGN)) == "<Drive ilr33-amber: tick 0>"
 
 
 def test_designs_can_be_sent_to_workers_and_kept_in_caches() -> None:
