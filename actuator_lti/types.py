@@ -17,6 +17,16 @@ Progress = Callable[[int, int], None] | None
 """Called with (done, total) while long work goes on; None: nobody looks on."""
 
 
+def number_array(given: Any) -> Real:
+    """Numbers of any shape as floats.
+
+    A TypeError or ValueError for what is none, and for text, which numpy would read.
+    """
+    if np.asarray(given).dtype.kind in "SU":
+        raise TypeError
+    return np.asarray(given, dtype=float)
+
+
 class Compared:
     """A dataclass (``eq=False``) that holds arrays: equal where all its fields are, nan as nan; no hash."""
 

@@ -17,7 +17,7 @@ from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError, finite_number, shown
 from actuator_lti.loops.result import Loops
-from actuator_lti.types import Compared
+from actuator_lti.types import Compared, number_array
 
 Response = Callable[[np.ndarray], np.ndarray]
 
@@ -90,7 +90,7 @@ class Onset(Compared):
 
 def _frequencies(omega_rad_s: Any) -> np.ndarray:
     try:
-        omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
+        omega = np.atleast_1d(number_array(omega_rad_s))
     except (TypeError, ValueError):
         omega = np.array([np.nan])
     if not np.isfinite(omega).all():

@@ -68,6 +68,8 @@ def stability_margins(
     (True, 9.943, 61.3521, 10.70796)
     """
     delay_s, band_rad_s = delay_number(delay_s), _band(band_rad_s)
+    if certify not in (True, False):
+        raise InputError(f"certify = {shown(certify)}: must be True or False")
     if is_measured(system):
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):

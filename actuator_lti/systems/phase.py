@@ -18,7 +18,7 @@ from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.bounds import bounds
 from actuator_lti.measured.response import is_measured, measured_response
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
-from actuator_lti.types import Real
+from actuator_lti.types import Real, number_array
 
 _AT_REST = 1e-10  # of the median: a root this near to zero is one at zero, beside which the side is rounding
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
@@ -53,7 +53,7 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     """
     delay_s = delay_number(delay_s)
     try:
-        omega = np.asarray(omega_rad_s, dtype=float)
+        omega = number_array(omega_rad_s)
     except (TypeError, ValueError):
         omega = np.array(np.nan)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):
