@@ -136,7 +136,7 @@ def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) ->
     """Largest steady motor speed, what sets it, and the torque against motion there."""
     motor, limits, stall = design.effective_motor, design.limits, stall_torque_Nm(design)
     bounds: list[tuple[int, Any]] = []
-    if design.controller.velocity is not None and "position" in design.controller.stages:
+    if design.controller.velocity is not None:
         bounds.append((SPEED_LIMIT, limits.speed_rad_s))
         if (pulls := droop(design)) is not None:
             rises = _first_root(against - pulls[0], slopes, pulls[1])

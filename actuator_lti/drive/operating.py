@@ -38,7 +38,7 @@ class Operating:
     ``speed_rad_s``: motor speed at which the slope of a friction map is taken.
     ``angle_rad``: output angle at which torques that bend with the angle are made linear.
     ``twist_rad``: twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A
-    spring that bends has the stiffness of this twist; without one, of that under ``load_Nm``.
+    spring that bends has the stiffness of this twist; without one, of that of `carried_Nm`.
     ``torques_held``: whether torques that depend on the angle are taken as they stand, without their slopes.
     ``torques_at_once``: whether they act at every instant, as they do on a motor, where model.md section 11
     (and so the simulator) holds them over a tick.
@@ -162,6 +162,21 @@ def follows_angle(design: Design) -> bool:
 def holding_moment_Nm(design: Design, angle_rad: float = 0.0) -> float:
     """Moment on the output shaft that holds the load's own one at an output angle."""
     return -float(design.load.over_angle.at(angle_rad))
+
+
+def carried_Nm(design: Design, at: Operating) -> Any:
+    """Torque of the coupling that carries the load and the load's own moment at the output angle, at rest."""
+    own = design.load.over_angle.at(at.angle_rad)
+    return -(at.load_Nm + own) / design.ratio_behind_coupling
+
+
+def stiffness_there(design: Design, at: Operating) -> Any:
+    """Stiffness of the coupling's piece on which a drive stands: that of its twist, or of what it carries."""
+    coupling = design.coupling
+    assert coupling is not None
+    if len(coupling.pieces) == 1:
+        return coupling.stiffness_Nm_rad
+    return coupling.stiffness_at(at.twist_rad or coupling.twist_rad(carried_Nm(design, at)))
 
 
 def holding_torque_Nm(design: Design, angle_rad: float = 0.0, twist_rad: float = 0.0) -> float:

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design, Motor
-from actuator_lti.drive.operating import CONTACT, Operating, moment_slope, slope_at, torque_slope
+from actuator_lti.drive.operating import (
+    CONTACT,
+    Operating,
+    moment_slope,
+    slope_at,
+    stiffness_there,
+    torque_slope,
+)
 from actuator_lti.errors import InputError
 
 Entries = dict[str, Any]
@@ -174,10 +181,7 @@ def _elastic(design: Design, motor: Motor, at: Operating) -> Plant:
     assert coupling is not None
     J_m, J_l = design.motor_side_inertia_kgm2, design.load_side_inertia_kgm2
     N_c, N_r = design.ratio_to_coupling, design.ratio_behind_coupling
-    k, c = coupling.stiffness_Nm_rad, coupling.damping_Nms_rad
-    if len(coupling.pieces) > 1:
-        twist = at.twist_rad or coupling.twist_rad(at.load_Nm / N_r)
-        k = coupling.stiffness_at(twist)
+    k, c = stiffness_there(design, at), coupling.damping_Nms_rad
     A, B_u = _motor_side(motor, J_m, slope_at(design, at))
     names = ("i", "w", "th", "W", "twist") if motor.has_electrical_dynamics else ("w", "th", "W", "twist")
     spring = {} if at.point == "gap" else {"twist": k, "w": c / N_c, "W": -c}

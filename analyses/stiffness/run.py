@@ -15,7 +15,7 @@ import numpy.typing as npt
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, LoadFriction
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, stiffness_there
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import stiffness as linear
 from nonlinear import commands, simulate, tangent
@@ -253,8 +253,7 @@ def _telling_loads(design: Design) -> tuple[float, ...]:
     if coupling is None or len(coupling.pieces) == 1:
         return (0.0,)
     for load in design.validation.loads_Nm:
-        twist = coupling.twist_rad(load / design.ratio_behind_coupling)
-        reached.setdefault(float(coupling.stiffness_at(twist)), load)
+        reached.setdefault(float(stiffness_there(design, Operating(load_Nm=load))), load)
     return tuple(reached.values())
 
 

@@ -68,12 +68,10 @@ class Differences:
         """Let the commands before the first be those of the motion: else it is fed forward to there."""
         setup, start = self.setup, self.drive.start
         place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
-        if place is None or setup.outer != "position" or (speed == 0.0 and place.sensor != "output"):
+        if place is None or setup.outer != "position":
             return
-        now = N * setup.bias.output_rad(setup.design)
-        if speed:
-            size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
-            now = -N * size * since_s
+        size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
+        now = -N * size * since_s if speed else N * size
         period_s = place.every * setup.design.controller.period_s
         start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
 

@@ -186,8 +186,7 @@ class LoopSetup:
         at_output = self.design.controller.position_loop.sensor == "output"
         seen = N * self.bias.output_rad(self.design) if at_output else 0.0
         if speed == 0.0:
-            row["angle_start"] = -ahead
-            row.step("bias", seen / N, -1.0)
+            row.step("bias", (ahead + seen) / N, -1.0)
         else:
             row.ramp("bias", speed / N, -(ahead + seen) / speed)
 

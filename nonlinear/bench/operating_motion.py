@@ -68,8 +68,10 @@ class OperatingMotion:
         """Where the linear loops have to be taken to be those of this motion."""
         if design.coupling is not None and self.friction_on:
             return Operating(point="driving", speed_rad_s=self.speed_rad_s, twist_rad=self.twist_rad)
-        angle = self.output_rad(design)
-        return Operating(speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=self.twist_rad)
+        # untold, the twist has to follow from the load: only cogging has to know how far it turns the motor
+        twist = self.twist_rad if design.motor.over_angle.follows else 0.0
+        load, angle = self.load_Nm, self.output_rad(design)
+        return Operating(load_Nm=load, speed_rad_s=self.speed_rad_s, angle_rad=angle, twist_rad=twist)
 
 
 def operating_motion(design: Design) -> OperatingMotion:
@@ -136,20 +138,22 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 
 
 def standing(design: Design) -> OperatingMotion:
-    """At rest, motor at zero, no dry friction; constant moments hold it and press a coupling with play.
+    """At rest, motor at zero, no dry friction: a constant torque there holds it, and a constant moment.
 
-    The drive is one that `may_stand`, `on_its_stand`.
+    A coupling carries the load's own moment at output angle 0; one with play is pressed where that does not
+    close it.  The drive is one that `may_stand`, `on_its_stand`.
     """
-    load, coupling, torque = design.load, design.coupling, holding_torque_Nm(design)
-    if coupling is None or coupling.play_rad == 0.0:
-        return OperatingMotion(0.0, 0.0, 0.0, False, holding_moment_Nm(design), extra_Nm=torque)
-    press = PRESSED[0] * full_torque_Nm(design) * design.total_ratio
-    coupling_Nm = max(press / design.ratio_behind_coupling, _closing_Nm(coupling))
-    press = coupling_Nm * design.ratio_behind_coupling
+    coupling, torque, carried = design.coupling, holding_torque_Nm(design), holding_moment_Nm(design)
+    if coupling is None:
+        return OperatingMotion(0.0, 0.0, 0.0, False, carried, extra_Nm=torque)
+    coupling_Nm = carried / design.ratio_behind_coupling
+    if coupling.play_rad > 0.0 and abs(coupling_Nm) < _closing_Nm(coupling):
+        press = PRESSED[0] * full_torque_Nm(design) * design.ratio_to_coupling
+        coupling_Nm = max(press, _closing_Nm(coupling))
     twist = coupling.twist_rad(coupling_Nm)
-    passed = 1.0 if load.path == "back-drivable" else 0.0
-    torque += passed * coupling_Nm / design.ratio_to_coupling
-    moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling) - press
+    torque += passed_moment_Nm(design, coupling_Nm * design.ratio_behind_coupling)
+    moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling)
+    moment -= coupling_Nm * design.ratio_behind_coupling
     return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
 
 

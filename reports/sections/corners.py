@@ -1,5 +1,7 @@
 """Margins at the corners: hot, cold, low supply, and the worst ends of the tolerances."""
 
+from collections import Counter
+
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
 from analyses.corners.run import Corner, Corners
 from reports import document as doc
@@ -38,8 +40,8 @@ def summary(result: Corners) -> str:
         return f"Every loop is stable{met} at all {count} corners.{none}{more}"
     where = f"{len(failed)} of {count} corners ({'; '.join(failed)})"
     where = f"all {count} corners" if len(failed) == count else where
-    what = dict.fromkeys(name for corner in result.corners for name in _failings(corner))
-    return f"The drive fails at {where}: {', '.join(what)}.{more}"
+    what = Counter(name for corner in result.corners for name in _failings(corner))
+    return f"The drive fails at {where}: {', '.join(f'{name} at {n}' for name, n in what.items())}.{more}"
 
 
 def _described(corner: Corner) -> str:

@@ -102,9 +102,17 @@ def test_many_drives_are_each_of_them_alone(name: str, load: float) -> None:
             assert mine == pytest.approx(getattr(alone, attribute), rel=1e-12, nan_ok=True), attribute
 
 
-def test_the_speed_limit_belongs_to_the_position_stage() -> None:
-    """The speed command is clamped where a position loop gives it; without a velocity loop there is none."""
-    assert drive_figures(amber()).rate_limit == "speed limit"
+@pytest.mark.parametrize("stages", [(), ("position",)])
+def test_the_speed_command_is_clamped_whoever_gives_it(stages: tuple[str, ...]) -> None:
+    """By hand, and where the simulator ends up, a speed drive too; without a velocity loop nothing does."""
+    design, load = without(amber(), *stages, gain=0.2), 4.0
+    capacity, w, friction = capability(design, load), design.limits.speed_rad_s, design.friction
+    torque = friction.dry_torque_Nm + friction.load_coefficient * load + friction.viscous() * w
+    assert RATE_LIMITS[int(capacity.rate_limit)] == "speed limit"
+    assert capacity.output_rate_rad_s == pytest.approx(w / design.total_ratio, rel=1e-12)
+    assert capacity.motor_current_A == pytest.approx(torque / design.motor.torque_constant_Nm_A, rel=1e-12)
+    ran = simulate(design, commands.ramp(9.0) if not stages else commands.step(9.0), 0.5, -load)
+    assert ran.motor_speed_rad_s[-1] == pytest.approx(w, rel=1e-6)
     assert drive_figures(without(amber(), "velocity", gain=1.0)).rate_limit == "voltage"
 
 

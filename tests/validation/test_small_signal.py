@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from actuator_lti import Design, assemble_loops, load_design, onset
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import shipped_designs
+from actuator_lti.design.model import Gravity
+from actuator_lti.drive import operating
 from actuator_lti.loops import ExactMargins
 from analyses.validation import CHECKS, places, validate
 from analyses.validation.design_values import design_value_rows
@@ -19,6 +22,7 @@ from analyses.validation.row import Row
 from analyses.validation.small_signal import Place, small_signal
 from nonlinear import tangent
 from tests.changed import changed
+from tests.loops.loop_designs import drive_e
 from tests.validation.random_drives import full_drive
 
 INTEGRAL_TIME_S = 100.0  # so slow that the pole passes 1 by 1e-6 of a relative change of the gain
@@ -152,6 +156,18 @@ def test_every_number_of_a_spring_that_bends_is_confronted() -> None:
         for drive, model in ((1.0, 1.01), (1.01, 1.0)):
             one, other = (design.with_values({key: factor * value}) for factor in (drive, model))
             assert Verdict.NOT_MET in {row.verdict for row in design_value_rows(one, other)}, key
+
+
+def test_gravity_twists_a_spring_that_bends_and_the_validator_stands_there(monkeypatch) -> None:
+    """A level arm of 3 N m, its slope none: K2 by itself, K1 where the load lifts it, K3 with 4 N m more."""
+    bends = {"torque_1_Nm": 2.0, "stiffness_2_Nm_rad": 600.0, "torque_2_Nm": 5.0, "stiffness_3_Nm_rad": 900.0}
+    level = Gravity(mass_kg=3.0 / 9.80665, arm_m=1.0, offset_rad=np.pi / 2)
+    design = changed(drive_e(), coupling=bends, load={"gravity": level})
+    for load_Nm, k in ((0.0, 600.0), (-3.0, design.coupling.stiffness_Nm_rad), (4.0, 900.0), (-9.0, 900.0)):
+        assert drive_figure(design, "static_stiffness", load_Nm) == pytest.approx(k, rel=1e-6)
+    assert verdicts(design, design, "position") <= {Verdict.MET}
+    monkeypatch.setattr(operating, "carried_Nm", lambda _, at: -at.load_Nm)  # as if there were no gravity
+    assert Verdict.NOT_MET in verdicts(design, design, "position")
 
 
 def pendulum(falls_Nm_rad: float) -> Design:
