@@ -167,7 +167,7 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 1.2, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 0.0, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.with_noise(THREE, np.inf), "finite and not negative"),
-    (lambda: DESIGN.with_law("velocity", ([], [], [], [], 1e-4), []), "inputs = an empty list: allowed: a list"),
+    (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
 ])  # fmt: skip
 def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:
     refused(ask, words=words)
