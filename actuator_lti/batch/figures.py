@@ -24,16 +24,12 @@ _MOST_ORDER = 80
 
 @dataclass(frozen=True)
 class Crossovers:
-    """Crossovers of one loop of many designs, in order of frequency; NaN past the last one.
+    """Crossovers of one loop of many designs, in order of frequency; NaN past the last one."""
 
-    ``frequency_rad_s``, ``margin``, shape (count, 6): margin in deg (gain crossovers) or as ratio (phase
-    crossovers).
-    ``crossings``, shape (count,): how many there are; where it is more than 6 the rest is not listed.
-    """
-
+    # Shape (count, 6)
     frequency_rad_s: np.ndarray
-    margin: np.ndarray
-    crossings: np.ndarray
+    margin: np.ndarray  # in deg (gain crossovers) or as ratio (phase crossovers)
+    crossings: np.ndarray  # shape (count,): how many there are; past 6 they are not listed
 
 
 @dataclass(frozen=True)
@@ -45,17 +41,13 @@ class LinearFigures:
     `actuator_lti.step`. A design whose loop is unstable keeps its crossovers; its closed-loop figures
     are NaN, its delay margin is 0.
     Closed-loop figures of the position loop are from command to output, feed-forward included.
-
-    ``loops``: the loops that the structure has.
-    ``raw``, shape (count, 3, columns): what the compiled code wrote (see ``_figures``); angles are radians
-    per sample.
-    ``period_s``, shape (count, 3): sampling period of each loop.
     """
 
-    loops: tuple[str, ...]
+    loops: tuple[str, ...]  # that the structure has
     count: int
+    # Shape (count, 3, columns): what the compiled code wrote (`_figures`); angles are radians per sample
     raw: np.ndarray
-    period_s: np.ndarray
+    period_s: np.ndarray  # shape (count, 3): sampling period of each loop
 
     def stable(self, loop: str) -> np.ndarray:
         """Whether the closed loop is stable, bool, shape (count,)."""

@@ -39,17 +39,14 @@ class Leftover:
 
 @dataclass
 class Residual:
-    """Follows kernels; what it leaves is in ``functions``, callees first.
+    """Follows kernels."""
 
-    ``look`` gives the number at a place of a row, by the row's argument, which is called alike in every
-    function, or None; ``replaced`` what stands for a call of a kernel, of its arguments and the function that
-    calls it; ``constants`` named ones that have another value here.
-    """
-
+    # The number at a place of a row, by the row's argument, which is called alike in every function, or None
     look: Callable[[str, int], float | None]
+    # What stands for a call of a kernel, of its arguments and the function that calls it
     replaced: Mapping[Any, Replaced] = field(default_factory=dict)
-    constants: Mapping[str, float] = field(default_factory=dict)
-    functions: dict[str, Leftover] = field(default_factory=dict)
+    constants: Mapping[str, float] = field(default_factory=dict)  # named ones that have another value here
+    functions: dict[str, Leftover] = field(default_factory=dict)  # what it leaves, callees first
     _done: dict[tuple[Any, ...], Leftover] = field(default_factory=dict)
 
     def follow(self, python: Any, known: Mapping[str, Any] | None = None) -> Leftover:

@@ -143,26 +143,20 @@ class Fact:
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerance:
-    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution.
-
-    ``lower`` and ``upper`` are values of the parameter itself, not deviations.  ``text`` is the width as
-    written, kept so that a relative one ("50 %") follows a changed nominal.
-    """
+    """How far a value may lie from its nominal, in SI: a uniform or (truncated) normal distribution."""
 
     kind: Literal["uniform", "normal", "truncated-normal"]
     half_width: float | None = None
     std: float | None = None
+    # Values of the parameter itself, not deviations
     lower: float = -inf
     upper: float = inf
-    text: str = ""
+    text: str = ""  # the width as written, so that a relative one ("50 %") follows a changed nominal
 
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:
-    """One value of the design file with its pedigree: dotted key, text as written, SI value.
-
-    ``stated``: what the file has instead, where the value was computed from that.
-    """
+    """One value of the design file with its pedigree: dotted key, text as written, SI value."""
 
     path: str
     text: str
@@ -172,7 +166,7 @@ class Parameter:
     source: str = ""
     grade: str = ""
     tolerance: Tolerance | None = None
-    stated: str = field(default="", compare=False)
+    stated: str = field(default="", compare=False)  # what the file has, where it is computed from that
 
 
 FrozenMap = MappingProxyType
@@ -215,18 +209,13 @@ class ControllerObject(ObjectPlace):
 
 @dataclass(frozen=True, kw_only=True)
 class ControllerObjects:
-    """The controller's own settings that a design was imported from, also those that no key holds.
+    """The controller's own settings that a design was imported from, also those that no key holds."""
 
-    ``family`` says that the drive is run by that kind of motion controller: its gains then have the ranges
-    and steps of its objects.
-    ``velocity_gain_factor`` turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s,
-    9.549 (60/2 pi) if it is per rpm; the documents do not settle it.  The values are kept in the order of
-    index and subindex.
-    """
-
+    # Turns the unit of object 0x2344.01 into A s/rad: 1 if it is per rad/s, 9.549 (60/2 pi) if it is per rpm;
+    # the documents do not settle it
     velocity_gain_factor: float = 1.0
-    values: tuple[ControllerObject, ...] = ()
-    family: ObjectFamily = ""
+    values: tuple[ControllerObject, ...] = ()  # in the order of index and subindex
+    family: ObjectFamily = ""  # by which the drive is run: its gains have the ranges and steps of its objects
 
     @property
     def named(self) -> bool:

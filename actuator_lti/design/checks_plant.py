@@ -6,7 +6,7 @@ from dataclasses import replace
 from math import inf, isclose, log
 from typing import Any
 
-from actuator_lti.design.fields import axis_unit, part_at
+from actuator_lti.design.fields import FIELDS, axis_unit, part_at
 from actuator_lti.design.mistakes import UNREAD, Check, Refusal, Rule, readable, told
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import MotorConstants
@@ -14,10 +14,8 @@ from actuator_lti.design.spellings import split_quantity
 
 MAX_MAP_POINTS = 16  # of each direction
 _ELECTRICAL = {
-    "resistance": "resistance_ohm",
-    "inductance": "inductance_H",
-    "torque_constant": "torque_constant_Nm_A",
-    "back_emf_constant": "back_emf_constant_Vs_rad",
+    key: FIELDS[f"motor.{key}"].attribute
+    for key in ("resistance", "inductance", "torque_constant", "back_emf_constant")
 }
 _TORQUE_OVER_VOLTAGE: dict[MotorConstants, tuple[float, str]] = {
     "dc": (1.0, "1"),

@@ -49,27 +49,24 @@ class Structure:
 
 @dataclass(frozen=True, kw_only=True)
 class Field:
-    """One key of the design file.
-
-    ``unit_template`` is an SI unit in which ``{angle}``, ``{torque}`` and ``{inertia}`` stand for
-    rad, N*m, kg*m^2 on a rotary axis and m, N, kg on a linear one, ``{drive}`` for A or V.
-    ``low`` and ``high`` are inclusive, in SI. ``most`` gives the largest value in a design, where others
-    decide it, and why. ``default`` is that of the attribute.
-    """
+    """One key of the design file."""
 
     path: str
     kind: Kind
     description: str
     attribute: str = ""
+    # An SI unit in which {angle}, {torque} and {inertia} stand for rad, N*m, kg*m^2 on a rotary axis and
+    # m, N, kg on a linear one, {drive} for A or V
     unit_template: str = ""
     symbol: str = ""
+    # Inclusive, in SI
     low: float = -inf
     high: float = inf
     choices: tuple[str, ...] = ()
     required: bool = False
     example: str = ""
-    most: Callable[[Design], tuple[float, str]] | None = None
-    default: Any = None
+    most: Callable[[Design], tuple[float, str]] | None = None  # in a design, where others decide it, and why
+    default: Any = None  # that of the attribute
 
     @property
     def is_number(self) -> bool:

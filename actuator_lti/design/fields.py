@@ -16,26 +16,18 @@ Many = Literal["", "named", "numbered", "listed"]
 
 @dataclass(frozen=True)
 class Section:
-    """One table of the file.
+    """One table of the file."""
 
-    ``path``: table name, such as ``"control.velocity"``; of repeated tables without the name or number.
-    ``place``: where the part lies in a `Design`, such as ``"controller.velocity"``.
-    ``kind``: dataclass of the part.
-    ``required``: whether a file must have it.
-    ``many``: repeated tables, known by their key ``name`` (gears), by their number from 1, or by ``label``.
-    ``rare``: whether lists of values pass over it while all its values are the defaults.
-    ``label``: the key that a listed table is known by; its number from 1 where empty.
-    ``asked``: whether it says what is asked of the drive, not what it is: the hash knows it where it stands.
-    """
-
-    path: str
-    place: str
-    kind: type
-    required: bool = False
+    path: str  # table name, such as "control.velocity"; of repeated tables without the name or number
+    place: str  # where the part lies in a `Design`, such as "controller.velocity"
+    kind: type  # dataclass of the part
+    required: bool = False  # whether a file must have it
+    # Of repeated tables: known by their key `name` (gears), by their number from 1, or by `label`
     many: Many = ""
-    rare: bool = False
+    rare: bool = False  # whether lists of values pass over it while all its values are the defaults
+    # Whether it says what is asked of the drive, not what it is: the hash knows it where it stands
     asked: bool = False
-    label: str = ""
+    label: str = ""  # the key that a listed table is known by; its number from 1 where empty
 
     @property
     def template(self) -> str:

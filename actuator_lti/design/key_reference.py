@@ -75,16 +75,12 @@ def _allowed(field: Field, unit: str) -> str:
 
 @dataclass(frozen=True)
 class Explained:
-    """One number of a file.
-
-    ``path``: its dotted key.
-    ``written``, ``read``: as the file has it, and in SI.
-    ``model``: as the equations have it: symbol and value, of the equivalent DC motor at its temperature.
-    """
+    """One number of a file, by its dotted key."""
 
     path: Annotated[str, "Key"]
-    written: Annotated[str, "Written"]
-    read: Annotated[str, "Read as"]
+    written: Annotated[str, "Written"]  # as the file has it
+    read: Annotated[str, "Read as"]  # in SI
+    # As the equations have it: symbol and value, of the equivalent DC motor at its temperature
     model: Annotated[str, "In the model as"]
 
 

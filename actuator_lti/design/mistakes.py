@@ -86,12 +86,10 @@ def readable(items: Iterable[T]) -> Iterator[T]:
 
 @dataclass(frozen=True)
 class Rule:
-    """What a design must not be: the key that is refused then, its value as shown, and what is allowed.
-
-    The texts show values of the design ``d``, as ``{d.limits.voltage_V:g}``.
-    """
+    """What a design must not be: the key that is refused then, its value as shown, and what is allowed."""
 
     key: str
+    # Both show values of the design ``d``, as ``{d.limits.voltage_V:g}``
     given: str
     allowed: str
     broken: Callable[[Design], Any]

@@ -28,15 +28,12 @@ _Values = dict[tuple[int, int], int]
 
 @dataclass(frozen=True)
 class KnownObject(ObjectPlace):
-    """One object: what it means, its unit in SI, its range, and the keys that it sets.
-
-    ``scale`` is the SI value of one step.  The first of ``paths`` is read on export, all are set on import;
-    without paths the object is known but not part of the model.
-    """
+    """One object: what it means, its unit in SI, its range, and the keys that it sets."""
 
     meaning: str
     unit: str
-    scale: float
+    scale: float  # SI value of one step
+    # The first is read on export, all are set on import; without any it is no part of the model
     paths: tuple[str, ...] = ()
     low: int = 0
     high: int = U32

@@ -10,16 +10,12 @@ ROUNDED = 1e-15  # a slope of so small a part of its terms, and of the angle's o
 
 @dataclass(frozen=True)
 class Wave:
-    """``peak sin(order angle + phase)``; numbers, or arrays of shape (K,) of stacked designs.
-
-    ``averages``: whether a drive in motion passes its periods so fast that it feels their mean, which is
-    none.
-    """
+    """``peak sin(order angle + phase)``; numbers, or arrays of shape (K,) of stacked designs."""
 
     peak_Nm: Any
     order: Any
     phase_rad: Any
-    averages: bool = False
+    averages: bool = False  # whether a drive in motion passes its periods so fast that it feels their mean, 0
 
 
 @dataclass(frozen=True)

@@ -13,23 +13,12 @@ from math import inf
 from typing import Any
 
 from actuator_lti.asked.quantities import LOOPS, QUANTITIES
+from actuator_lti.design import fields as schema
 from actuator_lti.design import model
 from actuator_lti.design.asked import FrozenMap, default_deflection
 from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import Field, Structure
-from actuator_lti.design.fields import (
-    BY_PATH,
-    FIELDS,
-    HEAD,
-    RECORDS,
-    Section,
-    children,
-    fields_in,
-    part_at,
-    template_of,
-    with_part,
-)
 from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
@@ -69,9 +58,10 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     """The design of a tree, `UNREAD` where there are findings; relations between its keys are `checks`."""
     reader = Reader(tree, findings)
     head, _ = reader.values("design", tree.get("design"), "design")
-    meant = reader.known(tree, [*(item.key for item in (HEAD, *children(""), *RECORDS)), "objects"], "")
+    tables = [item.key for item in (schema.HEAD, *schema.children(""), *schema.RECORDS)]
+    meant = reader.known(tree, [*tables, "objects"], "")
     parts = reader.tables("", tree, meant)
-    records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in RECORDS}
+    records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in schema.RECORDS}
     objects = reader.objects(tree.get("objects"))
     # 10 deg (0.01 m) without a load where the file does not say what to validate
     fallback = model.Validation(full_deflection_rad=default_deflection(reader.structure.axis))
@@ -117,7 +107,7 @@ class Reader:
             self.refuse("screw", screw, 'allowed with design.axis = "linear"')
         lead: Any = screw.get("lead") if isinstance(screw, dict) else None
         lead = lead.get("value") if isinstance(lead, dict) else lead
-        field, lead_m = FIELDS["screw.lead"], 0.01
+        field, lead_m = schema.FIELDS["screw.lead"], 0.01
         with suppress(InputError, TypeError):  # told where the lead itself is read
             value = self.frame.quantity(lead, field)
             lead_m = value if field.accepts(value) else lead_m
@@ -167,10 +157,10 @@ class Reader:
         if not isinstance(table, dict):
             word = key_for(path.rpartition(".")[0], path.rpartition(".")[2])
             number = f"; a number of that name is {word}" if word else ""
-            allowed = f"allowed: a table{f', [{path}]' if path in BY_PATH else ''}{number}"
+            allowed = f"allowed: a table{f', [{path}]' if path in schema.BY_PATH else ''}{number}"
             self.unread(path, "missing") if table is None else self.refuse(path, table, allowed)
             return {}, ()
-        fields, stated = fields_in(template), sheet_fields(template)
+        fields, stated = schema.fields_in(template), sheet_fields(template)
         meant = self.known(table, (*(field.key for field in (*fields, *stated)), *inner), path)
         for field in stated:
             if field.key in table:
@@ -203,7 +193,7 @@ class Reader:
             return UNREAD
         if field.kind == "limit":
             return self.limit(table.get("quantity"), raw, path)
-        if field.is_number and field.path in FIELDS:
+        if field.is_number and field.path in schema.FIELDS:
             return self.entry(field, raw, path, self.parameters)
         lists = {"quantities": self.numbers, "matrix": self.rows, "names": self.words}
         if reads := self.number if field.is_number else lists.get(field.kind):
@@ -254,7 +244,7 @@ class Reader:
 
     def takes(self, path: str, text: str) -> bool:
         """Whether a key that holds a number reads a text as it stands."""
-        field = FIELDS.get(template_of(re.sub(r"\[([0-9]+)\]", r".\1", path)))  # gear[1], without a name
+        field = schema.field_of(re.sub(r"\[([0-9]+)\]", r".\1", path))  # gear[1], without a name
         with suppress(InputError):
             if field is not None:
                 gain = self.as_stated(field, text)
@@ -289,8 +279,8 @@ class Reader:
                 source = "; ".join(filter(None, (f"from {table['value']}", table.get("source"))))
                 made = {**table, "value": text, "source": source, "stated": f"from {table['value']}"}
                 self.kept(field, made, value, path, self.parameters)
-                part = replace(part_at(design, field.section), **{field.attribute: value})
-                design = with_part(design, field.section, part)
+                part = replace(schema.part_at(design, field.section), **{field.attribute: value})
+                design = schema.with_part(design, field.section, part)
         return design
 
     def tolerance(self, field: Field, raw: Any, value: float, path: str) -> model.Tolerance | None:
@@ -352,12 +342,12 @@ class Reader:
         except (InputError, ValueError) as error:
             return self.refuse(path, raw, getattr(error, "message", str(error)))
 
-    def part(self, section: Section, raw: Any, path: str) -> Any:
+    def part(self, section: schema.Section, raw: Any, path: str) -> Any:
         """What one table becomes, with the tables inside it."""
         named = section.many == "named"
         raw = _rows_flat(raw) if issubclass(section.kind, model.StateSpace) else raw
         raw = self.law(raw, path) if section.kind is model.Law else raw
-        names = [*(item.key for item in children(section.path)), *["name"] * named]
+        names = [*(item.key for item in schema.children(section.path)), *["name"] * named]
         values, meant = self.values(section.template, raw, path, names)
         if not isinstance(raw, dict):
             return UNREAD
@@ -390,7 +380,7 @@ class Reader:
     def tables(self, path: str, table: Tree, meant: Iterable[str]) -> Tree:
         """The parts of the tables that lie in a table (``""``: in the file), where they are written."""
         result: Tree = {}
-        for section in children(path):
+        for section in schema.children(path):
             if section.key in meant and section.key not in table:
                 result[section.attribute] = UNREAD
             elif section.many:
@@ -399,7 +389,7 @@ class Reader:
                 result[section.attribute] = self.part(section, table.get(section.key), section.path)
         return result
 
-    def items(self, section: Section, raw: Any) -> Any:
+    def items(self, section: schema.Section, raw: Any) -> Any:
         """The parts of repeated tables, each known by its name, id or number."""
         most = MAX_GEARS if section.many == "named" else MAX_LIST
         if not isinstance(raw, list):
@@ -414,7 +404,7 @@ class Reader:
             paths.append(self._label(section, table, index, paths))
         return tuple(self.part(section, *item) for item in zip(raw, paths, strict=True))
 
-    def _label(self, section: Section, table: Any, index: int, before: list[str]) -> str:
+    def _label(self, section: schema.Section, table: Any, index: int, before: list[str]) -> str:
         """The dotted path of a repeated table; the name of one that is known by it is checked."""
         key = "name" if section.many == "named" else section.label
         name = table.get(key) if isinstance(table, dict) else None
@@ -448,7 +438,7 @@ class Reader:
 
 def _meant(table: Tree, path: str) -> Any:
     """The word of a key on which the reading of others depends: where it is none, the nearest."""
-    field = FIELDS[path]
+    field = schema.FIELDS[path]
     return meant_of(f"{table.get(field.key, field.default)}", field.choices) or field.default
 
 

@@ -74,8 +74,7 @@ class Frame:
         counted = field.key == "counts_per_rev" and self.structure.axis == "linear"
         if counted and _PER_TRAVEL.search(f"{text}"):
             whole_m = 1.0 if self.per_metre(field.section) else 2.0 * pi * (self.travel_m_rad or 0.0)
-            factors = {"count/m": whole_m}  # of a metre, or of a lead
-            counts = parse_quantity(text, "count/m") * factors["count/m"]
+            counts = parse_quantity(text, "count/m") * whole_m  # of a metre, or of a lead
             return float(round(counts)) if abs(counts - round(counts)) <= 1e-9 * counts else counts
         refused: list[InputError] = []
         for one, factor in factors.items():

@@ -36,18 +36,13 @@ class Realisation(NamedTuple):
 
 @dataclass(frozen=True)
 class Block:
-    """One block in both times.
-
-    ``states``: names of the sampled realisation's states, told apart by the place of the block.
-    ``period_s``: T of the sampled realisation.
-    ``age_s``: delay that the continuous realisation needs besides (a difference over m T is m T/2 old).
-    """
+    """One block in both times."""
 
     sampled: Realisation
     continuous: Realisation
-    states: tuple[str, ...] = ()
-    period_s: Any = 0.0
-    age_s: Any = 0.0
+    states: tuple[str, ...] = ()  # names of the sampled ones, told apart by the place of the block
+    period_s: Any = 0.0  # T of the sampled realisation
+    age_s: Any = 0.0  # delay that the continuous one needs besides (a difference over m T is m T/2 old)
 
     def at_z(self, omega_rad_s: np.ndarray) -> np.ndarray:
         """Frequency response of the sampled realisation."""

@@ -24,23 +24,18 @@ ROUNDING = 1e-12  # of a speed: nearer than that, two bounds are one
 
 @dataclass(frozen=True)
 class Capability:
-    """Figures of the whole drive at one load torque, the worse of both directions; floats or arrays.
+    """Figures of the whole drive at one load torque, the worse of both directions; floats or arrays."""
 
-    ``output_rate_rad_s``: largest steady speed of the output within the speed, voltage and peak current
-    limits; 0 if it cannot move; ``inf`` without any limit.
-    ``rate_limit``: what sets it, a place in `RATE_LIMITS`.
-    ``motor_current_A``: current needed at that speed; NaN for an ideal source or where the speed has no
-    bound.
-    ``acceleration_rad_s2``: largest acceleration of the output from rest, within the acceleration limit; 0 if
-    it cannot move.
-    ``torque_margin``: motor torque at rest over what friction and the load ask of it to start, the smaller of
-    both directions; ``inf`` where nothing holds it. (ECSS-E-ST-33-01C calls it the motorization factor.)
-    """
-
+    # Largest steady speed of the output within the speed, voltage and peak current limits; 0 if it cannot
+    # move, ``inf`` without any limit
     output_rate_rad_s: Any
-    rate_limit: Any
+    rate_limit: Any  # what sets it, a place in `RATE_LIMITS`
+    # Needed at that speed; NaN for an ideal source or where the speed has no bound
     motor_current_A: Any
+    # Largest of the output from rest, within the acceleration limit; 0 if it cannot move
     acceleration_rad_s2: Any
+    # Motor torque at rest over what friction and the load ask of it to start, the smaller of both directions;
+    # ``inf`` where nothing holds it (ECSS-E-ST-33-01C: motorization factor)
     torque_margin: Any
 
 

@@ -47,24 +47,19 @@ SIGNALS = {signal.name: signal for signal in _SIGNALS}
 
 @dataclass(frozen=True)
 class Limiter:
-    """A limiter: where it acts and how reports call it.
-
-    ``signal``: what stands in front of it, of `SIGNALS`.
-    ``kind``: a clamp of the signal, of its change per update, or of its mean square in the long run; or no
-    limit of a loop but what the drive makes of its command.
-    ``limit``: attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the
-    stage's target, and for the command.
-    ``bit``: of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest).
-    ``always``: whether every drive that has the signal is told of it, also where it has no such limit.
-    """
+    """A limiter: where it acts and how reports call it."""
 
     name: str
     words: str
-    signal: str
+    signal: str  # what stands in front of it, of `SIGNALS`
+    # A clamp of the signal, of its change per update, or of its mean square in the long run; or no limit of a
+    # loop but what the drive makes of its command
     kind: Kind
+    # Attribute of `Limits` that holds it; empty for ``torque-command``, which has that of the stage's target,
+    # and for the command
     limit: str
-    bit: int
-    always: bool = False
+    bit: int  # of the limit flags that a run writes (`REST_BIT` says that the rotor is at rest)
+    always: bool = False  # whether every drive that has the signal is told of it, without such a limit too
 
     def limit_of(self, limits: Limits) -> Any:
         """Its value in a design; ``inf`` where there is none."""

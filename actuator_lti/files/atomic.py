@@ -18,16 +18,16 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from actuator_lti.errors import InputError
-from actuator_lti.files.reading import reason
+from actuator_lti.files.reading import AnyPath, reason
 
-Name = TypeVar("Name", bound=str | os.PathLike[str])
+Name = TypeVar("Name", bound=AnyPath)
 _PART = ".part"
 _NO_FILE = "is no file; allowed: a file, a pipe or a character device"
 _STANDARD = ("stdin", "stdout", "stderr")
 _OPEN_FILE = re.compile(r"/(?:(?:dev|proc/self)/fd/(\d{1,6})|dev/(stdin|stdout|stderr))\Z")
 
 
-def write_text(path: str | os.PathLike[str], text: str) -> None:
+def write_text(path: AnyPath, text: str) -> None:
     """Write text as UTF-8 with the line ends given; the old content stays until the new one is on disk.
 
     An InputError if the folder cannot be made or written.
@@ -35,12 +35,12 @@ def write_text(path: str | os.PathLike[str], text: str) -> None:
     write_bytes(path, text.encode("utf-8"))
 
 
-def write_bytes(path: str | os.PathLike[str], data: bytes) -> None:
+def write_bytes(path: AnyPath, data: bytes) -> None:
     """Write bytes; see `write_text`."""
     write_together({path: data})
 
 
-def write_stream(path: str | os.PathLike[str], write: Callable[[BinaryIO], None]) -> None:
+def write_stream(path: AnyPath, write: Callable[[BinaryIO], None]) -> None:
     """Let ``write`` fill a file that need not fit in memory; see `write_text`."""
     _write_all([(path, write)])
 
@@ -55,7 +55,7 @@ def write_together(files: Mapping[Name, bytes] | Iterable[tuple[Name, bytes]]) -
     _write_all((path, methodcaller("write", data)) for path, data in pairs)
 
 
-def _write_all(files: Iterable[tuple[str | os.PathLike[str], Callable[[BinaryIO], object]]]) -> None:
+def _write_all(files: Iterable[tuple[AnyPath, Callable[[BinaryIO], object]]]) -> None:
     """Fill every file beside its place, then move all into place; devices and pipes are written to last.
 
     The disk is waited for when all are written: many files then reach it in few turns.

@@ -33,6 +33,7 @@ from actuator_lti.bounds import (
 )
 from actuator_lti.errors import InputError, in_file
 
+AnyPath = str | PathLike[str]
 Tree = dict[str, Any]
 """A table of TOML or an object of JSON as a file has it: a schema checks its keys, or has done so."""
 INTEGERS = range(-(1 << 63), 1 << 63)
@@ -61,20 +62,20 @@ def _written(value: object) -> str:
     return repr(value)
 
 
-def shown_path(path: str | PathLike[str]) -> str:
+def shown_path(path: AnyPath) -> str:
     """A path as it may be printed; what is no path is refused."""
     if not isinstance(path, str | bytes | PathLike):
         raise InputError(f"{path!r}: allowed: the path of a file")
     return shown(os.fspath(path), 200)[1:-1]
 
 
-def as_path(path: str | PathLike[str]) -> Path:
+def as_path(path: AnyPath) -> Path:
     """A path; what is none is refused."""
     shown_path(path)
     return Path(os.fspath(path))
 
 
-def open_regular(path: str | PathLike[str], what: str = "file") -> BufferedReader:
+def open_regular(path: AnyPath, what: str = "file") -> BufferedReader:
     """Open a regular file for reading; a directory, a device or a pipe is refused without waiting for it.
 
     An InputError names the file and what is allowed.
@@ -94,7 +95,7 @@ def open_regular(path: str | PathLike[str], what: str = "file") -> BufferedReade
         raise InputError(f"{kind}; allowed: a {what}")
 
 
-def _near(path: str | PathLike[str]) -> str:
+def _near(path: AnyPath) -> str:
     """The file of nearly that name in the same folder."""
     folder, name = os.path.split(os.fsdecode(path))
     try:
@@ -109,7 +110,7 @@ def reason(error: OSError | ValueError) -> str:
     return (error.strerror if isinstance(error, OSError) else None) or str(error)
 
 
-def read_bytes(path: str | PathLike[str], what: str = "design file", most: Bound = TOML_BYTES) -> bytes:
+def read_bytes(path: AnyPath, what: str = "design file", most: Bound = TOML_BYTES) -> bytes:
     """The bytes of a regular file of bounded size.
 
     An InputError names the file and what is allowed.
@@ -136,16 +137,13 @@ def decode(data: bytes, where: str) -> str:
         raise InputError(f"byte {error.start} is not UTF-8; allowed: UTF-8 text", where=where) from None
 
 
-def read_text(path: str | PathLike[str], what: str = "design file", most: Bound = TOML_BYTES) -> str:
+def read_text(path: AnyPath, what: str = "design file", most: Bound = TOML_BYTES) -> str:
     """The text of a regular file of bounded size; as `read_bytes`, `decode`."""
     return decode(read_bytes(path, what, most), shown_path(path))
 
 
 def read_toml(
-    path: str | PathLike[str],
-    what: str = "design file",
-    size: Bound = TOML_BYTES,
-    values: Bound = TOML_VALUES,
+    path: AnyPath, what: str = "design file", size: Bound = TOML_BYTES, values: Bound = TOML_VALUES
 ) -> Tree:
     """The tree of a TOML file: size, encoding, syntax, depth, texts and integers checked.
 
@@ -154,12 +152,12 @@ def read_toml(
     return parse_toml(read_text(path, what, size), shown_path(path), size=size, values=values)
 
 
-def read_campaign_toml(path: str | PathLike[str]) -> Tree:
+def read_campaign_toml(path: AnyPath) -> Tree:
     """As `read_toml`, for campaign and record files, which list thousands of runs."""
     return read_toml(path, "campaign or record file", CAMPAIGN_BYTES, CAMPAIGN_VALUES)
 
 
-def read_json(path: str | PathLike[str], what: str = "report.json") -> Any:
+def read_json(path: AnyPath, what: str = "report.json") -> Any:
     """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
     where, text = shown_path(path), read_text(path, what, REPORT_BYTES)
     if not text.strip():

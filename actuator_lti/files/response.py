@@ -27,31 +27,19 @@ _COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # o
 
 @dataclass(frozen=True, eq=False)
 class RecordedResponse(Compared):
-    """A response as it was measured.
+    """A response as it was measured; arrays of shape (m,), NaN where something is not known."""
 
-    ``frequency_hz``, shape (m,): rising, above 0.
-    ``response``, shape (m,).
-    ``deviation``, shape (m,): root mean square of the complex error over the size of the value; not a number
-    where it is not known.
-    ``coherence``, shape (m,): ordinary coherence, 0 to 1; not a number where it is not known.
-    ``name``: of the file.
-    ``left_out``: rows without numbers, without coherence, or at 0 Hz.
-    ``radius``, shape (m,): of the circle about each value that holds the true one in 99 of 100 cases, over
-    the size of the value; not a number where the noise is not known. ``noise``: where it is from.
-    ``read_as``: how the columns of a file were taken. ``period_s``: sampling period of which it says that it
-    is; None where it says none.
-    """
-
-    frequency_hz: Floats
+    frequency_hz: Floats  # rising, above 0
     response: NDArray[np.complex128]
-    deviation: Floats
-    coherence: Floats
-    name: str
-    left_out: int = 0
+    deviation: Floats  # root mean square of the complex error over the size of the value
+    coherence: Floats  # ordinary coherence, 0 to 1
+    name: str  # of the file
+    left_out: int = 0  # rows without numbers, without coherence, or at 0 Hz
+    # Of the circle about each value that holds the true one in 99 of 100 cases, over the size of the value
     radius: Floats = field(default_factory=lambda: np.array(np.nan))
-    noise: str = ""
-    read_as: str = ""
-    period_s: float | None = None
+    noise: str = ""  # where the radius is from
+    read_as: str = ""  # how the columns of a file were taken
+    period_s: float | None = None  # sampling period of which it says that it is; None where it says none
 
     def refuse_other_period(self, loop: str, period_s: float | None) -> None:
         """Refuse data that say another sampling period than that of the loop, s."""

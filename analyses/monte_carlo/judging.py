@@ -30,14 +30,10 @@ Columns = Mapping[str, np.ndarray]
 
 @dataclass(frozen=True)
 class Judged:
-    """One requirement over many designs; arrays of shape (count,).
+    """One requirement over many designs; arrays of shape (count,)."""
 
-    ``value`` is the figure that is limited, the worst of the loops, NaN where there is none; ``distance``
-    that to the limit, positive where met, -inf where a loop is unstable or the figure is missing.
-    """
-
-    value: np.ndarray
-    distance: np.ndarray
+    value: np.ndarray  # the figure that is limited, the worst of the loops, NaN where there is none
+    distance: np.ndarray  # to the limit, positive where met; -inf: unstable, or the figure is missing
     passed: np.ndarray
 
 

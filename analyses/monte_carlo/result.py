@@ -99,18 +99,15 @@ _NONE = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class Sketch:
-    """Counts of the finite values by bins, and of those that are not finite.
+    """Counts of the finite values by bins, and of those that are not finite."""
 
-    ``dropped`` last bits a bin does not tell apart (0: every value is kept), ``keys`` are the occupied bins
-    in increasing order. Without a finite value minimum and maximum are infinities the wrong way round.
-    """
-
-    dropped: int = 0
-    keys: np.ndarray = field(default_factory=lambda: _NONE)
+    dropped: int = 0  # last bits that a bin does not tell apart (0: every value is kept)
+    keys: np.ndarray = field(default_factory=lambda: _NONE)  # occupied bins in increasing order
     counts: np.ndarray = field(default_factory=lambda: _NONE)
     missing: int = 0
     low: int = 0
     high: int = 0
+    # Without a finite value infinities the wrong way round
     minimum: float = math.inf
     maximum: float = -math.inf
 

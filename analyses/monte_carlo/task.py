@@ -170,17 +170,15 @@ def step_columns(step: StepCheck, population: Population) -> Arrays:
 
 @dataclass(frozen=True)
 class SampleTask:
-    """Figures of numbered samples of a design; goes to workers as it is.
-
-    ``load_Nm`` and ``time_figures`` (of their steps) are of the linear loops; ``step`` is a nonlinear one.
-    """
+    """Figures of numbered samples of a design; goes to workers as it is."""
 
     design: Design
     sampler: Sampler
+    # Of the linear loops
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
-    time_figures: bool = True
-    step: StepCheck | None = None
+    time_figures: bool = True  # of their steps
+    step: StepCheck | None = None  # a nonlinear one
 
     def __post_init__(self) -> None:
         known = variable_paths(self.design)

@@ -1,6 +1,7 @@
 """What a drive can do at each load torque: rate, acceleration, current; manoeuvres, and their bounds."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -58,7 +59,7 @@ def thermal_duty(design: Design, rms_current_A: float | None) -> float | None:
 
 def manoeuvres(
     design: Design, load_Nm: float, rate_rad_s: float, acceleration_rad_s2: float, settling_s: float
-) -> tuple[Manoeuvre, ...]:
+) -> Iterator[Manoeuvre]:
     """Simulate a step, a sine below the top rate, and a sawtooth at it, all at full deflection.
 
     Rate and acceleration: the largest of the output; ``settling_s``: of the linear loop.
@@ -68,7 +69,7 @@ def manoeuvres(
     travel = full / rate_rad_s if moves else 0.0
     swing = math.sqrt(full / acceleration_rad_s2) if turns else 0.0
     time = travel + 8.0 * swing + 4.0 * settling_s
-    result = [_manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None)]
+    yield _manoeuvre(design, "step to full deflection", commands.step(full), time, load_Nm, None)
     # angular frequencies at which a sine needs all of the rate, or of the acceleration
     bounds = [rate_rad_s / full] * moves + [math.sqrt(acceleration_rad_s2 / full)] * turns
     slow_hz = min(bounds, default=0.0) / (2.0 * math.pi)
@@ -79,8 +80,7 @@ def manoeuvres(
         chosen = tone(hz, design)
         period = chosen.ticks / chosen.cycles * design.controller.period_s  # two of them; the second counts
         sine, said = commands.sine(full, chosen.frequency_hz), f"{name} ({hz:.3g} Hz)"
-        result.append(_manoeuvre(design, said, sine, 2.0 * period, load_Nm, period))
-    return tuple(result)
+        yield _manoeuvre(design, said, sine, 2.0 * period, load_Nm, period)
 
 
 def _manoeuvre(

@@ -10,14 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.loops import Loops, assemble_loops
 from analyses.finite import finite
 from analyses.large_signal.tones import TANH_TOLERANCE, linear_steady_state
-from analyses.specification.capability import (
-    Capability,
-    Manoeuvre,
-    TorqueSpeedPlane,
-    capability,
-    manoeuvres,
-    torque_speed_plane,
-)
+from analyses.specification import capability
 from nonlinear import LIMITERS, Rows
 
 SMALLEST = 0.01  # of full deflection: the small-signal step, beside the design's own fractions
@@ -85,10 +78,10 @@ class Specification:
     """Figures for a specification sheet."""
 
     design: Design
-    capabilities: tuple[Capability, ...]  # one a load torque
+    capabilities: tuple[capability.Capability, ...]  # one a load torque
     steps: tuple[StepTime, ...]  # by load torque, then from small to full deflection
-    plane: TorqueSpeedPlane
-    manoeuvres: tuple[Manoeuvre, ...]  # by load torque
+    plane: capability.TorqueSpeedPlane
+    manoeuvres: tuple[capability.Manoeuvre, ...]  # by load torque
 
 
 def specification(design: AnyDesign, loops: Loops | None = None) -> Specification:
@@ -102,11 +95,11 @@ def specification(design: AnyDesign, loops: Loops | None = None) -> Specificatio
     loops = assemble_loops(design) if loops is None else loops
     settling_s = linear_steady_state(loops, np.array([1.0])).settling_ticks * design.controller.period_s
     loads = design.validation.loads_Nm
-    result = tuple(capability(design, load, settling_s) for load in loads)
+    result = tuple(capability.capability(design, load, settling_s) for load in loads)
     rates = [one.figures.output_rate_rad_s for one in result]
     pushes = [one.figures.acceleration_rad_s2 for one in result]
     times = step_times(design, min(rates), min(pushes), settling_s)
     each = zip(loads, rates, pushes, strict=True)
-    moves = tuple(move for at in each for move in manoeuvres(design, *at, settling_s))
+    moves = tuple(move for at in each for move in capability.manoeuvres(design, *at, settling_s))
     top = max(rates) * design.total_ratio
-    return Specification(design, result, times, torque_speed_plane(design, top), moves)
+    return Specification(design, result, times, capability.torque_speed_plane(design, top), moves)

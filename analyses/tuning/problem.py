@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES
 from actuator_lti.batch import Population, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of
@@ -22,14 +22,7 @@ from analyses.monte_carlo.judging import in_populations, judge, loop_columns, lo
 from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
-GAINS = (
-    "control.current.gain",
-    "control.current.integral_time",
-    "control.velocity.gain",
-    "control.velocity.integral_time",
-    "control.position.gain",
-    "control.position.integral_time",
-)
+GAINS = tuple(f"control.{loop}.{key}" for loop in LOOPS for key in ("gain", "integral_time"))
 SPAN = 50.0  # a gain may leave what it is and what the rules say by this factor
 MOST_FACTORS = 10
 PLENTY = 10.0  # relative distance beyond which the search does not look
@@ -38,17 +31,14 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 
 @dataclass
 class Problem:
-    """Requirements on the loops of a design, over the corners of its tolerances.
-
-    ``most`` designs may be looked at by a search, ``evaluations`` were so far. ``elements`` were added.
-    """
+    """Requirements on the loops of a design, over the corners of its tolerances."""
 
     design: Design
     requirements: tuple[Requirement, ...]
     variables: tuple[Variable, ...]
-    elements: tuple[Element, ...] = ()
-    most: int = MOST_DESIGNS
-    evaluations: int = 0
+    elements: tuple[Element, ...] = ()  # that were added
+    most: int = MOST_DESIGNS  # designs that a search may look at
+    evaluations: int = 0  # that were looked at so far
     # Of the variables: dotted keys; SI values from which a search begins, that the design has (of an added
     # element neutral ones), and ends of what may be set
     paths: tuple[str, ...] = field(init=False)

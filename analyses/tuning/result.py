@@ -1,6 +1,6 @@
 """What tuning returns; the tuned design once more, by certified margins and by nonlinear steps."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -67,19 +67,15 @@ class TradeOffPoint:
 
 @dataclass(frozen=True)
 class NonlinearCheck:
-    """A step of the tuned design in the nonlinear model, with every limit and friction.
-
-    ``settling_time_s`` is None where it does not stay within 2 % of the commanded angle; friction may leave
-    an error that no gain removes. ``limited`` names the limiters that acted, with their share of the time.
-    """
+    """A step of the tuned design in the nonlinear model, with every limit and friction."""
 
     corner: str
     amplitude_rad: float
     rise_time_s: float | None
     overshoot_percent: float
-    settling_time_s: float | None
-    final_error_percent: float
-    limited: str
+    settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
+    final_error_percent: float  # friction may leave one that no gain removes
+    limited: str  # the limiters that acted, with their share of the time
 
 
 @dataclass(frozen=True)
@@ -149,13 +145,13 @@ def hunting(tuned: Design) -> str:
     return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
-def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[NonlinearCheck, ...]:
+def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> Iterator[NonlinearCheck]:
     """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
     values = as_values(tuned, [f.path for f in problem.factors], points)
-    population, made = Population(tuned, values, len(names)), []
+    population = Population(tuned, values, len(names))
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):
@@ -164,5 +160,4 @@ def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> tuple[N
             limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
             overshoot, error = seen["overshoot"], seen["final_error"]
-            made.append(NonlinearCheck(corner, size, rise, overshoot, settling, error, limited))
-    return tuple(made)
+            yield NonlinearCheck(corner, size, rise, overshoot, settling, error, limited)

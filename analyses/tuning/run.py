@@ -15,17 +15,10 @@ from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Progress
 from analyses.monte_carlo.judging import in_populations, label
 from analyses.specification.requirements import RequirementVerdict
+from analyses.tuning import result
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
 from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, loop_requirements, problem_of
-from analyses.tuning.result import (
-    BindingRequirement,
-    GainSetting,
-    TuningResult,
-    confirm,
-    hunting,
-    nonlinear_checks,
-)
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
@@ -34,7 +27,7 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 
 def tune(
     design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress = None
-) -> TuningResult:
+) -> result.TuningResult:
     """Find gains that meet the requirements on loops over all corners of the tolerances.
 
     With the aim ``least-change`` those nearest to the design as it is (`analyses.tuning.least`); with
@@ -63,7 +56,7 @@ def tune(
         tell(len(tried), stages)
     problem, solution = max(tried, key=lambda one: one[1].slack)
     gains = _rounded(problem, solution, settings.aim) if settings.rounded else solution.gains
-    result = problem.exact_distances(gains[None, :], problem.all_corners)[0]
+    distances = problem.exact_distances(gains[None, :], problem.all_corners)[0]
     moved = {  # what did not move keeps its text and source
         item.path: float(value)
         for item, value in zip(problem.variables, gains, strict=True)
@@ -73,14 +66,14 @@ def tune(
     tuned = with_values(problem.design, moved)
     tuned = replace(tuned, name=f"{design.name}-tuned", requirements=stated)
     tell(len(choices) + 1, stages)
-    requirements = _binding(problem, gains, result, settings.aim)
-    confirmed = confirm(tuned, wanted, requirements)
+    requirements = tuple(_binding(problem, gains, distances, settings.aim))
+    confirmed = result.confirm(tuned, wanted, requirements)
     tell(len(choices) + 2, stages)
-    checks = nonlinear_checks(tuned, problem, result) if settings.check else ()
+    checks = tuple(result.nonlinear_checks(tuned, problem, distances)) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(stages, stages)
-    feasible = bool(result.min() >= 0.0) and all(v.passes for v in confirmed)
-    return TuningResult(
+    feasible = bool(distances.min() >= 0.0) and all(v.passes for v in confirmed)
+    return result.TuningResult(
         feasible=feasible,
         before=design,
         design=tuned,
@@ -91,12 +84,12 @@ def tune(
         checks=checks,
         trade_off=curve,
         evaluations=sum(one.evaluations for one, _ in tried),
-        notes=tuple(_notes(problem, gains, result, confirmed)),
+        notes=tuple(_notes(problem, gains, distances, confirmed)),
         aim=settings.aim,
         placed=problem.elements,
         confirmed=confirmed,
         spent=problem.spent,
-        hunting=hunting(tuned) if settings.check and feasible else "",
+        hunting=result.hunting(tuned) if settings.check and feasible else "",
     )
 
 
@@ -134,16 +127,17 @@ def _rounded(problem: Problem, solution: Solution, aim: Aim) -> Floats:
     return choices[best[int(np.argmax(whole))]]
 
 
-def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple[BindingRequirement, ...]:
+def _binding(
+    problem: Problem, gains: Floats, distances: Floats, aim: Aim
+) -> Iterator[result.BindingRequirement]:
     """Every requirement at its worst corner."""
-    smallest = float(result.min())
+    smallest = float(distances.min())
     enough = smallest >= RESERVE * (1.0 - _BINDS)
     if aim == "least-change":  # nothing binds a design that meets all as it came
         enough = smallest >= _BINDS or np.array_equal(gains, problem.present)
-    made = []
-    for requirement, distances in zip(problem.requirements, result.T, strict=True):
-        worst = int(np.argmin(distances))
-        relative, limit = float(distances[worst]), requirement.bound
+    for requirement, away in zip(problem.requirements, distances.T, strict=True):
+        worst = int(np.argmin(away))
+        relative, limit = float(away[worst]), requirement.bound
         distance = relative * requirement.size if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
         value = None if distance is None else limit + way * distance
@@ -151,17 +145,16 @@ def _binding(problem: Problem, gains: Floats, result: Floats, aim: Aim) -> tuple
         binds = relative <= smallest + _BINDS and not enough
         at = {factor.path: float(here) for factor, here in corner}
         about = (requirement.id, label(requirement), requirement.unit)
-        made.append(BindingRequirement(*about, value, limit, distance, relative, binds, at))
-    return tuple(made)
+        yield result.BindingRequirement(*about, value, limit, distance, relative, binds, at)
 
 
 def _settings(
     problem: Problem, before: Design, rules: RuleGains, tuned: Floats, rounded: Floats
-) -> Iterator[GainSetting]:
+) -> Iterator[result.GainSetting]:
     there, structure = set(paths_of(before)), Structure.of(problem.design)
     for path, exact, value in zip(problem.paths, map(float, tuned), map(float, rounded), strict=True):
         known, step = object_of(problem.design, path), step_of_gain(problem.design, path)
-        yield GainSetting(
+        yield result.GainSetting(
             path=path,
             unit=FIELDS[template_of(path)].unit(structure),
             before=parameter_value(before, path) if path in there else None,
@@ -175,11 +168,11 @@ def _settings(
 
 
 def _notes(
-    problem: Problem, gains: Floats, result: Floats, confirmed: tuple[RequirementVerdict, ...]
+    problem: Problem, gains: Floats, distances: Floats, confirmed: tuple[RequirementVerdict, ...]
 ) -> Iterator[str]:
     """What was missed, what was not looked at, what a certified margin does not bear out."""
-    if result.min() < 0.0:
-        missed = [r.id for k, r in enumerate(problem.requirements) if result[:, k].min() < 0.0]
+    if distances.min() < 0.0:
+        missed = [r.id for k, r in enumerate(problem.requirements) if distances[:, k].min() < 0.0]
         yield f"Cannot be met together, best compromise found misses: {', '.join(missed)}."
     yield (
         "Distances are the smallest over the nominal design and all corners of the tolerance box; a margin "

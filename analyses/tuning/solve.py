@@ -28,15 +28,11 @@ Functions = Callable[[Floats], Floats]
 
 @dataclass(frozen=True)
 class Solution:
-    """Gains (SI) and how far they stay from every limit.
-
-    ``slack`` is the smallest relative distance over all corners and requirements, negative where one is
-    missed; ``working`` are the corners that mattered.
-    """
+    """Gains (SI) and how far they stay from every limit."""
 
     gains: Floats
-    slack: float
-    working: Floats
+    slack: float  # smallest relative distance over all corners and requirements, negative where one is missed
+    working: Floats  # the corners that mattered
 
 
 Seeking = Callable[[Floats | None, Floats], Floats | None]
@@ -110,12 +106,10 @@ class Spent(Exception):
 
 @dataclass
 class Program:
-    """Functions of the coordinates with their central differences, all from one compiled batch.
-
-    ``goals`` and ``limits`` (if any): (candidates, coordinates) -> (candidates, functions).
-    """
+    """Functions of the coordinates with their central differences, all from one compiled batch."""
 
     problem: Problem
+    # (candidates, coordinates) -> (candidates, functions)
     goals: Functions
     limits: Functions | None = None
     seen: list[tuple[Floats, float]] = field(default_factory=list, repr=False)

@@ -24,16 +24,11 @@ SAMPLES = 240  # of a run, about
 
 @dataclass(frozen=True)
 class BenchSweep:
-    """An injected sweep of one loop.
-
-    ``frequency_hz``, shape (K,).
-    ``open_loop``, shape (K,): measured; NaN where every size met an event.
-    ``linear``, shape (K,).
-    """
+    """An injected sweep of one loop at K frequencies."""
 
     loop: str
     frequency_hz: Floats
-    open_loop: Complexes
+    open_loop: Complexes  # measured; NaN where every size met an event
     linear: Complexes
 
 

@@ -51,18 +51,13 @@ class StepShown:
 
 @dataclass(frozen=True)
 class MarginRun:
-    """A run beside a gain margin, started on its critical mode.
+    """A run beside a gain margin, started on its critical mode."""
 
-    ``gain``: factor on the loop gain.
-    ``factor``, ``found``: what the mode is predicted to be multiplied by over the run; found over predicted.
-    ``error``: of ``found``, by what two sizes of the run differ in and the tangent's stated error.
-    ``time_s``, ``amplitude``: amplitude of the mode, from 1.
-    """
-
-    gain: float
-    factor: float
-    found: float
-    error: float
+    gain: float  # factor on the loop gain
+    factor: float  # what the mode is predicted to be multiplied by over the run
+    found: float  # over predicted
+    error: float  # of what was found, by what two sizes of the run differ in and the tangent's stated error
+    # Amplitude of the mode, from 1
     time_s: Floats
     amplitude: Floats
 

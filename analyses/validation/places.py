@@ -31,14 +31,10 @@ from nonlinear.bench.operating_motion import may_stand, on_its_stand, on_the_ben
 
 @dataclass(frozen=True)
 class Bench:
-    """A drive on the bench in both writings.
+    """A drive on the bench in both writings."""
 
-    ``design``: what is simulated.
-    ``model``: what predictions are made of.
-    """
-
-    design: Design
-    model: Design
+    design: Design  # what is simulated
+    model: Design  # what predictions are made of
     _assembled: dict[tuple[Operating, bool], Loops] = field(default_factory=dict, init=False, repr=False)
     _setups: dict[str, LoopSetup] = field(default_factory=dict, init=False, repr=False)
     _tangents: dict[object, Tangent] = field(default_factory=dict, init=False, repr=False)

@@ -10,29 +10,20 @@ WITHIN = 1e-6  # of a value, a response, a margin
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """One prediction beside what the simulator shows of it.
+    """One prediction beside what the simulator shows of it."""
 
-    ``name``: quantity: ``"response"``, ``"gain_margin"``, ``"breakaway_torque"``, ...
-    ``loop``: stage, break point, ``"command"``, ``"load"``, or ``"drive"``.
-    ``unit``: of the predicted and found value.
-    ``predicted``, ``found``: ``None`` where the row judges more than one number (a response); ``because``
-    says which was worst.
-    ``error``, ``allowed``: difference, and the largest that is agreement; in ``unit``, relative where both
-    values are ``None``.
-    ``verdict``: ``met``, ``not met``, or ``not proven``: the simulator's own accuracy does not suffice.
-    ``condition``: on which motion.
-    """
-
-    name: str
-    loop: str
-    unit: str = ""
+    name: str  # quantity: "response", "gain_margin", "breakaway_torque", ...
+    loop: str  # stage, break point, "command", "load", or "drive"
+    unit: str = ""  # of the predicted and found value
+    # ``None`` where the row judges more than one number (a response); ``because`` says which was worst
     predicted: float | None = None
     found: float | None = None
+    # Difference, and the largest that is agreement; in ``unit``, relative where both values are ``None``
     error: float = 0.0
     allowed: float = 0.0
-    verdict: Verdict = Verdict.MET
+    verdict: Verdict = Verdict.MET  # not proven: the simulator's own accuracy does not suffice
     because: str = ""
-    condition: str = ""
+    condition: str = ""  # on which motion
 
     @property
     def key(self) -> tuple[str, str, str]:

@@ -19,19 +19,14 @@ FINDINGS: tuple[Finding, ...] = get_args(Finding)
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """What a validation looks at beside its checks; the defaults are those of the report.
+    """What a validation looks at beside its checks; the defaults are those of the report."""
 
-    ``own``: what the drive itself does: whether it comes to rest, and what large commands make of it.  The
-    verdict is that of the checks and of these.
-    ``findings``: of `FINDINGS`.
-    ``rest_frequencies``: of the sweep from rest.
-    ``map_counts``: amplitudes and frequencies of the large-signal map.
-    """
-
+    # What the drive itself does: whether it comes to rest, and what large commands make of it. The verdict is
+    # that of the checks and of these
     own: bool = True
     findings: tuple[Finding, ...] = FINDINGS
-    rest_frequencies: int = 16
-    map_counts: tuple[int, int] = (17, 28)
+    rest_frequencies: int = 16  # of the sweep from rest
+    map_counts: tuple[int, int] = (17, 28)  # amplitudes and frequencies of the large-signal map
 
 
 QUICK = Settings(findings=())

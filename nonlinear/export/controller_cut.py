@@ -53,15 +53,12 @@ def controller_start(p, s):  # type: ignore[no-untyped-def]
 
 @dataclass(frozen=True, kw_only=True)
 class Controller:
-    """The controller of a design as C in double precision.
-
-    ``p``: the parameters of the design with all that is derived from them.
-    ``state``, ``measured``, ``out``: what it remembers, is given and gives.
-    """
+    """The controller of a design as C in double precision."""
 
     design: Design
-    p: Floats
+    p: Floats  # the parameters of the design with all that is derived from them
     program: Program
+    # What it remembers, is given and gives
     state: Struct
     measured: Struct
     out: Struct

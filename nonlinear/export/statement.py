@@ -18,16 +18,13 @@ class Statement:
 
     Where another outcome of a condition is followed too, a branch with its end stands for the condition;
     each way ends with all being allowed, or a refusal.
-
-    ``target``: number of the value, or place in the row; of a condition or branch 1 where it has to hold,
-    else 0.
-    ``does``: a sign between two terms, the name of a function of the C library, ``where`` (condition,
-    yes, no), ``zero_below`` (value, least), or empty for the term itself.  Of a refusal: its words, the
-    form of ``printf`` where a term is shown.
     """
 
     kind: Literal["value", "condition", "store", "branch", "end", "allowed", "refusal"]
-    target: int = 0
+    target: int = 0  # number of the value, place in the row; of a condition or branch 1 where it has to hold
+    # A sign between two terms, the name of a function of the C library, `where` (condition, yes, no),
+    # `zero_below` (value, least), or empty for the term itself; of a refusal its words, the form of `printf`
+    # where a term is shown
     does: str = ""
     terms: tuple[Term, ...] = ()
 

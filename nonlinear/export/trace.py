@@ -24,15 +24,10 @@ from nonlinear.row.parameters import design_row
 
 @dataclass
 class Tape:
-    """Statements in the order in which they were made.
+    """Statements in the order in which they were made."""
 
-    Where the statements are ``interpreted``, the whole number below a value and the outcome of a comparison
-    are values too; else they are conditions.  Where they are ``loose``, a message may show a value, a
-    remainder is a value, and every value is known to be finite.
-    """
-
-    interpreted: bool = False
-    loose: bool = False
+    interpreted: bool = False  # a whole number below a value, a comparison's outcome: values, not conditions
+    loose: bool = False  # a message may show a value, a remainder is one, and every value is finite
     statements: list[Statement] = field(default_factory=list)
     count: int = 0
 
@@ -163,10 +158,7 @@ class Traced:
 
 @dataclass(frozen=True, kw_only=True)
 class Key:
-    """One numeric key of a design as a parameter, in SI; ``whole``: a count.
-
-    ``fixed``: only before the run begins, because the state's shape or clock depends on it.
-    """
+    """One numeric key of a design as a parameter, in SI."""
 
     path: str
     value: float
@@ -174,8 +166,8 @@ class Key:
     description: str
     low: float
     high: float
-    whole: bool = False
-    fixed: bool = False
+    whole: bool = False  # a count
+    fixed: bool = False  # only before the run begins, because the state's shape or clock depends on it
 
 
 @dataclass(frozen=True)

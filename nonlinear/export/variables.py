@@ -25,10 +25,7 @@ Causality = Literal["input", "output", "parameter", "local", "independent"]
 
 @dataclass(frozen=True, kw_only=True)
 class Variable:
-    """One variable; ``start`` is None where it is calculated, ``unit`` ``"1"`` where there is none.
-
-    ``shown`` is the unit that a host shows it in, ``nominal`` its size in use; ``""`` and None: not said.
-    """
+    """One variable."""
 
     name: str
     reference: int
@@ -36,10 +33,10 @@ class Variable:
     variability: str
     description: str
     kind: Literal["real", "integer", "boolean", "string"] = "real"
-    unit: str = "1"
-    shown: str = ""
-    nominal: float | None = None
-    start: float | str | None = None
+    unit: str = "1"  # where there is none
+    shown: str = ""  # unit that a host shows it in, where that is said
+    nominal: float | None = None  # its size in use, where that is known
+    start: float | str | None = None  # None where it is calculated
     low: float = -math.inf
     high: float = math.inf
 

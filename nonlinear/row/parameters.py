@@ -281,7 +281,7 @@ def _command(design: Design, row: Floats) -> None:
     """Profile and filter of the command, at the period of the outermost stage."""
     command, control = design.command, design.controller
     outermost = control.outermost
-    period = row[at.PERIOD] * (row[at.EVERY_POSITION] if control.position else row[at.EVERY_VELOCITY])
+    period = control.period_of(outermost)
     limits: list[Any] = [command.rate_rad_s, command.acceleration_rad_s2, command.jerk_rad_s3]
     limited = any(_somewhere(limit < inf) for limit in limits)
     if outermost in ("current", "voltage") and limited:

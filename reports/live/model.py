@@ -14,6 +14,7 @@ from actuator_lti.asked.quantities import (
 )
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.plant import reachable_speed
+from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
@@ -30,6 +31,7 @@ from reports.sections.limits import COLOURS, WORDS
 from reports.sections.requirements import limit_words
 
 CONTACT = 'The coupling of the loops is in contact, its torque in the direction of motion ("driving").'
+MEAN = "Bandwidth and step of the position loop are those behind the mean of the command's profile."
 MAP = "The friction of the loops has the slope of the first piece of its map."
 OPEN = "The drive has no loop."
 COLUMNS, LEVELS = 18, 12  # cells of the map
@@ -94,6 +96,7 @@ def _column(of: Quantity) -> Tree:
 def _point(design: Design, held: Collection[str]) -> str:
     """Say at which operating point the loops of the page are linear, where there is a choice."""
     words = [CONTACT] * (design.coupling is not None) + [MAP] * bool(design.friction.points)
+    words += [MEAN] * (command_mean(design) is not None)
     words += [f"The load drives the {name} loop away by itself; the report judges it held." for name in held]
     return " ".join(words)
 

@@ -254,7 +254,7 @@ def test_more_unstable_poles_than_collocation_found_are_counted() -> None:
 
 
 def test_a_loop_below_the_resolution_of_the_search_is_nearest_where_it_is_real() -> None:
-    """1e-9/(s + 1) behind 1 s: w + arctan w = pi, there |1 + L| = 1 - |L|; not "1 at an infinite frequency"."""
+    """1e-9/(s + 1) behind 1 s: w + arctan w = pi, there |1 + L| = 1 - |L|; not "1 at infinity"."""
     result = stability_margins(control.tf([1e-9], [1.0, 1.0]), delay_s=1.0)
     w = brentq(lambda x: x + np.arctan(x) - np.pi, 1.0, 3.0)
     assert result.modulus_frequency_rad_s == pytest.approx(w, rel=1e-9)

@@ -10,10 +10,13 @@ from live_page import AMBER, FIGURES, agree, command_line, verdicts_agree
 from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import load_design, parameter_value, shipped_designs, with_values
+from actuator_lti.design.access import paths_of
 from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
+from nonlinear.export.trace import Tape, reached
 from reports.live.model import live_model
+from tests.validation.random_drives import full_drive
 
 ASKED = (
     ("output_rate", "deg/s", 60.0, 20.0),
@@ -32,6 +35,7 @@ POINTS = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, tor
 DESIGNS = {name: load_design(name) for name in shipped_designs()} | {
     "with a friction map": replace(AMBER, name="mapped", friction=Friction(points=POINTS)),
     "with requirements on the whole drive": replace(load_design("fin"), requirements=WHOLE_DRIVE),
+    "with a filter of the command": with_values(AMBER, {"command.filter_time": 2e-3}),
 }
 CHANGES = {  # in the units of the page
     "ilr33-amber": {"control.position.gain": 140.0, "control.computing_delay": 137.5,
@@ -45,6 +49,7 @@ CHANGES = {  # in the units of the page
     "ilr33-amber-tanh": {"friction.viscous": 2e-6},
     "joint": {"coupling.stiffness": 40000.0, "load.inertia": 2.0, "limits.peak_current": 11.0},
     "with a friction map": {"control.velocity.gain": 0.156},
+    "with a filter of the command": {"control.position.gain": 140.0, "command.filter_time": 3e-3},
     "with requirements on the whole drive": {
         "motor.resistance": 1.7, "load.inertia": 1.2e-3, "coupling.play": 3.0, "limits.voltage": 22.4,
         "friction.load_coefficient": 5.1},
@@ -54,9 +59,9 @@ CHANGES = {  # in the units of the page
 @pytest.mark.parametrize("name", sorted(DESIGNS))
 def test_figures_are_those_of_margins_on_the_saved_file(name: str, opens, tmp_path) -> None:
     """Every design, requirements on rate, current, acceleration, torque margin and lost motion among them."""
-    page = opens(DESIGNS[name])
+    page, filtered = opens(DESIGNS[name]), DESIGNS[name].command.filter_time_s > 0.0
     assert page.evaluate("document.documentElement.scrollHeight") <= 6 * 900  # six screens open
-    agree(page.read(), command_line(page.saved(tmp_path / "same.toml")))
+    agree(page.read(), command_line(page.saved(tmp_path / "same.toml")), filtered)
     verdicts_agree(page, command_line(tmp_path / "same.toml", "requirements"))
     values = ("table.demands tbody tr", "(all) => all.map((row) => row.dataset.value)")
     before, judged = page.read(), page.eval_on_selector_all(*values)
@@ -66,13 +71,21 @@ def test_figures_are_those_of_margins_on_the_saved_file(name: str, opens, tmp_pa
     assert "Refused" not in page.inner_text(".state")
     changed = page.saved(tmp_path / "changed.toml")
     assert page.read() != before
-    agree(page.read(), command_line(changed))
+    agree(page.read(), command_line(changed), filtered)
     verdicts_agree(page, command_line(changed, "requirements"))
     for key in CHANGES[name]:
         assert parameter_value(load_design(changed), key) != parameter_value(DESIGNS[name], key)
     moved = [a != b for a, b in zip(judged, page.eval_on_selector_all(*values), strict=True)]
     assert "whole drive" not in name or all(moved)
     assert "friction map" not in name or "first piece" in page.inner_text("#hands-on")
+    assert ("behind the mean" in page.inner_text("#hands-on")) is (name == "ballscrew")
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_every_key_of_any_drive_is_followed_but_the_seed_of_its_noise(seed: int) -> None:
+    design = full_drive(seed)
+    unknown = {path for path in paths_of(design) if reached(design, path, Tape(interpreted=True)) is None}
+    assert unknown <= {"instruments.seed"}
 
 
 def test_periodic_break_points_follow_once_nothing_moves(opens) -> None:
