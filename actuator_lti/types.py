@@ -17,7 +17,7 @@ Progress = Callable[[int, int], None] | None
 """Called with (done, total) while long work goes on; None: nobody looks on."""
 
 
-def number_array(given: Any) -> Real:
+def number_array(given: Any) -> Floats:
     """Numbers of any shape as floats.
 
     A TypeError or ValueError for what is none, and for text, which numpy would read.
