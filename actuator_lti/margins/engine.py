@@ -38,7 +38,8 @@ def stability_margins(
     margin (0 for an unstable loop), the smallest distance to -1.
 
     ``system``: the open loop L, one input and one output, continuous or sampled: StateSpace,
-    TransferFunction, `DelaySystem` or FrequencyResponseData. With ``dt=True`` the period counts as 1 s.
+    TransferFunction (of scipy.signal too), `DelaySystem` or FrequencyResponseData. With ``dt=True`` the
+    period counts as 1 s.
     Measured data give bounds between neighbouring points and no verdict.
 
     ``delay_s``: exact extra delay in series. In a sampled loop whole samples become states; part of a sample

@@ -61,7 +61,8 @@ def step_figures(system: Any) -> StepFigures:
     samples. A system with inner delays is walked along its first delays, and is then the free motion of its
     exact poles. All figures are relative to the final value, however small it is beside what comes before.
 
-    ``system``: a closed loop, one input, one output: StateSpace, TransferFunction or DelaySystem.
+    ``system``: a closed loop, one input, one output: StateSpace, TransferFunction (of
+    scipy.signal too) or DelaySystem.
 
     Raises `InputError`: the system is not stable, its final value is zero, or it is measured data; or a
     direct feed-through with a delay that is no plain shift: one in a loop or beside another path. Raises

@@ -33,8 +33,8 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by
     -180 deg, as a damped one does.
 
-    ``system``: StateSpace, TransferFunction, DelaySystem or FrequencyResponseData of one input and one
-    output, continuous or sampled. Measured data have no factors: their phase is followed from point to point,
+    ``system``: StateSpace, TransferFunction (of scipy.signal too), DelaySystem or FrequencyResponseData of
+    one input and one output, continuous or sampled. Measured data have no factors: their phase is followed from point to point,
     from between -180 and 180 deg at the first, straight over log frequency.
     ``omega_rad_s``: angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured
     data within their band), any order, any shape, which is that of the result.
