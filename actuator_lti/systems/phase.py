@@ -34,8 +34,8 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     -180 deg, as a damped one does.
 
     ``system``: StateSpace, TransferFunction (of scipy.signal too), DelaySystem or FrequencyResponseData of
-    one input and one output, continuous or sampled. Measured data have no factors: their phase is followed from point to point,
-    from between -180 and 180 deg at the first, straight over log frequency.
+    one input and one output, continuous or sampled. Measured data have no factors: their phase is followed
+    from point to point, from between -180 and 180 deg at the first, straight over log frequency.
     ``omega_rad_s``: angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured
     data within their band), any order, any shape, which is that of the result.
     ``delay_s``: exact delay in series, s.
