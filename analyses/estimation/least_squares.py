@@ -124,17 +124,25 @@ def events_of(w: Floats, noise: Floats) -> Information:
 
     Root n blocks of root n rows each, whatever their own sizes, each left out in turn: ``W'W`` times what the
     values then move by takes the place of its sum of ``w e`` (jackknife; Bell and McCaffrey, Survey
-    Methodology 28, 2002), as one event bends the values towards itself. The noise may be that of the first
-    rows only.
+    Methodology 28, 2002), as one event bends the values towards itself.
     """
     size = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
-    rows = np.column_stack([w[: len(noise)] / size, noise])
-    parts = np.array_split(rows, max(int(np.sqrt(len(noise))), 2))
+    parts = np.array_split(np.column_stack([w / size, noise]), max(int(np.sqrt(len(noise))), 2))
     tables = np.array([part.T @ part for part in parts])
     gram, own, sums = np.sum(tables, axis=0)[:-1, :-1], tables[:, :-1, :-1], tables[:, :-1, -1]
     moved = np.linalg.pinv(gram - own, hermitian=True) @ sums[:, :, None]
-    sums = size * (gram @ moved)[:, :, 0] * np.sqrt(len(w) / len(noise) * (1.0 - 1.0 / len(parts)))
+    sums = size * (gram @ moved)[:, :, 0] * np.sqrt(1.0 - 1.0 / len(parts))
     return Information(gram=w.T @ w, noise=sums.T @ sums, rows=len(w), order=0)
+
+
+def wider_covariance(records: Sequence[tuple[Floats, Floats]]) -> Floats:
+    """Covariance from the rows and noise of each record, of a steady noise or of events.
+
+    Each value has the larger error of the two: few blocks hold what tells it, and at times little of a noise.
+    """
+    steady, single = (covariance_of([of(*each) for each in records]) for of in (information_of, events_of))
+    grown = np.sqrt(np.maximum(np.diag(steady) / np.maximum(np.diag(single), 1e-300), 1.0))
+    return np.asarray(single * np.outer(grown, grown))
 
 
 def covariance_of(records: Sequence[Information]) -> Floats:

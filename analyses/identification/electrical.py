@@ -11,11 +11,10 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import (
-    covariance_of,
-    events_of,
     scaled_lstsq,
     solve,
     told_apart,
+    wider_covariance,
 )
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
@@ -89,7 +88,7 @@ def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ..
     return ElectricalFit(
         names=names,
         values=result.values,
-        covariance=covariance_of([events_of(*each) for each in told]) + np.outer(moved, moved) / 3.0,
+        covariance=wider_covariance(told) + np.outer(moved, moved) / 3.0,
         fixed={one.name: Fixed(value=0.0, reason=str(one)) for one in left},
         relative_residual=float(np.linalg.norm(result.residual) / np.linalg.norm(u)),
         columns=names,
@@ -160,11 +159,11 @@ def without_own_bias(
     told = []
     for measured, modelled in zip(own, other, strict=True):
         (_, rest), (z, like) = _residual(measured, columns, values), _residual(modelled, columns, again)
-        told.append(events_of(z, rest - like))
+        told.append((z, rest - like))
     return replace(
         fit,
         values=values[picked] - bias,
-        covariance=covariance_of(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
+        covariance=wider_covariance(told)[np.ix_(picked, picked)] + np.outer(fit.at_once, fit.at_once) / 3.0,
         bias=dict(zip(fit.names, bias.tolist(), strict=True)),
     )
 

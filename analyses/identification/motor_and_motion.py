@@ -114,13 +114,19 @@ def _found(
     if not settings.electrical:
         return Found(start=plain, electrical=None, right=moved(plain))
     start, found = by_voltage(plain, records, recipe)
+    right = moved(start)
     for _ in range(ROUNDS):
-        before, right = found, moved(start)
+        before, model = found, right.model
         start, found = by_voltage(plain, records, recipe, (start, right))
-        off = [abs(found[n] - before[n]) - SETTLED * found.std(n) for n in found.names if n in before.names]
-        if found.names == before.names and max(off) < 0.0:
+        right = moved(start)
+        if _settled(before, found) and _settled(model, right.model):
             break
     return Found(start=start, electrical=found, right=right)
+
+
+def _settled(before: Fit, found: Fit) -> bool:
+    off = [abs(found[name] - before[name]) < SETTLED * found.std(name) for name in found.names]
+    return found.names == before.names and all(off)
 
 
 def by_voltage(

@@ -13,7 +13,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.driving import SMOOTH, command_of
 from analyses.estimation.fit import Fit
-from analyses.estimation.least_squares import covariance_of, events_of, information_of, scaled_lstsq
+from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq, wider_covariance
 from analyses.estimation.parameters import default_value
 from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
@@ -88,13 +88,15 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         told += "; the intervals hold it"
         return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
     parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
-    weighed = [(g * part.w, g * part.noise) for g, part in zip(model.weights, parts, strict=True)]
+    pairs = zip(model.weights, parts, strict=True)
+    weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, part in pairs]
+    share = sum(len(noise) for _, noise in weighed) / model.rows_used  # of a long record the first part
     moved = _by_direction(model, again)
     singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
         model,
         values=model.values - bias,
-        covariance=covariance_of([events_of(*each) for each in weighed]) + np.outer(moved, moved),
+        covariance=share * wider_covariance(weighed) + np.outer(moved, moved),
         records=parts,
         alone=tuple(_alone(*each, made, model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},

@@ -8,7 +8,7 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.design import load_design, parameter_value, with_values, write_design
-from analyses.estimation.least_squares import between_records, solve
+from analyses.estimation.least_squares import between_records, covariance_of, events_of, scaled_lstsq, solve
 from analyses.records.open_record import open_records
 from nonlinear import commands, simulate
 from reports.document import load
@@ -269,3 +269,17 @@ def test_a_design_in_the_place_of_a_record_is_named(sixteen, cli) -> None:
     status, _, err = cli("correlate", sixteen.with_name("60_0.0002_1.csv"), file)
     assert status == 2
     assert "a table of numbers, TOML is wanted: a record, and no design?" in err
+
+
+def test_one_event_is_in_the_errors_as_if_its_block_were_left_out() -> None:
+    """By fits without one block each: an event bends the values towards itself."""
+    rng = np.random.default_rng(2)
+    w = np.column_stack([rng.standard_normal(400), 1e4 * np.ones(400)])
+    y = w @ [2.0, 3e-4] + 1e-3 * rng.standard_normal(400)
+    y[45:50] += 20.0
+    values = scaled_lstsq(w, y)
+    without = [np.delete(np.arange(400), block) for block in np.array_split(np.arange(400), 20)]
+    moved = [scaled_lstsq(w[rows], y[rows]) - values for rows in without]
+    found = covariance_of([events_of(w, y - w @ values)])
+    assert found == pytest.approx(400 / 398 * 19 / 20 * np.transpose(moved) @ moved, rel=1e-6)
+    assert np.all(np.abs(values - [2.0, 3e-4]) < 1.1 * np.sqrt(np.diag(found)))
