@@ -23,7 +23,7 @@ from actuator_lti.measured.response import (
     scatter_of_repeats,
     student,
 )
-from actuator_lti.types import Floats
+from actuator_lti.types import Compared, Floats
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
@@ -32,8 +32,8 @@ NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
 _COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # one value a row
 
 
-@dataclass(frozen=True)
-class RecordedResponse:
+@dataclass(frozen=True, eq=False)
+class RecordedResponse(Compared):
     """A response as it was measured; arrays of shape (m,), NaN where something is not known."""
 
     frequency_hz: Floats  # rising, above 0

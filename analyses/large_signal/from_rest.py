@@ -21,14 +21,14 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.operating import Operating, rubs
+from actuator_lti.drive.operating import Operating, level, rubs
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.loops.sampled import reference_to_output
-from actuator_lti.types import Complexes, Floats
+from actuator_lti.types import Compared, Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of, tone
 from analyses.linear.responses import response_at
@@ -40,8 +40,8 @@ NO_MOTION = 1e-3  # of the command
 UPDATES = 400  # of the position loop in a window
 
 
-@dataclass(frozen=True)
-class RestSweep:
+@dataclass(frozen=True, eq=False)
+class RestSweep(Compared):
     """Response from rest, one entry a frequency."""
 
     # Shape (K,): command at the output shaft, peak
@@ -216,8 +216,10 @@ class _Release:
     ) -> None:
         design, closed = bench.drive, bench.figures[name].loop.plain_closed
         self.kind, self.part, self.sizes = kind, part, full_range(design)
-        still = OperatingMotion(0.0, 0.0, 0.0, friction_on)
-        self.setup = replace(bench.setup(name), bias=still, limits_on=True, held=False)
+        setup, still = bench.setup(name), OperatingMotion(0.0, 0.0, 0.0, friction_on)
+        # with the loops around it open, gravity or a spring would swing the drive whatever this loop does
+        own = level(setup.design) if setup.outer != design.controller.outermost else setup.design
+        self.setup = replace(setup, design=own, bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
         settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
         travel, cycle = ceil(1.3 * _travel_s(design, name, part) / tick_s), 1.0 / (hertz * tick_s)

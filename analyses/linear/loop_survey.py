@@ -56,7 +56,7 @@ class OperatingPointFigures:
 
     kind: OperatingPoint  # as `actuator_lti.assemble_loops` names it
     label: str
-    load_Nm: float | None  # ``None`` where it makes no difference
+    load_Nm: float | None  # ``None``: that asked for, which makes a difference to a spring that bends only
     slope_Nms_rad: float  # slope of the friction torque over the motor speed
     figures: Mapping[str, LoopFigures]
     load_unit: str = "N m"
@@ -170,19 +170,20 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 
 
 def operating_points(
-    design: Design, refused: list[str], *, described: bool = True, certify: bool = True
+    design: Design, refused: list[str], load_Nm: float = 0.0, *, described: bool = True, certify: bool = True
 ) -> tuple[OperatingPointFigures, ...]:
     """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
 
-    ``refused`` gets the loops whose margins are not found, and why; ``described``: friction described at
-    small speeds as well; ``certify``: margins by exact arithmetic.
+    ``refused`` gets the loops whose margins are not found, and why; ``load_Nm``: at the output, of the points
+    that are not told at a load: it chooses the piece of a spring that bends; ``described``: friction
+    described at small speeds as well; ``certify``: margins by exact arithmetic.
     """
     linear = design.axis == "linear"
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
     ) -> OperatingPointFigures:
-        at = Operating(point=kind, load_Nm=load or 0.0, speed_amplitude_rad_s=speed)
+        at = Operating(point=kind, load_Nm=load_Nm if load is None else load, speed_amplitude_rad_s=speed)
         slope, loops = slope_at(design, at), loops_at(design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
         return OperatingPointFigures(kind, label, load, slope, figures, "N" if linear else "N m")

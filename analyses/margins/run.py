@@ -219,17 +219,23 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
         around[outer.name] = loop_figures(loop_around(loops, outer), step=step, certify=True)
     measured = measured_if_asked(loops, asked.response, asked.response_of, asked.averages)
     figures = all_loop_figures(loops, step=step, certify=True, locked=True)
-    usual = (asked.form, asked.operating_point) == ("sampled", "sliding")
     return Margins(
         design=design,
         asked=asked,
         loops=figures,
-        requirements=evaluate_requirements(design, figures if usual else None),
+        requirements=evaluate_requirements(design, figures if as_judged(design, asked) else None),
         around=around,
-        operating_points=tuple(operating_points(design, [], described=False, certify=False)),
+        operating_points=tuple(operating_points(design, [], asked.load_Nm, described=False, certify=False)),
         measured=measured,
         by_cogging=_by_cogging(loops, figures),
     )
+
+
+def as_judged(design: Design, asked: Asked) -> bool:
+    """Whether the loops asked for are those that requirements are judged on."""
+    bends = design.coupling is not None and len(design.coupling.pieces) > 1
+    usual = (asked.form, asked.operating_point) == ("sampled", "sliding")
+    return usual and not (bends and asked.load_Nm)
 
 
 def _by_cogging(loops: Loops, figures: Mapping[str, LoopFigures]) -> tuple[str, ...]:

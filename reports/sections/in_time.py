@@ -136,15 +136,14 @@ def remarks(items: Sequence[AmplitudeMargin]) -> list[str]:
 
 def remark(item: AmplitudeMargin) -> str:
     value, linear = _text(item.value or 0.0, item), _text(item.linear, item)
-    varied = {"gain": f"its gain is raised by {value}", "delay": f"a delay of {value}"}[item.kind]
-    cause = "as designed" if _already(item) else f"if {varied} or more" + " is added" * (item.kind == "delay")
-    size = f" of {output_unit(item.axis).of(item.output, 2)} at the output" if item.output > 0.0 else ""
-    quiet = "" if item.friction_on else ", without dry friction,"
+    varied = {"gain": f"With its gain {value} higher", "delay": f"With {value} more delay"}[item.kind]
+    size = f" by {output_unit(item.axis).of(item.output, 2)} at the output" if item.output > 0.0 else ""
+    quiet = "" if item.friction_on else ", without dry friction"
     acting = f" The {words_of(item.limiter)} acts." if item.limiter else ""
     return (
-        f"The {item.loop} loop{quiet} sustains an oscillation{size} {cause}, started from "
-        f"{100.0 * item.part:.0f} % of full range; the linear {item.kind} margin on the validation's "
-        f"operating motion is {linear}.{acting}"
+        f"{'As designed' if _already(item) else varied}{quiet}, the {item.loop} loop keeps oscillating{size} "
+        f"once let go from {100.0 * item.part:.0f} % of full range.{acting} Its linear {item.kind} margin, "
+        f"as validated, is {linear}."
     )
 
 

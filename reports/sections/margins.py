@@ -11,7 +11,7 @@ from actuator_lti.margins.single import DelayMargin, GainMargin, PhaseMargin
 from analyses.finite import finite
 from analyses.linear.loop_figures import HELD, LoopFigures
 from analyses.linear.loop_survey import AT_REST, OperatingPointFigures, at_rest
-from analyses.margins.run import Margins
+from analyses.margins.run import Margins, as_judged
 from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
@@ -103,8 +103,8 @@ def section(result: Margins) -> list[doc.Section]:
     made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
     said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}{_hold(result)}. {judged['result']}"
-    if result.requirements and (result.asked.form, result.asked.operating_point) != ("sampled", "sliding"):
-        said += " Judged on the sampled loops with sliding friction."
+    if result.requirements and not as_judged(result.design, result.asked):
+        said += " Judged on the sampled loops with sliding friction, without a load."
     return [{**made, "result": said + _below_custom(result)}, judged]
 
 

@@ -21,8 +21,8 @@ from reports.verdict_summary import gathered
 from tests.changed import changed
 
 AS_IT_IS = (
-    "The position loop, without dry friction, sustains an oscillation as designed, started from 2 %% of full "
-    "range; the linear %s margin on the validation's operating motion is %s."
+    "As designed, without dry friction, the position loop keeps oscillating once let go from 2 %% of full "
+    "range. Its linear %s margin, as validated, is %s."
 )
 SMALL = {"size": "small", "part": 0.02, "friction_on": False, "limiter": ""}
 LARGE = {"size": "large", "part": 0.5, "friction_on": True, "limiter": "current", "output": 4.7e-5}
@@ -113,9 +113,9 @@ def test_findings_come_from_the_sections_gravest_first_once_and_in_turns() -> No
     ("more", "said"),
     [
         ({**LARGE, "kind": "gain", "value": 2.0},
-         "The position loop sustains an oscillation of 0.0027 deg at the output if its gain is raised by "
-         "6.02 dB or more, started from 50 % of full range; the linear gain margin on the validation's "
-         "operating motion is 20 dB. The current limit acts."),
+         "With its gain 6.02 dB higher, the position loop keeps oscillating by 0.0027 deg at the output once "
+         "let go from 50 % of full range. The current limit acts. Its linear gain margin, as validated, is "
+         "20 dB."),
         ({**SMALL, "kind": "gain", "value": 1.0}, AS_IT_IS % ("gain", "20 dB")),
         ({**SMALL, "kind": "delay", "value": 1e-5}, AS_IT_IS % ("delay", "1 ms")),
     ],

@@ -10,6 +10,7 @@ import pytest
 
 from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.design import load_design, with_values
+from actuator_lti.design.model import Coupling
 from analyses.large_signal.result import LimitShift
 from analyses.limit_cycles import LimitCycles
 from analyses.linear.loop_figures import all_loop_figures
@@ -108,8 +109,22 @@ def test_requirements_beside_other_loops_say_on_which_they_are_judged(point: str
     """At rest under 8 N m the loop has 3.6 dB and 5.3 deg; sliding, as it is judged, 27 dB and 75 deg."""
     slow = ["--set", "control.position.integral_time=0.12 s"]
     said = cli.text("margins", "ilr33-amber", *slow, "--operating-point", point, "--load", "8")
-    wanted = "12 of 12 requirements met. Judged on the sampled loops with sliding friction."
+    wanted = "12 of 12 requirements met. Judged on the sampled loops with sliding friction, without a load."
     assert (wanted in " ".join(said.split())) is other
+
+
+def test_all_that_is_said_sliding_is_of_one_load_where_that_bends_a_spring() -> None:
+    """Requirements beside it are those of the piece without a load, K1; the load presses it onto K3."""
+    keys = {"coupling.torque_1": 14.0, "coupling.stiffness_2": 3.5e4, "coupling.torque_2": 48.0}
+    design = load_design("joint").with_values({**keys, "coupling.stiffness_3": 6e4})
+    found = margins(design, MarginsAsked(load_Nm=60.0))
+    stiff = margins(replace(design, coupling=Coupling(stiffness_Nm_rad=6e4, damping_Nms_rad=11.0)))
+    for loops in (found.loops, found.operating_points[0].figures):
+        one, other = (each["position"].margins.gain_margin_db for each in (loops, stiff.loops))
+        assert one == pytest.approx(other, rel=1e-9)
+    judged, plain = ([one.value for one in each.requirements] for each in (found, margins(design)))
+    assert judged == pytest.approx(plain, rel=1e-9)
+    assert "with sliding friction, without a load." in brief(found).words
 
 
 def test_a_loop_that_is_known_to_be_unstable_is_said_to_be() -> None:

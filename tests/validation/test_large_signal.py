@@ -10,7 +10,7 @@ from actuator_lti.design import load_design, with_values
 from actuator_lti.drive.operating import rubs
 from analyses import amplitude_map, large_signals, sawtooth
 from analyses.large_signal.classify import FULL_TRIANGLE, rate_limited
-from analyses.large_signal.from_rest import TOO_MANY, margins_by_amplitude
+from analyses.large_signal.from_rest import CLOSE, TOO_MANY, margins_by_amplitude
 from analyses.large_signal.map import MINUS_3DB, AmplitudeBode, _crossing, amplitude_bode, crossing_range
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.validation.places import Bench
@@ -187,6 +187,15 @@ def test_a_way_back_of_hours_is_not_simulated() -> None:
     assert len(found) == 24  # its friction is a map: with it and without
     assert all(one.too_long and one.value is None for one in found)
     assert TOO_MANY * drive.controller.period_s < 900.0  # 12 values and more
+
+
+def test_an_arm_that_falls_while_outer_loops_are_open_takes_no_margin_of_an_inner_loop() -> None:
+    """A small deviation without dry friction finds the linear margins; the delay margin was 0."""
+    level = load_design("joint").with_values({"load.gravity.offset": "90 deg"})
+    found = [one for one in margins_by_amplitude(Bench(level, level)) if one.size == "small"]
+    inner = [one for one in found if one.loop == "current" and not one.friction_on]
+    assert [one.kind for one in inner] == ["gain", "delay"]
+    assert [one.value for one in inner] == [pytest.approx(one.linear, rel=2 * CLOSE) for one in inner]
 
 
 def test_a_flat_friction_map_is_dry_friction() -> None:
