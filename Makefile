@@ -52,7 +52,7 @@ $(ALL): $(CORE) requirements-all.lock
 	@touch $@
 
 # The tests of margins, loops, studies and reports again, as on processors with other linear algebra: its kernels
-# that run here, and ten processors that are not at hand (tests/machines/beside.py).
+# that run here but the one that all tests run on, and ten processors that are not at hand (tests/machines/beside.py).
 MACHINE_TESTS := tests/margins/test_margin_reference_loops.py tests/margins/test_margin_edges.py \
   tests/margins/test_unstable_inner_loops.py \
   tests/margins/test_delay_margins.py tests/margins/test_step_random.py \
@@ -82,7 +82,7 @@ check: $(ALL) page
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/python -m pytest -q --doctest-modules actuator_lti nonlinear analyses reports
+	$(BIN)/python -m pytest -q -n 2 --doctest-modules actuator_lti nonlinear analyses reports
 
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
 fuzz: $(ALL)
@@ -100,7 +100,7 @@ limits: $(CORE)
 
 # The documentation in out/docs: opens from disk, asks no network; its tutorials are run while it is built.
 docs: $(ALL)
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs $(OUT)/docs
+	$(BIN)/python -m sphinx -W --keep-going -q -j 2 -b html docs $(OUT)/docs
 
 $(RELEASE): $(CORE)
 	$(PIP) install --constraint constraints.txt '.[release]'

@@ -113,6 +113,7 @@ def _response_json(figures: LoopFigures) -> Tree:
         "bandwidth_hz": band.minus3db_hz if band else None,
         "bandwidth_90deg_hz": band.minus90deg_hz if band else None,
         "resonance_peak_db": band.resonance_peak_db if band else None,
+        "resonance_hz": (band.resonance_hz or None) if band else None,
         **{name: getattr(step, name, None) for name in _OF_STEP},
     }
     alone = figures.loop.name == "position" and figures.of_feedback

@@ -1,5 +1,6 @@
 """What is refused: in one line that can be printed."""
 
+import re
 from collections.abc import Callable
 
 import pytest
@@ -9,14 +10,19 @@ from actuator_lti.errors import InputError
 
 
 def refused(
-    call: Callable[..., object], *arguments: object, words: str | tuple[str, ...] = (), **named
+    call: Callable[..., object],
+    *arguments: object,
+    words: str | tuple[str, ...] = (),
+    match: str = "",
+    **named,
 ) -> str:
-    """What is said of it, these words among it."""
+    """What is said of it, these words among it, and what this pattern matches."""
     with pytest.raises(InputError) as caught:
         call(*arguments, **named)
     line = str(caught.value)
     assert line.isprintable()
     assert len(line) < 400
+    assert re.search(match, line), line
     for word in (words,) if isinstance(words, str) else words:
         assert word in line
     return line

@@ -84,8 +84,7 @@ def _text(rad_s: float | None, known: Range | None = None) -> str:
 class Peaks:
     """Peaks of the sensitivity S = 1/(1 + L) and of the complementary sensitivity T = L/(1 + L).
 
-    ``sensitivity_db``, ``complementary_db``: peak gains, dB.
-    ``sensitivity_rad_s``, ``complementary_rad_s``: where they are reached (0 and infinity are possible).
+    And where they are reached (0 and infinity are possible).
     """
 
     sensitivity_db: float

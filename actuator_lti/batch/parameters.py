@@ -31,13 +31,10 @@ def variable_paths(design: Design) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Population:
-    """Many designs of one structure: a nominal design and, for some keys, an array of SI values.
-
-    ``values``, shape (count,): by dotted key; a key that is not there has its nominal value.
-    """
+    """Many designs of one structure: a nominal design and, for some keys, an array of SI values."""
 
     design: Design
-    values: Values
+    values: Values  # shape (count,), by dotted key; a key that is not there has its nominal value
     count: int
 
     def __post_init__(self) -> None:

@@ -107,11 +107,9 @@ class Requirement:
 
 @dataclass(frozen=True, kw_only=True)
 class Waiver:
-    """Leave to go on while a requirement or a check is not proven; one that is not met stays so.
+    """Leave to go on while a requirement or a check is not proven; one that is not met stays so."""
 
-    ``requirement`` is the id as reports have it, ``id/loop`` of a requirement on every loop.
-    """
-
+    # As reports have it, ``id/loop`` of a requirement on every loop
     requirement: Annotated[str, text("id of the requirement or check")]
     reason: Annotated[str, label("reason for the waiver")]
     date: Annotated[str, day("day of the waiver")]

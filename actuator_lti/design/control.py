@@ -36,10 +36,7 @@ ABSENT = 0.0
 
 @dataclass(frozen=True, kw_only=True)
 class Encoder:
-    """The measurement of angle and speed at the motor (model.md section 7).
-
-    Without ``counts_per_rev`` there is no quantisation.
-    """
+    """The measurement of angle and speed at the motor (model.md section 7); unquantised without counts."""
 
     counts_per_rev: Annotated[int | None, integer("counts per motor revolution after quadrature (linear "
         "axis without a screw: per metre): of the measured speed unless it is ideal, and of a law's angle; "
@@ -278,10 +275,7 @@ class Controller:
 
     @property
     def position_loop(self) -> PositionLoop:
-        """The position loop, for questions that need one.
-
-        An InputError where the drive has none.
-        """
+        """The position loop, for questions that need one; an InputError where the drive has none."""
         if self.position is None:
             raise InputError("control.position: missing; this needs a drive with a position loop")
         return self.position

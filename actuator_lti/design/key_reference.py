@@ -45,8 +45,7 @@ def record_reference(axis: Axis = "rotary") -> tuple[KeyEntry, ...]:
 
 
 def _entry(field: Field, structure: Structure) -> KeyEntry:
-    unit = "1" if field.kind in ("text", "label", "choice", "flag") else field.unit(structure)
-    unit = "of its quantity" if field.kind == "limit" else unit
+    unit = "of its quantity" if field.kind == "limit" else field.unit(structure)
     same: Tree = {item.name: getattr(field, item.name, None) for item in fields(KeyEntry)}
     default = "" if field.required or field.section == "design" else _default(field, unit)
     return KeyEntry(**{**same, "unit": unit, "default": default, "allowed": _allowed(field, unit)})

@@ -319,10 +319,7 @@ class FrictionPoint:
 
 @dataclass(frozen=True, kw_only=True)
 class Friction:
-    """Friction at the motor shaft: dry ``Tc = C0 + CM |M_ext|`` plus viscous ``Cv w`` (paper, equation 9).
-
-    ``points`` is a map in place of C0 and Cv (model.md section 6), to which CM and the offset add.
-    """
+    """Friction at the motor shaft: dry ``Tc = C0 + CM |M_ext|`` plus viscous ``Cv w`` (paper, equation 9)."""
 
     law: Annotated[FrictionLaw, choice("dry friction with stick, or smoothed by tanh")] = "coulomb"
     dry_torque_Nm: Annotated[float, not_negative("dry friction at the motor", "C0",
@@ -341,7 +338,7 @@ class Friction:
         "differs", "Cv-", example="5.3e-6 N*m*s/rad")] = None
     offset_torque_Nm: Annotated[float, quantity("constant torque that opposes positive motion",
         example="0 N*m")] = 0.0
-    points: tuple[FrictionPoint, ...] = ()
+    points: tuple[FrictionPoint, ...] = ()  # in place of C0 and Cv (section 6); CM and the offset add to them
 
     def map(self, direction: int = 1) -> tuple[FrictionPoint, ...]:
         """Points of the friction map for motion forward (1) or backward (-1), by rising speed.

@@ -176,7 +176,8 @@ def beyond_largest(design: Design, key: str, load_Nm: float) -> Iterator[str]:
     """What is said of a load that is asked for and lies above the largest one of the design."""
     largest, unit = design.load.moment_max_Nm, unit_on(design.axis, "{torque}")
     if abs(load_Nm) > largest:
-        yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+        stated = f"= {largest:g} {unit}" if largest else "of 0: the largest load is not stated"
+        yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max {stated}"
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:

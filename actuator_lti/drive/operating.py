@@ -67,9 +67,10 @@ class Operating:
             raise InputError(f"rotor = {self.rotor!r}: free or locked")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
             finite_number(name, getattr(self, name))
-        amplitude = self.speed_amplitude_rad_s
-        if self.point == "describing-function" and (amplitude is None or not 0 < amplitude < float("inf")):
-            raise InputError(f"speed_amplitude_rad_s = {amplitude}: must be positive (motor side)")
+        W, allowed = self.speed_amplitude_rad_s, "positive, in rad/s (motor side)"
+        needed = self.point == "describing-function"
+        if (needed or W is not None) and finite_number("speed_amplitude_rad_s", W, allowed) <= 0.0:
+            raise InputError(f"speed_amplitude_rad_s = {W}: must be {allowed}")
 
     def checked(self, design: Design) -> Operating:
         """The same, refused where the design has no such operating point."""

@@ -30,30 +30,24 @@ MatrixEntries = dict[tuple[str, str], Any]
 
 @dataclass(frozen=True)
 class Plant:
-    """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive.
+    """``dx/dt = A x + B_u u + B_T T + B_M M_ext`` of the slipping drive."""
 
-    ``states``: ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source;
-    ``("i",)`` with the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and
-    ``"twist"`` = th/N_c - phi in rad, both at its own shaft: so the absolute angle is one state, which no
-    inner loop sees.
-    ``A``, shape (..., n, n): without the load's own torques, see `moment`.
-    ``B_u``, ``B_T``, ``B_M``, shape (..., n): effect of the voltage (V, or the drive signal of a torque
-    source), of a torque in N m that accelerates the motor, and of a moment in N m that pushes the output
-    shaft forward.
-    ``torque``, ``moment``: the motor's own torque, and the load's own torque on the output shaft, as
-    combinations of states and rows; both are held over a tick. Empty where there is none, or it does not
-    reach the plant.
-    ``rows``: angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle
-    behind the coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees).
-    """
-
+    # ``("i", "w", "th")`` in A, rad/s, rad at the motor; without ``"i"`` for a torque source; ``("i",)`` with
+    # the rotor locked. With a coupling also ``"W"``, the speed behind it in rad/s, and ``"twist"`` = th/N_c -
+    # phi in rad, both at its own shaft: so the absolute angle is one state, which no inner loop sees
     states: tuple[str, ...]
-    A: np.ndarray
+    A: np.ndarray  # shape (..., n, n): without the load's own torques, see `moment`
+    # Shape (..., n): effect of the voltage (V, or the drive signal of a torque source), of a torque in N m
+    # that accelerates the motor, and of a moment in N m that pushes the output shaft forward
     B_u: np.ndarray
     B_T: np.ndarray
     B_M: np.ndarray
+    # The motor's own torque, and the load's own torque on the output shaft, as combinations of states and
+    # rows; both are held over a tick. Empty where there is none, or it does not reach the plant
     torque: Entries
     moment: Entries
+    # Angles and torques as combinations of states: ``output_angle``, ``phi`` and ``T_s`` (angle behind the
+    # coupling, its torque) and ``load_speed`` (motor speed that the output's sensor sees)
     rows: dict[str, Entries]
 
 

@@ -5,7 +5,7 @@ samples of the position loop, n = 2 a/(j T) rounded up, and acts on every comman
 """
 
 from dataclasses import dataclass
-from math import ceil, inf, pi, sin, sqrt
+from math import asin, ceil, inf, pi, sin, sqrt
 
 import numpy as np
 
@@ -16,13 +16,10 @@ RESOLVED = 1e-13  # of the command: what sin(k pi) leaves of a zero of the mean
 
 @dataclass(frozen=True)
 class CommandMean:
-    """Mean over the last samples of the command.
-
-    ``period_s``: of the position loop.
-    """
+    """Mean over the last samples of the command."""
 
     samples: int
-    period_s: float
+    period_s: float  # of the position loop
 
     @property
     def delay_s(self) -> float:
@@ -76,6 +73,19 @@ def profile_onset_rad(design: Design, omega_rad_s: np.ndarray) -> np.ndarray:
     period = control.position.every * control.period_s
     per_peak = 2.0 * np.sin(0.5 * np.asarray(omega_rad_s, dtype=float) * period) / period
     return np.asarray(np.minimum(command.rate_rad_s / per_peak, command.acceleration_rad_s2 / per_peak**2))
+
+
+def profile_passes_rad_s(design: Design, peak_rad: float) -> float:
+    """Up to which frequency a sine command of a peak keeps rate and acceleration, see `profile_onset_rad`.
+
+    ``inf``: at every one.
+    """
+    command, control = design.command, design.controller
+    if control.position is None:
+        return inf
+    period = control.position.every * control.period_s
+    per_peak = min(command.rate_rad_s / peak_rad, sqrt(command.acceleration_rad_s2 / peak_rad))
+    return inf if per_peak >= 2.0 / period else 2.0 / period * asin(0.5 * period * per_peak)
 
 
 def profile_note(design: Design) -> str:

@@ -111,10 +111,7 @@ def reason(error: OSError | ValueError) -> str:
 
 
 def read_bytes(path: AnyPath, what: str = "design file", most: Bound = TOML_BYTES) -> bytes:
-    """The bytes of a regular file of bounded size.
-
-    An InputError names the file and what is allowed.
-    """
+    """The bytes of a regular file of bounded size; an InputError names the file and what is allowed."""
     data = bytearray()
     with in_file(shown_path(path)), open_regular(path, what) as stream:
         try:

@@ -16,7 +16,7 @@ from actuator_lti.files import response_columns as column
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
 from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, NEIGHBOURS, MeasuredResponse, student
-from actuator_lti.types import Floats, Ints
+from actuator_lti.types import Compared, Floats, Ints
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
@@ -25,8 +25,8 @@ NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
 _COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # one value a row
 
 
-@dataclass(frozen=True)
-class RecordedResponse:
+@dataclass(frozen=True, eq=False)
+class RecordedResponse(Compared):
     """A response as it was measured; arrays of shape (m,), NaN where something is not known."""
 
     frequency_hz: Floats  # rising, above 0

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.plain_system import period_of
-from actuator_lti.types import Complex, Real
+from actuator_lti.types import Compared, Complex, Real, number_array
 
 CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
@@ -23,8 +23,8 @@ _FEWEST = 6  # points: of two residuals the median has one degree of freedom
 _UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
 
-@dataclass(frozen=True)
-class MeasuredResponse:
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse(Compared):
     """A measured loop L with the radius of a circle about each value that holds the true one.
 
     `stability_margins` takes it as it takes `control.FrequencyResponseData`; the ranges that it states are
@@ -61,7 +61,7 @@ class MeasuredResponse:
         Raises `InputError`: a negative or infinite standard deviation, or a confidence outside (0, 1).
         """
         omega, L, dt = _read(data)
-        sigma = _per_point(standard_deviation, L.size, "standard_deviation", math.inf)
+        sigma = _per_point("standard_deviation", standard_deviation, L.size)
         radius = sigma * math.sqrt(-math.log(1.0 - _checked(confidence)))
         return cls(omega, L, radius, dt, "given as a standard deviation")
 
@@ -81,8 +81,8 @@ class MeasuredResponse:
         Raises `InputError`: a coherence outside (0, 1], fewer than 2 averages.
         """
         omega, L, dt = _read(data)
-        g2 = _per_point(coherence, L.size, "coherence", 1.0)
-        if not (g2 > 0.0).all():
+        g2 = _per_point("coherence", coherence, L.size)
+        if not ((g2 > 0.0) & (g2 <= 1.0)).all():
             raise InputError("coherence: every value must lie in (0, 1]")
         if averages < 2:
             raise InputError(f"averages = {averages}: at least 2")
@@ -195,12 +195,15 @@ def _read(data: Any) -> tuple[Real, Complex, float | None]:
     return omega, L, dt
 
 
-def _per_point(values: ArrayLike, count: int, name: str, high: float) -> Real:
-    array = np.asarray(values, dtype=float)
+def _per_point(name: str, values: ArrayLike, count: int) -> Real:
+    try:
+        array = number_array(values)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0))
     if array.shape not in ((), (count,)):
-        raise InputError(f"{name}: one number, or one for each of the {count} frequencies")
-    if not (np.isfinite(array) & (array >= 0.0) & (array <= high)).all():
-        raise InputError(f"{name}: every value must be finite and lie in [0, {high:g}]")
+        raise InputError(f"{name}: allowed: one number, or one for each of the {count} frequencies")
+    if not (np.isfinite(array) & (array >= 0.0)).all():
+        raise InputError(f"{name}: every value must be finite and not negative")
     return np.broadcast_to(array, (count,)).astype(float)
 
 

@@ -36,23 +36,18 @@ STEP_ROUNDS = 6
 
 @dataclass(frozen=True, kw_only=True)
 class CorrelationResult:
-    """The comparison of every signal that the record and the model share.
-
-    ``limits`` tells for each limiter what share of the simulated time it was active. ``notes`` tells what was
-    done to the record, and what the model was given. ``used`` tells for each signal what it was used for,
-    ``findings`` whether the record agrees with itself and with the design's limits.
-    """
+    """The comparison of every signal that the record and the model share."""
 
     record: str
     design: str
     signals: Mapping[str, SignalComparison]
-    limits: dict[str, float]
-    notes: tuple[str, ...]
+    limits: dict[str, float]  # share of the simulated time in which each limiter was active
+    notes: tuple[str, ...]  # what was done to the record, and what the model was given
     counts: str
     sha256: str
     source: Record = field(repr=False)
-    used: Mapping[str, str] = field(default_factory=dict, repr=False)
-    findings: tuple[Finding, ...] = ()
+    used: Mapping[str, str] = field(default_factory=dict, repr=False)  # what each signal was used for
+    findings: tuple[Finding, ...] = ()  # whether the record agrees with itself and with the design's limits
 
     @property
     def inputs(self) -> tuple[InputUse, ...]:

@@ -7,19 +7,18 @@ in.  Nothing failed, the two together are the drive (`nonlinear.simulate`) bit f
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
-
-from actuator_lti.bandwidth import closed_loop_bandwidth
 from actuator_lti.design.model import Command, Design, Instruments, LoadFriction
 from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.profile import profile_passes_rad_s
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
 from analyses.failures.asked import Asked
+from analyses.linear.loop_figures import all_loop_figures
 from nonlinear import Drive, State
 
 Sensing = Callable[[State], State]
@@ -94,7 +93,7 @@ class Rig:
 
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
-FLAT = 1.01  # a response that rises by less has no resonance
+FLAT_DB = 0.1  # a response that rises by less has no resonance
 OPEN = 1e4  # times the resistance: of a winding with an open phase
 
 Course = Callable[[float], float]
@@ -115,7 +114,7 @@ class Case:
 
 
 def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, str]]:
-    """The cases that exist for a design, and why the others do not."""
+    """The cases that exist for a design, and why the others do not; of those of one name the worst counts."""
     open_phase = "the winding is open: no current, no torque"
     if design.motor.constants != "dc":
         more = "a DC equivalent has one winding; the pulsating torque of two phases left is not modelled"
@@ -127,16 +126,17 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
     if design.controller.position is None:
         return made, dict.fromkeys(_LOOP_CASES, "the drive has no position loop")
     far, near, half = asked.stop_rad, asked.deflection_rad, 0.5 * asked.stop_rad
-    frequency, where = _followed_most_hz(design)
     frozen = f"the position sensor freezes, the command steps by {_size(design, near)}"
     lost = f"the position sensor reads zero while the drive holds {_size(design, half)}"
-    waves = f"a sine of {_size(design, near)} at {frequency:.3g} Hz, {where}"
 
     def jam(rig: Rig) -> None:
         rig.fail(jammed(design))
 
-    def sine(t: float) -> float:
-        return near * math.sin(2.0 * math.pi * frequency * t)
+    def sine(hz: float, where: str) -> Case:
+        words = f"a sine of {_size(design, near)} at {hz:.3g} Hz, {where}"
+        return Case(
+            "oscillatory-command", words, lambda t: near * math.sin(2.0 * math.pi * hz * t), stops=False
+        )
 
     jams = "the output jams half-way through a step to the stop"
     of_loop = (
@@ -144,7 +144,7 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
         Case("jam", jams, lambda _: far, jam, at_rad=half, stops=False),
         Case("frozen-sensor", frozen, lambda _: near, partial(_sense, lose=False)),
         Case("lost-sensor", lost, lambda _: half, partial(_sense, lose=True), start_rad=half),
-        Case("oscillatory-command", waves, sine, stops=False),
+        *(sine(*one) for one in _sines(design, near)),
     )
     return made + of_loop, {}
 
@@ -184,18 +184,23 @@ def _sense(rig: Rig, *, lose: bool) -> None:
     rig.sensing = lambda true: replace(true, **{f"{sensor}_angle_rad": angle, f"{sensor}_speed_rad_s": 0.0})
 
 
-def _followed_most_hz(design: Design) -> tuple[float, str]:
-    """Frequency from 0.1 Hz up at which the linear output is largest; without a resonance its bandwidth."""
-    response = assemble_loops(design).plain_response
-    assert response is not None
-    period = design.controller.period_s * design.controller.position_loop.every
-    f = np.geomspace(0.1, 0.5 / period, 400)
-    size = np.abs(response(np.exp(2j * np.pi * f * period)))
-    top = int(np.argmax(size))
-    if size[top] > FLAT * size[0]:
-        return float(f[top]), "where the drive follows most"
-    band = closed_loop_bandwidth(response).minus3db_hz
-    return float(f[-1] if band is None else band), "its bandwidth, as it has no resonance"
+def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
+    """Frequencies in Hz at which the output may follow a sine of the command most, and in words which.
+
+    Resonance and bandwidth of the response to the command, as `margins` has them; where the profile of the
+    command cuts a sine of the size there, the highest that it lets pass.
+    """
+    band = all_loop_figures(assemble_loops(design), step=False)["position"].bandwidth
+    if band is not None and band.resonance_peak_db > FLAT_DB:
+        yield band.resonance_hz, "the resonance of its response"
+    if band is not None and band.minus3db_hz is not None:
+        highest, words = band.minus3db_hz, "its bandwidth"
+    else:
+        period = design.controller.period_s * design.controller.position_loop.every
+        highest, words = 0.5 / period, "half its sampling frequency, as it has no bandwidth"
+    yield highest, words
+    if (passed := profile_passes_rad_s(design, size) / (2.0 * math.pi)) < highest:
+        yield passed, "the highest that rate and acceleration of the command let pass"
 
 
 def _size(design: Design, value: float) -> str:

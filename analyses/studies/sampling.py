@@ -79,15 +79,12 @@ class Table:
 
 @dataclass(frozen=True)
 class Sampler:
-    """Samples of the toleranced parameters of a design; ``seed`` is any integer from 0 on.
-
-    ``correlation`` is that of the normal scores (Gaussian copula); a table is drawn by a further coordinate.
-    """
+    """Samples of the toleranced parameters of a design."""
 
     factors: tuple[Factor, ...]
-    correlation: np.ndarray = field(repr=False)
-    table: Table | None = None
-    seed: int = 0
+    correlation: np.ndarray = field(repr=False)  # of the normal scores (Gaussian copula)
+    table: Table | None = None  # drawn by a further coordinate
+    seed: int = 0  # any integer from 0 on
 
     def __post_init__(self) -> None:
         if not self.paths:

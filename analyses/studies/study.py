@@ -96,17 +96,13 @@ LONGEST_NAME = 200
 
 @dataclass(frozen=True)
 class Variant:
-    """One design of a study; ``design`` is ``None`` where it was refused, then ``error`` says why.
+    """One design of a study."""
 
-    The name is as written, any text, never used as a path; ``slug`` is its form in file names, unique in
-    the study; ``overrides`` are dotted keys as written.
-    """
-
-    name: str
-    slug: str
-    design: Design | None
-    overrides: Mapping[str, Any] = field(default_factory=dict)
-    error: str = ""
+    name: str  # as written, any text, never used as a path
+    slug: str  # its form in file names, unique in the study
+    design: Design | None  # ``None`` where it was refused
+    overrides: Mapping[str, Any] = field(default_factory=dict)  # dotted keys as written
+    error: str = ""  # why it was refused
 
 
 @dataclass(frozen=True)

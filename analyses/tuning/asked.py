@@ -31,13 +31,16 @@ class TuningSettings:
 class Asked:
     """Find gains that meet the requirements at every corner of the tolerances, or say by how much none can.
 
+    Searched for are requirements on loops, and on the output rate that a P velocity loop bounds; all others
+    are judged on the tuned design, as by margins.
+
     By default the least change of the design. With --place also a notch, a low-pass, feed-forward where
     gains alone do not do.
 
     The result is confirmed by certified margins, nominal and at each requirement's worst corner.
 
-    Writes tune.html, tune.json and, where the requirements are met, tuned.toml (a design). Exit status 1
-    where they cannot be met.
+    Writes tune.html, tune.json and, where all that is searched for is met, tuned.toml (a design). Exit status
+    1 where any requirement is not met.
 
     Try: actuator-lti tune joint --require "position.bandwidth>=60 Hz" --place notch,feedforward
     """

@@ -8,17 +8,18 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS, QUANTITIES
-from actuator_lti.batch import Population, linear_figures, variable_paths
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES
+from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of
 from actuator_lti.design.mistakes import nearest
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import drawn
 from actuator_lti.design.units import parse_limit
+from actuator_lti.drive.steady import droop
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
-from analyses.monte_carlo.judging import in_populations, judge, loop_columns, loops_of
+from analyses.monte_carlo.judging import drive_column, in_populations, judge, loop_columns, loops_of
 from analyses.studies.sampling import Factor, as_values, correlation_of, semidefinite_root
 from analyses.tuning.start import Element, Variable, allowed_range, change, place
 
@@ -31,7 +32,7 @@ MOST_DESIGNS = 25_000  # looked at in one search: half a minute of one processor
 
 @dataclass
 class Problem:
-    """Requirements on the loops of a design, over the corners of its tolerances."""
+    """Requirements that gains of a design move, over the corners of its tolerances."""
 
     design: Design
     requirements: tuple[Requirement, ...]
@@ -130,8 +131,12 @@ class Problem:
         corners, where not those of the problem.
         """
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
-        linear = self._looked_at(gains, corners, self.factors if factors is None else factors, timed)
+        population = self._looked_at(gains, corners, self.factors if factors is None else factors)
+        linear = _linear_figures(population, timed)
         columns = loop_columns(linear)
+        for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
+            if name in DRIVE_QUANTITIES:
+                columns[drive_column(name, load)] = drive_figures(population, name, load)
         out = np.empty((len(gains) * len(corners), len(self.requirements)))
         radius = np.fmax.reduce([linear.pole_radius(loop) for loop in linear.loops], initial=1.0)
         for k, requirement in enumerate(self.requirements):
@@ -141,19 +146,21 @@ class Problem:
 
     def figure(self, quantity: str, loop: str, gains: Floats, corners: Floats) -> Floats:
         """One figure of one loop, shape (candidates, corners)."""
-        linear = self._looked_at(gains, corners, self.factors, QUANTITIES[quantity].timed)
+        population = self._looked_at(gains, corners, self.factors)
+        linear = _linear_figures(population, QUANTITIES[quantity].timed)
         return linear.quantity(quantity, loop).reshape(len(gains), len(corners))
 
-    def _looked_at(
-        self, gains: Floats, corners: Floats, factors: tuple[Factor, ...], timed: bool
-    ) -> LinearFigures:
-        """Linear figures of every candidate at every corner, and the search's account of them."""
+    def _looked_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> Population:
+        """Every candidate at every corner, and the search's account of them."""
         count, many = len(gains), len(corners)
         values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
         values |= as_values(self.design, [f.path for f in factors], np.tile(corners, (count, 1)))
         self.evaluations += count * many
-        population = Population(self.design, values, count * many)
-        return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
+        return Population(self.design, values, count * many)
+
+
+def _linear_figures(population: Population, timed: bool) -> LinearFigures:
+    return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
 
 
 def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
@@ -162,10 +169,14 @@ def asked_for(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requ
     return (*(r for r in design.requirements if (r.quantity, r.loop) not in replaced), *extra)
 
 
-def loop_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
-    """Those of `asked_for` that are on loops."""
+def gain_requirements(design: Design, extra: tuple[Requirement, ...] = ()) -> tuple[Requirement, ...]:
+    """Those of `asked_for` that the search looks at: on loops, and the rate that a P velocity loop bounds.
+
+    Raises `InputError`: without any.
+    """
+    moved = {*LOOP_QUANTITIES, *([] if droop(design) is None else ["output_rate"])}
     every = asked_for(design, extra)
-    chosen = tuple(r for r in every if r.quantity in LOOP_QUANTITIES and in_populations(r, design))
+    chosen = tuple(r for r in every if r.quantity in moved and in_populations(r, design))
     if not chosen:
         told = "no requirement on a loop: nothing to tune for; state margins and bandwidths in the "
         raise InputError(told + 'file, or as --require "position.bandwidth>=30 Hz"')

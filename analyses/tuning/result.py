@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_lti.asked.quantities import QUANTITIES
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.batch import Population
 from actuator_lti.design import with_values
 from actuator_lti.design.model import Design, Requirement
@@ -18,7 +18,7 @@ from analyses.finite import finite
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
-from analyses.specification.requirements import RequirementVerdict, judged
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, judged, tally
 from analyses.studies.sampling import as_values
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
@@ -82,7 +82,7 @@ class NonlinearCheck:
 class TuningResult:
     """A tuned design."""
 
-    feasible: bool  # whether every requirement on the loops is met at every corner, with the rounded gains
+    feasible: bool  # whether all that is searched for is met at every corner, with the rounded gains
     # As it came, and with the rounded gains
     before: Design
     design: Design
@@ -96,44 +96,53 @@ class TuningResult:
     notes: tuple[str, ...]
     aim: Aim = "least-change"
     placed: tuple[str, ...] = ()  # elements that were added, because gains alone do not meet the requirements
-    # The requirements on loops by certified margins: the tuned design, and each worst corner of one
+    # What was searched for, by certified margins: the tuned design, and each worst corner of one
     confirmed: tuple[RequirementVerdict, ...] = ()
+    others: tuple[RequirementVerdict, ...] = ()  # all other requirements, of the tuned design
     spent: bool = False  # whether the search ended at its bound: then there may be something better
     hunting: str = ""  # after which step the tuned drive does not come to rest; empty: it does
 
     @property
+    def verdict(self) -> Verdict:
+        """What was searched for, and all other requirements."""
+        return (Tally.of([Verdict.of(self.feasible)]) + tally(self.others)).verdict
+
+    @property
     def passed(self) -> bool:
-        """Whether it is feasible."""
-        return self.feasible
+        """Whether every requirement is met."""
+        return self.verdict.passes()
 
     def __str__(self) -> str:
-        head = "every requirement met" if self.feasible else "REQUIREMENTS CANNOT BE MET"
+        head = "what is tuned for is met" if self.feasible else "REQUIREMENTS CANNOT BE MET"
+        open_ones = (f"{one.verdict}: {one.id}" for one in self.others if not one.passes)
+        head = "every requirement met" if self.passed else head
         binding = (one for one in self.requirements if one.binds and one.distance)
         lines = [f"{self.design.name}: {head} over {self.corners} corners"]
         lines += [f"{g.path} = {g.rounded:.6g} {g.unit}" for g in self.gains]
-        return "\n".join([*lines, *(f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in binding)])
+        lines += [f"binding: {r.id} {r.distance:+.4g} {r.unit}" for r in binding]
+        return "\n".join([*lines, *open_ones])
 
 
 def confirm(
     tuned: Design, requirements: tuple[Requirement, ...], binding: tuple[BindingRequirement, ...]
 ) -> tuple[RequirementVerdict, ...]:
-    """Judge the tuned design, and each requirement's worst corner, by certified margins.
+    """Judge every requirement of the tuned design, and of some their worst corners, by certified margins.
 
-    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the same
-    requirements at their worst corners.
+    The search asks the many-designs figures; this asks what ``margins`` asks. ``binding`` holds the
+    ``requirements`` at their worst corners.
     """
     timed = any(QUANTITIES[item.quantity].timed for item in requirements)
-    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {(): list(requirements)}
+    rows: dict[tuple[tuple[str, float], ...], list[Requirement]] = {}
     for item, result in zip(requirements, binding, strict=True):
         if result.corner:
             rows.setdefault(tuple(sorted(result.corner.items())), []).append(item)
-    verdicts: list[RequirementVerdict] = []
+    verdicts = [*evaluate_requirements(tuned, all_loop_figures(assemble_loops(tuned), certify=True))]
     for corner, asked in rows.items():
         design = with_values(tuned, together(tuned, dict(corner)), check=False)
         figures = all_loop_figures(assemble_loops(design), step=timed, certify=True)
         for requirement in asked:
             found = judged(design, requirement, figures, lambda name: (None, f"{name}: no figure of a loop"))
-            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found] if corner else found
+            verdicts += [replace(each, id=f"{each.id}, worst corner") for each in found]
     return tuple(verdicts)
 
 

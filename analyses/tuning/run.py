@@ -6,19 +6,19 @@ from itertools import combinations
 
 import numpy as np
 
-from actuator_lti.asked.quantities import LOOP_QUANTITIES, with_unit
+from actuator_lti.asked.quantities import with_unit
 from actuator_lti.design import parameter_value, paths_of, with_values
 from actuator_lti.design.fields import FIELDS, Structure, template_of
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Progress
-from analyses.monte_carlo.judging import in_populations, label
+from analyses.monte_carlo.judging import label
 from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning import result
 from analyses.tuning.asked import Aim, TuningSettings
 from analyses.tuning.least import least_change
-from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, loop_requirements, problem_of
+from analyses.tuning.problem import MOST_DESIGNS, Problem, asked_for, gain_requirements, problem_of
 from analyses.tuning.solve import RESERVE, Solution, solve, trade_off
 from analyses.tuning.start import Element, RuleGains, checked, neighbours, object_of, rule_gains, step_of_gain
 
@@ -28,13 +28,14 @@ _BINDS = 0.02  # relative distance above the smallest within which a requirement
 def tune(
     design: AnyDesign, settings: TuningSettings | None = None, *, progress: Progress = None
 ) -> result.TuningResult:
-    """Find gains that meet the requirements on loops over all corners of the tolerances.
+    """Find gains that meet the requirements that gains move over all corners of the tolerances.
 
     With the aim ``least-change`` those nearest to the design as it is (`analyses.tuning.least`); with
     ``reserve`` those that stay as far as possible from every limit, relative to the limit. Both search the
     exact sampled loops. Where gains alone do not do, the elements of ``place`` are tried, one, then two, then
     all; the fewest that do are kept. Where nothing does, the best compromise comes back, and the distances
-    say by how much it misses. What is returned is judged once more by certified margins.
+    say by how much it misses. What is returned is judged once more as `margins` does, by every requirement of
+    the design; what was searched for at its worst corners as well.
 
     ``progress`` is called with (stages done, stages in all).
 
@@ -43,7 +44,7 @@ def tune(
     design, settings = as_design(design), settings or TuningSettings()
     if not isinstance(settings, TuningSettings):
         raise InputError(f"settings = {shown(settings)}: allowed: TuningSettings")
-    wanted = loop_requirements(design, settings.requirements)
+    wanted = gain_requirements(design, settings.requirements)
     allowed = checked(design, settings.place)
     choices = [each for count in range(len(allowed) + 1) for each in combinations(allowed, count)]
     stages = len(choices) + 3
@@ -67,7 +68,8 @@ def tune(
     tuned = replace(tuned, name=f"{design.name}-tuned", requirements=stated)
     tell(len(choices) + 1, stages)
     requirements = tuple(_binding(problem, gains, distances, settings.aim))
-    confirmed = result.confirm(tuned, wanted, requirements)
+    verdicts = result.confirm(tuned, wanted, requirements)
+    confirmed = tuple(v for v in verdicts if v.requirement in wanted)
     tell(len(choices) + 2, stages)
     checks = tuple(result.nonlinear_checks(tuned, problem, distances)) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
@@ -88,6 +90,7 @@ def tune(
         aim=settings.aim,
         placed=problem.elements,
         confirmed=confirmed,
+        others=tuple(v for v in verdicts if v.requirement not in wanted),
         spent=problem.spent,
         hunting=result.hunting(tuned) if settings.check and feasible else "",
     )
@@ -190,6 +193,3 @@ def _notes(
         if one.verdict != "met":
             said = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".6g")
             yield f"Not confirmed by certified margins: {one.id}: {said}"
-    of_loops = [item for item in problem.design.requirements if item.quantity in LOOP_QUANTITIES]
-    if names := [item.id for item in of_loops if not in_populations(item, problem.design)]:
-        yield f"Not searched for, as each takes a computation of one design: {', '.join(names)}."

@@ -27,37 +27,30 @@ REST = {
 
 @dataclass(frozen=True, kw_only=True)
 class Validation:
-    """Everything the nonlinear simulator says of a design's predictions.
-
-    ``rows``: every check: small signals by the tangent, the runs in time, the numbers of the design.
-    ``figures``: the linear loops, as they are tested (of the current with the rotor locked).
-    ``loops``: the same as `analyses.margins` judges them: sliding, of the current with the rotor free.
-    ``margins``: runs on either side of the quoted gain margin of each loop.
-    ``amplitude_margins``, ``conditional``, ``rest_sweep``, ``counts``, ``large_signals``, ``friction``,
-    ``specification``: findings: what large signals, friction and counts do.
-    ``settlings``: what steps of the drive as it is end in.
-    ``held_by_friction``: loops that are stable with the friction that is left out where the drive is tested,
-    and only with it.
-    ``notes``: what could not be done, and why.
-    """
+    """Everything the nonlinear simulator says of a design's predictions."""
 
     design: Design
-    rows: tuple[Row, ...]
-    figures: Mapping[str, LoopFigures]
+    rows: tuple[
+        Row, ...
+    ]  # every check: small signals by the tangent, the runs in time, numbers of the design
+    figures: Mapping[str, LoopFigures]  # linear loops, as they are tested (the current's with a locked rotor)
+    # The same as `analyses.margins` judges them: sliding, of the current with the rotor free
     loops: Mapping[str, LoopFigures] = field(default_factory=dict)
     steps: Mapping[str, StepShown] = field(default_factory=dict)
-    margins: Mapping[str, MarginShown] = field(default_factory=dict)
+    margins: Mapping[str, MarginShown] = field(default_factory=dict)  # runs on either side of the gain margin
     sweeps: Mapping[str, BenchSweep] = field(default_factory=dict)
+    # Findings: what large signals, friction and counts do
     amplitude_margins: tuple[AmplitudeMargin, ...] = ()
     conditional: Conditional | None = None
     rest_sweep: RestSweep | None = None
     counts: tuple[Counts, ...] = ()
-    settlings: tuple[Settling, ...] = ()
+    settlings: tuple[Settling, ...] = ()  # what steps of the drive as it is end in
     large_signals: LargeSignals | None = None
     friction: FrictionEffects | None = None
     specification: Specification | None = None
+    # Loops that are stable with the friction that is left out where the drive is tested, and only with it
     held_by_friction: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # what could not be done, and why
 
     @property
     def tally(self) -> Tally:

@@ -3,7 +3,6 @@
 from actuator_lti.design.law import LAW_INPUTS
 from actuator_lti.design.model import Design
 from nonlinear._kernels import layout
-from nonlinear.export.c_files import stage_words
 from nonlinear.export.program import said_of
 
 _COMMANDED = {"position": "rad", "velocity": "rad/s", "current": "A", "voltage": "V"}  # unit of each stage's
@@ -43,17 +42,16 @@ def member_name(design: Design, name: str, *, counts: bool = False) -> str:
 
 
 def _unit(design: Design, name: str) -> str:
-    control = design.controller
-    stages = [each for each in _COMMANDED if each == "voltage" or getattr(control, each) is not None]
+    control, order = design.controller, [*_COMMANDED]
+    stages = (*control.stages, "voltage")
     if name in _OUTERMOST:
-        return stage_words(design)[1]
+        return _COMMANDED[stages[0]]
     if control.own_law is not None and name in ("LAW_COMMAND", "LAW_ERROR"):
         return _COMMANDED[control.own_law[0]]
     if name == "S_PROFILE_SPEED":
         return f"{_COMMANDED[stages[0]]}/s".replace("/s/s", "/s2")
     if name in _INSIDE:
-        inside = [*_COMMANDED][[*_COMMANDED].index(_INSIDE[name]) + 1 :]
-        return next(_COMMANDED[each] for each in stages if each in inside)
+        return next(_COMMANDED[each] for each in stages if order.index(each) > order.index(_INSIDE[name]))
     return _UNITS.get(name) or said_of(name)[1]
 
 

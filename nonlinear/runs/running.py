@@ -45,12 +45,6 @@ class Running:
     A run keeps to itself what it does; this hands its state over between two ticks, so that it may begin in
     any state and be cut anywhere.  It is the same compiled code (`nonlinear.native`).
 
-    ``p``, ``s``: parameters with what is derived from them, and the state; write into them between two
-    calls.
-    ``tables``: time series that the parameters refer to.
-    ``start``: the state that it began in.
-    ``work``: ticks that `advance` went on by, and integration steps within them.
-
     >>> from actuator_lti import load_design
     >>> from nonlinear.rows import Rows
     >>> rows = Rows.of(load_design("ilr33-amber"))
@@ -61,11 +55,12 @@ class Running:
     100.0
     """
 
+    # Parameters with what is derived from them, and the state; write into them between two calls
     p: Floats
     s: Floats
-    tables: Floats
-    start: Floats = field(init=False, repr=False)
-    work: int = field(init=False, default=0)
+    tables: Floats  # time series that the parameters refer to
+    start: Floats = field(init=False, repr=False)  # the state that it began in
+    work: int = field(init=False, default=0)  # ticks that `advance` went on by, integration steps within them
 
     def __post_init__(self) -> None:
         self.start = self.s.copy()

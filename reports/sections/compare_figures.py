@@ -83,7 +83,7 @@ def tornadoes(comparison: Comparison) -> doc.Section:
     blocks.append(doc.details("Every sensitivity", [_slopes(comparison)]))
     intro = (
         "Each parameter alone at both ends of its tolerance, or ±10 % where it has none. Slopes are central "
-        "differences of 0.1 % over the exact sampled loops."
+        "differences of 0.1 % over the exact sampled loops; figures of the step are stairs, without a slope."
     )
     result = "No figure depends on a parameter with a tolerance."
     if shown:
@@ -95,7 +95,10 @@ def tornadoes(comparison: Comparison) -> doc.Section:
 
 
 def _wanted(comparison: Comparison) -> dict[str, float | None]:
-    """Figures behind the requirements with their limit; without requirements the margins of each loop."""
+    """Figures behind the requirements with their limit; without requirements the margins of each loop.
+
+    Those that `analyses.specification.sensitivity` has: no stairs of a step, no response behind a mean.
+    """
     result: dict[str, float | None] = {}
     for verdict in comparison.base.verdicts:
         r = verdict.requirement
@@ -104,11 +107,12 @@ def _wanted(comparison: Comparison) -> dict[str, float | None]:
         place = verdict.loop or "drive"
         loads = dict(drive_cases([r.load_Nm or 0.0]))
         key = f"{place}.{r.quantity}" + (f"@{loads[r.quantity]:g}" if place == "drive" else "")
-        if comparison.base.figures.get(key) is not None:
+        if key in comparison.sensitivities.base and comparison.base.figures.get(key) is not None:
             result[key] = r.bound
     if not result:
         margins = ("gain_margin", "phase_margin", "bandwidth")
-        result = {f"{loop}.{q}": None for loop in comparison.base.loops for q in margins}
+        every = (f"{loop}.{q}" for loop in comparison.base.loops for q in margins)
+        result = {key: None for key in every if key in comparison.sensitivities.base}
     order = sorted(result, key=lambda key: not key.startswith(("position", "drive")))
     return {key: result[key] for key in order}
 

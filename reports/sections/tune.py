@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from actuator_lti.asked.quantities import shown_unit, with_unit
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.access import located
 from actuator_lti.design.fields import Structure
 from actuator_lti.design.model import Design
@@ -13,11 +14,13 @@ from analyses.tuning.result import BindingRequirement, TuningResult
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit, in_shown
+from reports.sections.names import Unit, in_shown, load_unit
+from reports.sections.requirements import item, label
 
 
 def section(result: TuningResult) -> doc.Section:
-    verdicts = doc.verdicts(_verdict(r, result.before) for r in result.requirements)
+    others = (item(one, load_unit(result.before)) for one in result.others)
+    verdicts = doc.verdicts([*(_verdict(r, result.before) for r in result.requirements), *others])
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
         *([confirmed(result)] if result.confirmed else []),
@@ -27,8 +30,7 @@ def section(result: TuningResult) -> doc.Section:
     ]
     blocks.append(doc.details("How the start gains were found", [doc.text(step) for step in result.steps]))
     title = "Tuning" if result.feasible else "Tuning: the requirements cannot be met"
-    status: doc.Status = "pass" if result.feasible else "fail"
-    return doc.section("tuning", title, blocks, result=summary(result), status=status)
+    return doc.section("tuning", title, blocks, result=summary(result), status=result.verdict.role())
 
 
 def write(result: TuningResult, folder: Path | None) -> list[str]:
@@ -39,6 +41,16 @@ def write(result: TuningResult, folder: Path | None) -> list[str]:
 
 
 def summary(result: TuningResult) -> str:
+    """What was found of what is searched for, and which of the other requirements are not met."""
+    told = [_searched(result)]
+    for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
+        open_ones = (one for one in result.others if one.verdict == word and not one.passes)
+        names = "; ".join(label(one, load_unit(result.before)) for one in open_ones)
+        told += [f"{word.capitalize()}, and not searched for: {names}."] if names else []
+    return " ".join(told)
+
+
+def _searched(result: TuningResult) -> str:
     over = f"the nominal design and {result.corners - 1} corners of the tolerance box"
     if result.corners == 1:
         over = "the nominal design (no value has a tolerance)"
@@ -47,13 +59,13 @@ def summary(result: TuningResult) -> str:
         if not missed:
             return f"The search meets every requirement over {over}; certified margins do not confirm it."
         return f"No gains meet every requirement over {over}. The best compromise misses {missed}."
-    words = f"Every requirement is met over {over}"
+    words = f"Every requirement {'searched for ' * bool(result.others)}is met over {over}"
     rest = f" But the drive does not come to rest {result.hunting}." if result.hunting else ""
     placed = f" Gains alone do not do; added: {', '.join(result.placed)}." if result.placed else ""
     names = ", ".join(f"{r.id} ({_amount(r)} left)" for r in result.requirements if r.binds)
     if result.aim == "least-change":
         if not changed(result):
-            return f"{words}. Nothing needs to change.{rest}"
+            return f"{words}. No gain needs to change.{rest}"
         least = "the least change found" if result.spent else "the least change that does"
         return f"{words}.{placed}{f' This is {least}; binding: {names}.' if names else ''}{rest}"
     if names:
@@ -133,14 +145,14 @@ def _curve(result: TuningResult) -> doc.Block:
     panel = chart.panel("bandwidth of the position loop, Hz", "smallest phase margin of all loops, deg")
     x, y = [p.bandwidth_hz for p in result.trade_off], [p.phase_margin_deg for p in result.trade_off]
     panel.curve(x, y, "best smallest phase margin, worst corner", colour=style.BLUE)
-    for ok, marker, colour, label in (
+    for ok, marker, colour, legend in (
         (True, "o", style.GREEN, "all other requirements met"),
         (False, "x", style.RED, "another requirement fails"),
     ):
         chosen = [(p.bandwidth_hz, p.phase_margin_deg) for p in result.trade_off if p.feasible is ok]
         if chosen:
             xs, ys = zip(*chosen, strict=True)
-            panel.points(xs, ys, label, marker=marker, colour=colour, size=7.0)
+            panel.points(xs, ys, legend, marker=marker, colour=colour, size=7.0)
     required: style.Style = {"colour": style.RED, "width": 1.2, "dash": 1, "seen": True, "label": "required"}
     if width and width[0] is not None:
         panel.rule_x(width[0], **required)

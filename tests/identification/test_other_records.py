@@ -9,14 +9,14 @@ import pytest
 from actuator_lti import load_design
 from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Tolerance
-from actuator_lti.errors import InputError
 from analyses.identification.inverse import fit_records
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.studies.sampling import sampler_of
-from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.problem import gain_requirements, problem_of
 from examples.odrive_motor import find_chirp, fit_step, main, predict_chirp
 from tests.identification.bench_records import columns_of, motion, record_of, write
+from tests.refusals import refused
 
 GIMBAL = Path(__file__).parents[1] / "nonlinear" / "gimbal.toml"
 
@@ -72,8 +72,7 @@ def test_a_chirp_is_found_again_and_noise_is_not() -> None:
     assert (law.start_hz, law.rate_per_s) == (pytest.approx(1.5, rel=1e-4), pytest.approx(0.8, rel=1e-4))
     assert law.end_s > 5.9
     noise = np.where(time > 1.0, np.random.default_rng(0).standard_normal(len(time)), 0.0)
-    with pytest.raises(InputError, match="no chirp"):
-        find_chirp(time, noise)
+    refused(find_chirp, time, noise, words="no chirp")
 
 
 AMBER = load_design("ilr33-amber")
@@ -110,7 +109,7 @@ def test_what_was_identified_is_what_the_studies_draw(tmp_path, cli) -> None:
     draws = sampler.draw(0, 4096)[:, [sampler.paths.index(path) for path in paths]]
     size = np.sqrt(np.diag(wanted))
     assert np.cov((draws / size).T) == pytest.approx(wanted / np.outer(size, size), abs=0.05)
-    corner = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    corner = problem_of(design, gain_requirements(design), {"control.position.gain": 100.0})
     assert set(paths) <= {factor.path for factor in corner.factors}
     drawn = ("--samples", "64", "--no-worst", "--out", tmp_path / "mc", "--json")
     study = cli("montecarlo", tmp_path / "ilr33-amber-identified.toml", *drawn)

@@ -15,6 +15,7 @@ from actuator_lti.margins import stability_margins
 from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
+from tests.refusals import refused
 
 s = control.tf("s")
 W = 2 * math.pi * 30
@@ -112,8 +113,7 @@ def test_peaks_beside_a_mode_at_rest_that_the_loop_does_not_show(shown: str) -> 
     ],
 )
 def test_no_value_to_fall_from_and_no_such_level(loop: control.LTI, level: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        closed_loop_bandwidth(loop, level=level)
+    refused(closed_loop_bandwidth, loop, level=level, match=message)
 
 
 def test_every_crossing_is_listed_and_the_first_fall_is_meant() -> None:
@@ -230,5 +230,4 @@ def test_a_delay_that_is_none_is_refused_in_one_line(system: str, delay_s: Any) 
         partial(stability_margins, given),
         partial(unwrapped_phase_deg, given, [1.0]),
     ):
-        with pytest.raises(InputError, match=r"^delay_s = .*: must be finite and not negative, in s$"):
-            asked(delay_s=delay_s)
+        refused(asked, delay_s=delay_s, match=r"^delay_s = .*: must be finite and not negative, in s$")

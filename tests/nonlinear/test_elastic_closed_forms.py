@@ -12,6 +12,7 @@ from actuator_lti.design.model import Controller, Friction, Limits, Motor, Posit
 from nonlinear import commands, simulate
 from nonlinear._kernels import layout
 from tests.nonlinear.elastic_drive import Run, drive_f, random_drive, run_plant, two_mass
+from tests.refusals import refused
 
 K, J_M, J_L, N, B = 200.0, 2e-5, 1e-3, 10.0, 0.01
 REDUCED = 1.0 / (1.0 / J_L + 1.0 / (J_M * N * N))  # inertia of the relative motion
@@ -174,8 +175,7 @@ def test_a_worm_before_a_chain_is_accepted_and_the_last_gear_is_meant_where_noth
         ({"load.locking_gear": "worm", "friction.load_coefficient": 0.9 / 4752}, "gives energy"),
         ({"load.locking_gear": "worm", "load.path": "back-drivable"}, "load.locking_gear = .*self-locking"),
     ):
-        with pytest.raises(InputError, match=words):
-            with_overrides(AMBER, {**CHAIN, **wrong})
+        refused(with_overrides, AMBER, {**CHAIN, **wrong}, match=words)
 
 
 @pytest.mark.parametrize(("load_Nm", "point"), [(4.0, "driving"), (-4.0, "driven")])
@@ -250,5 +250,4 @@ def test_a_duty_ratio_is_scaled_by_the_bus_between_the_loop_s_updates_too() -> N
     with pytest.raises(InputError, match="without a current loop"):
         simulate(AMBER, commands.hold(0.0), 0.1, supply=series, supply_scales=True)
     for negative in (commands.sampled([0.0, 0.1], [12.0, -1.0]), commands.sine(12.0, 1.0)):
-        with pytest.raises(InputError, match="voltages of 0 or more"):
-            simulate(AMBER, commands.hold(0.0), 0.1, supply=negative)
+        refused(simulate, AMBER, commands.hold(0.0), 0.1, supply=negative, words="voltages of 0 or more")

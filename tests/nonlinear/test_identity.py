@@ -128,8 +128,9 @@ def cruise(design: Design, point: Point) -> tuple[State, dict[str, float], float
     return state, linear | {"hold_w_ref": w, "hold_i_ref": i, "u1": u, "u2": u}, bent, twist
 
 
-@pytest.mark.parametrize("rates", RATES)
-@pytest.mark.parametrize("delay", DELAYS)
+@pytest.mark.parametrize(
+    ("delay", "rates"), [(0.0, RATES[0]), (0.5, RATES[1]), (1.0, RATES[1]), (1.5, RATES[0])]
+)
 @pytest.mark.parametrize("point", POINTS, ids=lambda point: point.name)
 def test_behind_a_coupling_between_its_events(point: Point, delay: float, rates: tuple[int, int]) -> None:
     friction = Friction(dry_torque_Nm=DRY, viscous_Nms_rad=1e-4, load_coefficient=point.load_coefficient)

@@ -115,7 +115,6 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     run = simulate("ilr33-amber", commands.step(0.01), 0.01)
     monkeypatch.setitem(sys.modules, "pandas", None)
     told = r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
-    with pytest.raises(InputError, match=told):
-        run.to_pandas()
+    refused(run.to_pandas, match=told)
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
     refused(plot_bode, assemble_loops("ilr33-amber").velocity.open_loop, words="plotting needs matplotlib")

@@ -10,7 +10,6 @@ from toleranced import toleranced
 
 from actuator_lti import load_design, read_design_text
 from actuator_lti.design.asked import Waiver
-from actuator_lti.errors import InputError
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.judging import Reduction, reduced, unpacked
 from analyses.monte_carlo.result import MOST, clopper_pearson
@@ -18,6 +17,7 @@ from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
 from analyses.studies.sampling import sampler_of
 from reports.sections.monte_carlo import brief, section
+from tests.refusals import refused
 from tests.reports.live_page import opened
 
 
@@ -116,8 +116,7 @@ def test_a_single_sample_is_replayed_by_its_number_and_another_study_does_not_mi
     assert result.friction.load_coefficient == row["parameter.friction.load_coefficient"]
     alone = SampleTask(design, sampler)((617, 1))
     assert alone["position.phase_margin"][0] == row["position.phase_margin"]
-    with pytest.raises(InputError, match="another study"):
-        monte_carlo(design, study.folder, replace(PLAIN, seed=4))
+    refused(monte_carlo, design, study.folder, replace(PLAIN, seed=4), words="another study")
 
 
 def in_parts(monkeypatch, **sizes):

@@ -17,8 +17,9 @@ from actuator_lti.design.model import Coupling, Gear, PositionLoop, VelocityLoop
 from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.task import StepCheck, step_columns
+from analyses.specification.requirements import evaluate_requirements
 from analyses.tuning import TuningSettings, tune
-from analyses.tuning.problem import loop_requirements, problem_of, read_requirement
+from analyses.tuning.problem import gain_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
 from analyses.tuning.start import (
     allowed_range,
@@ -28,6 +29,7 @@ from analyses.tuning.start import (
     step_of_gain,
     symmetric_optimum,
 )
+from reports.sections.tune import summary
 from tests.changed import changed
 from tests.loops.loop_designs import source_drive
 from tests.refusals import refused
@@ -46,7 +48,7 @@ def integrator(*requirements):
 def test_an_integrator_with_delay_gets_its_known_gain(margin):
     """Of K T z^-q/(z - 1) with L = q T: crossover at sin(w T/2) = K T/2, PM = 90 deg - w (L + T/2)."""
     design = integrator(need("phase_margin", margin, loop="position"))
-    problem = problem_of(design, loop_requirements(design), {"control.position.gain": 20.0})
+    problem = problem_of(design, gain_requirements(design), {"control.position.gain": 20.0})
     corners = problem.all_corners
     gains = maximise(
         problem, problem.start,
@@ -74,7 +76,7 @@ def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
 def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():
     """A thousand times its current gain: the radius of the position loop is NaN, which is no reserve."""
     design = load_design("ballscrew")
-    problem = problem_of(design, loop_requirements(design), {})
+    problem = problem_of(design, gain_requirements(design), {})
     gains = np.array([problem.present * [1e3 if "current.gain" in path else 1.0 for path in problem.paths]])
     wild = with_values(design, dict(zip(problem.paths, map(float, gains[0]), strict=True)))
     assert not stability_margins(assemble_loops(wild).current.open_loop).stable
@@ -170,7 +172,7 @@ def test_of_many_tolerances_the_strongest_make_the_corners_and_wishes_make_sense
     motor = dict.fromkeys(("resistance", "inductance", "rotor_inertia"), 10)
     friction = dict.fromkeys(("viscous", "dry_torque", "load_coefficient"), 30)
     design = read_design_text(toleranced(motor=motor, friction=friction, limits={"voltage": 5}))
-    problem = problem_of(design, loop_requirements(design), dict(rule_gains(design).values))
+    problem = problem_of(design, gain_requirements(design), dict(rule_gains(design).values))
     kept = {f.path for f in problem.factors}
     assert (len(problem.toleranced), len(kept), "motor.resistance" in kept) == (11, 10, True)
     assert problem.all_corners.shape == (1025, 10)
@@ -215,7 +217,7 @@ def seen(design):
 def test_a_requirement_that_only_a_notch_meets():
     """No gain does, and with the notch certified margins say that every limit is kept."""
     design = servo(*WIDE, stiffness=RESONANT)
-    problem = problem_of(design, loop_requirements(design), {})
+    problem = problem_of(design, gain_requirements(design), {})
     grid = np.geomspace(1e-4, 1.0, 400)[:, None]
     assert problem.distances(grid, problem.all_corners).min(axis=(1, 2)).max() < 0.0
     refused = tune(design, QUICK)
@@ -241,7 +243,7 @@ def distance_of(tuned):
 
 def nearest_drawn(design, most):
     """Of many notches about the resonance, with any gain and depth: the nearest that does, below a change."""
-    problem = problem_of(design, loop_requirements(design), {}, ("notch",))
+    problem = problem_of(design, gain_requirements(design), {}, ("notch",))
     rng, size = np.random.default_rng(5), 60_000
     frequency = 2 * np.pi * 700.0 * np.exp(rng.uniform(-0.3, 0.3, size))
     gain, depth = 0.02 * np.exp(rng.uniform(0.0, 1.5, size)), np.exp(rng.uniform(-1.5, 0.0, size))
@@ -264,7 +266,7 @@ def test_no_smaller_change_of_two_gains_meets_the_requirements():
     reach = 1.2 * np.sqrt(change)
     line = np.linspace(-reach, reach, 61)
     grid = np.exp(np.array(np.meshgrid(line, line)).reshape(2, -1).T) * [0.03, 0.01]
-    problem = problem_of(design, loop_requirements(design), {})
+    problem = problem_of(design, gain_requirements(design), {})
     met = problem.distances(grid, problem.all_corners).min(axis=(1, 2)) >= 0.0
     assert met.any()
     away = (np.log(grid / [0.03, 0.01]) ** 2).sum(axis=1)
@@ -307,6 +309,27 @@ def test_feed_forward_carries_the_bandwidth_where_the_gain_may_not_rise():
     assert position.feedforward > 0.0 or position.acceleration_feedforward > 0.0
 
 
+def test_a_rate_that_a_velocity_gain_bounds_is_tuned_for_and_every_other_requirement_is_judged():
+    """K (w_lim - w) = C + L: w of w_lim/2 takes K = 2 (C + L)/w_lim; no gain moves the acceleration k U/J."""
+    rate = model.Requirement(
+        id="rate", quantity="output_rate", unit="deg/s", minimum=math.degrees(5.0), load_Nm=0.4
+    )
+    push = model.Requirement(id="push", quantity="acceleration", unit="deg/s^2", minimum=math.degrees(1e5))
+    design = changed(
+        servo(need("phase_margin", 30.0), rate, push, gain=0.05, position=PositionLoop(gain=1.0)),
+        limits={"speed_rad_s": 10.0}, friction={"dry_torque_Nm": 0.1, "viscous_Nms_rad": 0.0},
+    )  # fmt: skip
+    tuned = tune(design, QUICK)
+    assert tuned.design.controller.velocity.gain == pytest.approx(2.0 * 0.5 / 10.0, rel=1e-5)
+    assert (tuned.feasible, tuned.passed) == (True, False)
+    assert {one.id: one.verdict for one in tuned.others} == {"push": "not met"}
+    assert {one.id: one.verdict for one in evaluate_requirements(tuned.design) if not one.passes} == {
+        "push": "not met"
+    }
+    assert summary(tuned).endswith("Not met, and not searched for: Drive: acceleration.")
+    assert "Not met: Drive" not in summary(tune(replace(design, requirements=design.requirements[:2]), QUICK))
+
+
 @pytest.mark.parametrize(("words", "design", "message"), [
     (("filter",), servo(), "notch, lowpass, feedforward"),
     (("feedforward",), servo(), "no control.position"),
@@ -321,5 +344,7 @@ def test_what_has_no_place_is_refused(words, design, message):
 def test_the_command_places_and_says_so(cli, tmp_path):
     words = ("--place", "notch,lowpass", "--aim", "least-change", "--no-curve", "--quiet", "--out", tmp_path)
     assert "least change" in cli.text("tune", "fin", *words)
-    assert load_design(tmp_path / "tuned.toml").controller.velocity.filters == ()
+    assert [item.kind for item in load_design(tmp_path / "tuned.toml").controller.velocity.filters] == [
+        "notch"
+    ]
     assert "spring" in cli.refused("tune", "fin", "--place", "spring", "--quiet")

@@ -7,12 +7,16 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
+from actuator_lti.design.model import Requirement
 from analyses.comparison.found import LargeSignal, figure_names
 from analyses.comparison.variants import compare
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import load_study, study_of, study_or_design
 from reports.sections.compare import batches, brief, ledger, section
 from reports.sections.compare_best import section as best_section
+from reports.sections.compare_figures import tornadoes
+from reports.verdict_summary import walk
+from tests.changed import changed
 from tests.refusals import refused
 
 HEAD = '[study]\nname = "s"\nbase = "ilr33-amber"\n'
@@ -242,3 +246,18 @@ def test_the_printed_example_is_a_study_and_23_s_stand_in_a_row_of_seconds(cli, 
     assert row[row.index("time") + 1] == "s"
     assert float(row[-3]) == pytest.approx(math.log(50.0) / 0.17, abs=0.01)
     assert float(row[-5]) == pytest.approx(0.033, abs=0.001)
+
+
+MARGINS = {f"{name} margin: each parameter alone at both its ends." for name in ("gain", "phase")}
+
+
+@pytest.mark.parametrize("asked", ["overshoot", "rise_time", "settling_time", ""])
+def test_what_has_no_slope_has_no_tornado(asked):
+    """Figures of the step; and those of the response to a command behind the mean of a limited jerk."""
+    needs = [Requirement(id=asked, quantity=asked, unit="s", loop="position", maximum=9.0)] if asked else []
+    profile = {"rate_rad_s": 1.0, "acceleration_rad_s2": 50.0, "jerk_rad_s3": 2000.0}
+    design = changed(load_design("ilr33-amber"), requirements=tuple(needs), command=profile)
+    made = tornadoes(compare(study_of(design)))
+    shown = [block["caption"] for block in walk(made) if block["kind"] == "figure"]
+    assert {words.partition(" loop")[0] for words in shown} == {"Current", "Velocity", "Position"}
+    assert {words.partition(": ")[2] for words in shown if words.startswith("Position")} <= MARGINS

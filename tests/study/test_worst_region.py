@@ -17,7 +17,7 @@ from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.monte_carlo.task import replay
 from analyses.monte_carlo.worst import Region
 from analyses.studies.sampling import Sampler, Table, correlation_of, sampler_of, semidefinite_root
-from analyses.tuning.problem import loop_requirements, problem_of
+from analyses.tuning.problem import gain_requirements, problem_of
 
 
 def _cube(region: Region, count: int = 4000) -> np.ndarray:
@@ -123,7 +123,7 @@ def test_torque_and_back_emf_constant_move_by_one_factor(tmp_path, toleranced) -
     ratios = [one.motor.torque_constant_Nm_A / one.motor.back_emf_constant_Vs_rad for one in made]
     assert ratios == pytest.approx(len(made) * [5.9 / 6.1], rel=1e-9)
     assert np.ptp([one.motor.torque_constant_Nm_A for one in made]) > 1e-3
-    problem = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    problem = problem_of(design, gain_requirements(design), {"control.position.gain": 100.0})
     assert len(problem.all_corners) == 3
     factor = np.array([1.0, 0.8, 1.2])
     gains = {path: np.full(3, value) for path, value in zip(problem.paths, problem.start, strict=True)}
@@ -143,7 +143,7 @@ def test_one_constant_is_drawn_as_one_and_opposite_ones_opposite(sign: float) ->
 
 def test_three_that_are_one_what_contradicts_and_no_corner_where_one_constant_is_two() -> None:
     design = _tied()
-    problem = problem_of(design, loop_requirements(design), {"control.position.gain": 100.0})
+    problem = problem_of(design, gain_requirements(design), {"control.position.gain": 100.0})
     names = [factor.path for factor in problem.factors]
     corners = problem.all_corners
     i, j = names.index(KM), names.index(KE)

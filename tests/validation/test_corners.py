@@ -10,12 +10,12 @@ import pytest
 from actuator_lti.batch import Population
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Requirement
-from actuator_lti.errors import InputError
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
 from analyses.specification.capability import drive_figures
 from analyses.specification.sensitivity import population_figures
 from reports.sections.corners import chart, section
+from tests.refusals import refused
 
 FIN, EMPS = load_design("fin"), load_design("emps")
 
@@ -108,8 +108,7 @@ def test_a_corner_that_contradicts_itself_fails_by_name_and_ends_nothing(cli) ->
 def test_a_source_has_no_temperature() -> None:
     names = [one.name for one in corners(EMPS).corners]
     assert names == ["nominal", "low supply", "worst gain margin", "worst phase margin"]
-    with pytest.raises(InputError, match="must be positive"):
-        Asked.of(EMPS, supply_V=-1.0)
+    refused(Asked.of, EMPS, supply_V=-1.0, words="must be positive")
 
 
 def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:

@@ -1,7 +1,7 @@
 """Failure cases against closed forms; nothing failed, the rig is the drive."""
 
 from dataclasses import replace
-from math import pi, sqrt
+from math import inf, pi, sqrt
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
-from analyses.failures.cases import Rig, _followed_most_hz, cases_of
+from analyses.failures.cases import Rig, _sines, cases_of
 from analyses.failures.run import MOST_TICKS, _hold, _settling_s
 from nonlinear import commands, simulate
 from reports.charts.svg import draw_svg
@@ -142,11 +142,33 @@ def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
 def test_without_a_resonance_the_sine_is_at_the_bandwidth() -> None:
     """A follower that falls from zero frequency on would be asked to creep at 0.1 Hz, which moves nothing."""
     slow = changed(AMBER, controller={"position": {"gain": 40.0}})
-    frequency, words = _followed_most_hz(slow)
+    ((frequency, words),) = _sines(slow, 0.01)
     response = assemble_loops(slow).reference_to_output
     size = abs(response(np.exp(2j * pi * frequency * slow.controller.period_s)))
     assert size == pytest.approx(np.sqrt(0.5), rel=1e-6)
     assert "bandwidth" in words
+
+
+def test_the_sine_is_one_that_the_profile_of_the_command_lets_pass() -> None:
+    """v, a and j of the command: A w <= v, A w^2 <= a, and the mean over 2 a/j is -3 dB at 2.783/(2 a/j)."""
+    v, a, j, size = 0.5, 8.0, 40.0, 0.01
+    rate = changed(AMBER, command={"rate_rad_s": v})
+    assert list(_sines(rate, size))[-1][0] == pytest.approx(v / size / (2 * pi), rel=1e-3)
+    both = changed(AMBER, command={"rate_rad_s": v, "acceleration_rad_s2": a})
+    assert list(_sines(both, size))[-1][0] == pytest.approx(sqrt(a / size) / (2 * pi), rel=1e-3)
+    smooth = changed(AMBER, command={"rate_rad_s": v, "acceleration_rad_s2": a, "jerk_rad_s3": j})
+    assert max(hz for hz, _ in _sines(smooth, size)) < 1.01 * 2.783 / (2 * a / j) / (2 * pi)
+
+
+def test_no_deflection_is_beyond_the_stop_and_a_drive_without_a_current_limit_has_all_cases() -> None:
+    """The stop is hard: the tick that passes it is not seen, the time on the way to it is."""
+    design = changed(AMBER, limits={"peak_current_A": inf, "peak_time_s": None})
+    found = failures(design, Asked.of(design, detection_s=0.5))
+    free = failures(design, replace(found.asked, stop_rad=10.0))
+    case, other = (one.case("hard-over") for one in (found, free))
+    assert case.at_detection_rad == found.asked.stop_rad == case.deflection_rad.max()
+    assert case.to_stop_s == np.interp(found.asked.stop_rad, other.deflection_rad, other.time_s)
+    assert len(found.cases) == 7
 
 
 def test_an_open_phase_of_three_says_what_one_winding_leaves_out() -> None:

@@ -13,7 +13,6 @@ from actuator_lti import load_design
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import with_overrides, with_values
 from actuator_lti.drive.steady import motor_torque_Nm
-from actuator_lti.errors import InputError
 from analyses.duty import Asked, duty
 from analyses.duty.run import heating
 from analyses.friction_effects import friction_effects
@@ -29,6 +28,7 @@ from reports.sections import large_signal as large_section
 from reports.sections import specification as specification_section
 from reports.sections.duty import section
 from tests.changed import changed
+from tests.refusals import refused
 
 AMBER, FIN, JOINT = (load_design(name) for name in ("ilr33-amber", "fin", "joint"))
 SHIPPED = ("ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position")
@@ -298,10 +298,8 @@ def test_section_figure_and_command(cli) -> None:
     assert told["rms_A"] < told["continuous_A"] == 6.0
     assert "--share 0: allowed: above 0, at most 1" in cli.refused("duty", "joint", "--share", "0")
     assert "Hz: at least" in cli.refused("duty", "joint", "--frequency", "1e-320")
-    with pytest.raises(InputError, match="no current"):
-        duty(load_design("emps"))
-    with pytest.raises(InputError, match="position loop"):
-        duty(changed(JOINT, controller={"position": None}))
+    refused(duty, load_design("emps"), words="no current")
+    refused(duty, changed(JOINT, controller={"position": None}), words="position loop")
 
 
 def test_a_duty_that_the_drive_cannot_follow_is_said_with_its_rating() -> None:
