@@ -85,8 +85,7 @@ class Format:
     """Names without a key that are understood where they are 0: what they switch is off."""
     newer: Mapping[str, str] = field(default_factory=dict)
     """Parts of names of newer firmware, each with the older one that the settings are listed by."""
-    assumed: Mapping[str, float] = field(default_factory=dict)
-    """Numbers where the file has none."""
+    assumed: Mapping[str, float] = field(default_factory=dict)  # numbers where the file has none
 
 
 def _ratio(above: float, below: float) -> float:
