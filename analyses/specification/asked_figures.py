@@ -17,7 +17,6 @@ from analyses.failures import failures
 from analyses.large_signal.tones import linear_steady_state, run_tones, tone
 from analyses.limit_cycles import limit_cycles
 from analyses.motion.settling import ending_of
-from analyses.specification.requirements import NOT_STATED
 
 
 def said_of(design: Design, frequency_hz: float | None) -> str:
@@ -79,7 +78,7 @@ class AskedFigures:
         return quantity.better * worst
 
     def figure(self, name: str) -> tuple[float | None, str]:
-        """A figure in its unit and, where there is none, why."""
+        """A figure in its unit, and what there is to say of it."""
         quantity = ANALYSIS_QUANTITIES[name]
         try:
             if quantity.cornered:
@@ -87,7 +86,6 @@ class AskedFigures:
             value = quantity.read(self, self.design.axis)
         except InputError as error:
             return None, error.message
-        said = "" if value is not None else NOT_STATED
-        if name == "limit_cycle":  # after which step that is
-            said = "" if self.cycles.hunting is None else ending_of(self.design, self.cycles.hunting)
-        return value, said
+        if name == "limit_cycle" and self.cycles.hunting is not None:  # after which step that is
+            return value, ending_of(self.design, self.cycles.hunting)
+        return value, ""

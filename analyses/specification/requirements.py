@@ -110,7 +110,8 @@ def judged(
         told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
         raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if quantity.scope == "analysis":
-        verdicts = [_verdict(requirement, None, *asked(quantity.name))]
+        value, reason = asked(quantity.name)
+        verdicts = [_verdict(requirement, None, value, reason or NOT_STATED * (value is None))]
     elif quantity.scope == "drive":
         value = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
         reason = "the design has no such figure" if math.isnan(value) else ""
@@ -129,8 +130,7 @@ def judged_by(design: Design, analysis: str, result: object) -> tuple[Requiremen
     """Judge the requirements on what one analysis finds, ``failures`` or ``duty``, by its result."""
 
     def found(name: str) -> tuple[float | None, str]:
-        value = QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis)
-        return value, NOT_STATED * (value is None)
+        return QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis), ""
 
     own = {name for name, one in QUANTITIES.items() if one.reader.startswith(f"{analysis}.")}
     asked = (one for one in design.requirements if one.quantity in own)
