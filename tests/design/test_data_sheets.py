@@ -212,7 +212,7 @@ def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -
     asked = cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"]
     assert asked == [{"path": "motor.torque_constant", **told}]
     assert "In the model as" in cli.text("keys", "--explain", "ilr33-amber")
-    gains = control.ss([], [], [], [[2.0, -0.5]], True)
+    gains = control.ss([], [], [], [[2.0, -0.5]], 6.25e-5)
     own = SERVO.with_law("velocity", gains, inputs=["error", "current"])
     law = {item.path: item for item in explained(own)}["control.velocity.law"]
     assert law.read == "error in rad/s, current in A dc"
