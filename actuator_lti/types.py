@@ -1,7 +1,8 @@
 """Kinds of arguments and results that many functions share."""
 
 from collections.abc import Callable
-from typing import Any
+from dataclasses import fields
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,3 +15,31 @@ Mask = NDArray[np.bool_]
 Ints = NDArray[np.int64]
 Progress = Callable[[int, int], None] | None
 """Called with (done, total) while long work goes on; None: nobody looks on."""
+
+
+def number_array(given: Any) -> Floats:
+    """Numbers of any shape as floats.
+
+    A TypeError or ValueError for what is none, and for text, which numpy would read.
+    """
+    if np.asarray(given).dtype.kind in "SU":
+        raise TypeError
+    return np.asarray(given, dtype=float)
+
+
+class Compared:
+    """A dataclass (``eq=False``) that holds arrays: equal where all its fields are, nan as nan; no hash."""
+
+    __hash__: ClassVar[None]  # type: ignore[assignment]
+
+    def __eq__(self, other: object) -> bool:
+        if type(other) is not type(self):
+            return NotImplemented
+        names: Any = [one.name for one in fields(self) if one.compare]  # type: ignore[arg-type]
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in names)
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
+        return np.array_equal(a, b, equal_nan=True)
+    return bool(a == b or (a != a and b != b))

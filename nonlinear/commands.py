@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from actuator_lti.bounds import SIGNAL_ROWS, TONE_TICKS, TONES, Bound
 from actuator_lti.errors import InputError, finite_number, shown, whole_number
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, number_array
 from nonlinear._kernels import layout as at
 from nonlinear.native import fill
 
@@ -144,7 +144,7 @@ def numbers_of(name: str, given: npt.ArrayLike) -> Floats:
     try:
         if isinstance(given, Sequence) and len(given) and isinstance(given[0], range):
             raise TypeError
-        return np.asarray(given, dtype=float).ravel()
+        return number_array(given).ravel()
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{name} = {shown(given)}: must be numbers, in SI") from None
 

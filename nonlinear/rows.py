@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
-from actuator_lti.types import Floats
+from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.native import parameters
@@ -40,8 +40,8 @@ LIMITERS = at.LIMITERS
 POINTS = at.POINTS
 
 
-@dataclass(frozen=True)
-class Rows:
+@dataclass(frozen=True, eq=False)
+class Rows(Compared):
     """n runs of one design, see the module: values, shape (n, columns), and time series they refer to."""
 
     design: Design

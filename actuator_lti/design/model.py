@@ -167,6 +167,9 @@ class Design:
         """What a notebook shows."""
         return draw("design_html", self)
 
+    def __repr__(self) -> str:
+        return f"<Design {self.name}: {self.axis}, {' > '.join(self.controller.stages) or 'no loop'}>"
+
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""
         names = (id, id.rpartition("/")[0])

@@ -45,10 +45,10 @@ class OverAngle:
         """The most that the waves have that average: what starting costs at the worst angle."""
         return sum(wave.peak_Nm for wave in self.waves if wave.averages)
 
-    def at(self, angle_rad: Any) -> Any:
-        """The torque at an angle; floats or arrays."""
+    def at(self, angle_rad: Any, *, moving: bool = False) -> Any:
+        """The torque at an angle; floats or arrays. ``moving``: of a drive in motion, see `slope_at`."""
         torque = self.slope_Nm_rad * angle_rad
-        for wave in self.waves:
+        for wave in self._acting(moving):
             torque = torque + wave.peak_Nm * np.sin(wave.order * angle_rad + wave.phase_rad)
         return torque
 
@@ -57,10 +57,13 @@ class OverAngle:
 
         ``moving``: of a drive in motion, to which waves that average have none.
         """
-        acting = [w for w in self.waves if np.any(w.peak_Nm) and not (moving and w.averages)]
+        acting = self._acting(moving)
         slope, size = self.slope_Nm_rad, abs(self.slope_Nm_rad)
         for wave in acting:
             steepest, phase = wave.peak_Nm * wave.order, wave.order * angle_rad + wave.phase_rad
             slope = slope + steepest * np.cos(phase)
             size = size + abs(steepest) * (abs(np.cos(phase)) + abs(phase))
         return slope * (abs(slope) > ROUNDED * size) if acting else slope
+
+    def _acting(self, moving: bool) -> list[Wave]:
+        return [w for w in self.waves if np.any(w.peak_Nm) and not (moving and w.averages)]

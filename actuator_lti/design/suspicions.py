@@ -1,6 +1,7 @@
 """What is not wrong in a design but suspicious: one line each, for the report and the terminal."""
 
 from collections.abc import Iterator
+from contextlib import suppress
 from math import inf, isfinite, pi, sqrt
 
 from actuator_lti.design.data_sheet import FROM
@@ -8,6 +9,9 @@ from actuator_lti.design.field import unit_on
 from actuator_lti.design.loader import as_design
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed, torque_per_command
+from actuator_lti.design.reader import GAINS
+from actuator_lti.design.writing import read_value
+from actuator_lti.errors import InputError
 
 GRADES = {"", "A", "B", "C", "D", "X"}  # of a source, or several with "/" between
 
@@ -22,7 +26,7 @@ def warnings_of(design: Design) -> tuple[str, ...]:
     design = as_design(design)
     checks = (
         _sampling, _crossovers, _law, _limits, _unused, _unseen, _gears, _loads, _angles, _asked_for,
-        _pedigree, _encoder, elastic_warnings,
+        _pedigree, _encoder, elastic_warnings, kept_gains,
     )  # fmt: skip
     return tuple(line for check in checks for line in check(design))
 
@@ -172,7 +176,8 @@ def beyond_largest(design: Design, key: str, load_Nm: float) -> Iterator[str]:
     """What is said of a load that is asked for and lies above the largest one of the design."""
     largest, unit = design.load.moment_max_Nm, unit_on(design.axis, "{torque}")
     if abs(load_Nm) > largest:
-        yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max = {largest:g} {unit}"
+        stated = f"= {largest:g} {unit}" if largest else "of 0: the largest load is not stated"
+        yield f"{key}: {load_Nm:g} {unit} lies above load.moment_max {stated}"
 
 
 def elastic_warnings(design: Design) -> Iterator[str]:
@@ -224,6 +229,20 @@ def _pedigree(design: Design) -> Iterator[str]:
             yield f"{path}: grade {item.grade[:20]!r} is none of A, B, C, D, X"
         if item.grade == "X" and item.tolerance is None and path.startswith(plant):
             yield f"{path}: an assumed value (grade X) without a tolerance"
+
+
+def kept_gains(design: Design) -> Iterator[str]:
+    """Gains read from what they did with the drive as it was (model.md section 11) and do no more."""
+    for path in GAINS:
+        item = design.parameters.get(path)
+        said = "" if item is None else item.source.partition("; ")[0].removeprefix("from ")
+        if item is None or said == item.source.partition("; ")[0]:
+            continue
+        with suppress(InputError):  # of a source that a user wrote
+            now, unit = read_value(design, path, said), item.text.partition(" ")[2]
+            if abs(now - item.value) > 1e-9 * item.value:
+                kept = f"keeps {item.value:.4g} {unit}, which was {said} before a change"
+                yield f"{path}: {kept}; {said} would now be {now:.4g} {unit}"
 
 
 def _encoder(design: Design) -> Iterator[str]:

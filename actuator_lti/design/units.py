@@ -223,7 +223,7 @@ def parse_unit(unit: str) -> UnitValue:
 
 def _unknown(name: str, units: Units) -> str:
     if name.lower() in _ASIDE:
-        return f'"{name}" {_ASIDE[name.lower()]}'
+        return f'"{name.replace("_", "-")}" {_ASIDE[name.lower()]}'
     names = [known for known in units if known[0] != "1"]
     prefixed = (prefix + known for known in names for prefix in ("", *_PREFIXES))
     cased = [one for one in prefixed if one.lower() == name.lower() and one != name]

@@ -167,7 +167,7 @@ def slopes_torque(slopes: list[tuple[float, Any]], speed: Any) -> Any:
 
 def steady_torque_Nm(design: Design, load_Nm: float, speed_rad_s: Any) -> Any:
     """Motor torque for a steady motion forward against a load, friction and damping on the way."""
-    return resistance_Nm(design, load_Nm, 1) + speed_torque_Nm(design, speed_rad_s)
+    return resistance_Nm(design, _with_own_Nm(design, load_Nm), 1) + speed_torque_Nm(design, speed_rad_s)
 
 
 def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) -> Any:
@@ -209,17 +209,23 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     )
 
 
+def _with_own_Nm(design: Design, load_Nm: float) -> Any:
+    """A load torque with the load's own moment at output angle 0, gravity; but for what a motion averages."""
+    return load_Nm + design.load.over_angle.at(0.0, moving=True)
+
+
 def capability(design: Design, load_Nm: float = 0.0) -> Capability:
     """Rate, current and acceleration at a load torque (either sign): the worse of both directions.
 
     Worse is the slower direction, then the weaker, then the one that needs more current. On a back-drivable
-    path the moment is against the motion.
+    path the moment, with the load's own at output angle 0 (gravity), is against the motion.
 
     Raises `InputError`: if the load is not finite.
     """
     if not math.isfinite(load_Nm):
         raise InputError(f"load_Nm = {load_Nm}: must be finite")
-    ahead, back = (_one_way(design, load_Nm, direction) for direction in (1, -1))
+    whole = _with_own_Nm(design, load_Nm)
+    ahead, back = (_one_way(design, whole, direction) for direction in (1, -1))
     slower = back.output_rate_rad_s < ahead.output_rate_rad_s
     weaker = back.acceleration_rad_s2 < ahead.acceleration_rad_s2
     as_strong = back.acceleration_rad_s2 == ahead.acceleration_rad_s2

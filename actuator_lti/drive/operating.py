@@ -67,9 +67,10 @@ class Operating:
             raise InputError(f"rotor = {self.rotor!r}: free or locked")
         for name in ("load_Nm", "speed_rad_s", "angle_rad", "twist_rad"):
             finite_number(name, getattr(self, name))
-        amplitude = self.speed_amplitude_rad_s
-        if self.point == "describing-function" and (amplitude is None or not 0 < amplitude < float("inf")):
-            raise InputError(f"speed_amplitude_rad_s = {amplitude}: must be positive (motor side)")
+        W, allowed = self.speed_amplitude_rad_s, "positive, in rad/s (motor side)"
+        needed = self.point == "describing-function"
+        if (needed or W is not None) and finite_number("speed_amplitude_rad_s", W, allowed) <= 0.0:
+            raise InputError(f"speed_amplitude_rad_s = {W}: must be {allowed}")
 
     def checked(self, design: Design) -> Operating:
         """The same, refused where the design has no such operating point."""
@@ -164,8 +165,8 @@ def holding_moment_Nm(design: Design, angle_rad: float = 0.0) -> float:
 
 
 def carried_Nm(design: Design, at: Operating) -> Any:
-    """Torque of the coupling that carries the load and the load's own moment at the output angle, at rest."""
-    own = design.load.over_angle.at(at.angle_rad)
+    """Torque of the coupling under a load and the load's own moment at the output angle, no friction."""
+    own = design.load.over_angle.at(at.angle_rad, moving=_moving(design, at))
     return -(at.load_Nm + own) / design.ratio_behind_coupling
 
 
@@ -187,19 +188,34 @@ def _motor_angle_rad(design: Design, angle_rad: float, twist_rad: float) -> Any:
     return design.total_ratio * angle_rad + design.ratio_to_coupling * twist_rad
 
 
+def runs(design: Design) -> bool:
+    """Whether nothing but the speed is held: such a drive is one in motion."""
+    return design.controller.outermost == "velocity"
+
+
+def averaged(design: Design) -> Design:
+    """The same drive without what a motion averages, cogging and gear error, if it is one in motion."""
+    load = replace(design.load, gear_error_Nm=0.0)
+    return replace(design, motor=design.motor.straight(), load=load) if runs(design) else design
+
+
+def _moving(design: Design, at: Operating) -> bool:
+    return at.speed_rad_s != 0.0 or (runs(design) and at.point != "rest")
+
+
 def torque_slope(design: Design, at: Operating) -> Any:
     """dT/d(motor angle) of the motor's own torque, in the same way."""
     if at.torques_held:
         return 0.0
     angle = _motor_angle_rad(design, at.angle_rad, at.twist_rad)
-    return design.motor.over_angle.slope_at(angle, moving=at.speed_rad_s != 0.0)
+    return design.motor.over_angle.slope_at(angle, moving=_moving(design, at))
 
 
 def moment_slope(design: Design, at: Operating) -> Any:
     """dM_ext/d(output angle) in N m/rad at the operating point; a float, or an array of stacked designs."""
     if at.torques_held:
         return 0.0
-    return design.load.over_angle.slope_at(at.angle_rad, moving=at.speed_rad_s != 0.0)
+    return design.load.over_angle.slope_at(at.angle_rad, moving=_moving(design, at))
 
 
 def pushes_away(design: Design, at: Operating) -> Any:

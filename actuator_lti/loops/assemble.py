@@ -1,5 +1,6 @@
 """From a design to all of its loops, in the form and at the operating point asked for."""
 
+import copyreg
 from functools import partial
 from os import PathLike
 from typing import Any, get_args
@@ -106,3 +107,10 @@ def loops_at(
         tick_system=time.tick_system(wired) if whole and sampled_form else None,
         period_s=wired.tick_s if sampled_form else None,
     )
+
+
+def _assembled_again(loops: Loops) -> Any:
+    return loops_at, (loops.design, loops.operating, loops.form, loops.inner_loops)
+
+
+copyreg.pickle(Loops, _assembled_again)  # sent to a worker as what it is made of

@@ -17,6 +17,7 @@ from actuator_lti.drive.signals import CLAMP_OF, LIMITERS, Limiter
 from actuator_lti.drive.wiring import Drive
 from actuator_lti.errors import InputError, finite_number, shown
 from actuator_lti.loops.result import Loops
+from actuator_lti.types import Compared, number_array
 
 Response = Callable[[np.ndarray], np.ndarray]
 
@@ -74,8 +75,8 @@ class LimiterPath:
             return np.asarray(headroom / magnitude)
 
 
-@dataclass(frozen=True)
-class Onset:
+@dataclass(frozen=True, eq=False)
+class Onset(Compared):
     """The limit of linear validity: smallest A_k over the limiters, and which one it is."""
 
     omega_rad_s: np.ndarray  # shape (K,)
@@ -89,7 +90,7 @@ class Onset:
 
 def _frequencies(omega_rad_s: Any) -> np.ndarray:
     try:
-        omega = np.atleast_1d(np.asarray(omega_rad_s, dtype=float))
+        omega = np.atleast_1d(number_array(omega_rad_s))
     except (TypeError, ValueError):
         omega = np.array([np.nan])
     if not np.isfinite(omega).all():

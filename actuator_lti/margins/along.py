@@ -104,6 +104,11 @@ class Along:
                 (new[0], 1.0 / new[1] if part.beyond else new[1]) if new[0] < old[0] else old
                 for new, old in zip(found, best, strict=True)
             ]
+        # what the search leaves, a part in 1e8, may be all that a small loop has
+        reals = self.reals
+        best = [
+            min([old, *((d.at(at.L), at.w) for at in reals)]) for old, d in zip(best, distances, strict=True)
+        ]
         inside = [w for _, w in best if 0.0 < w < math.inf]
         L = dict(zip(inside, self.loop.at(np.array(inside)).tolist(), strict=True)) if inside else {}
         return [(d.at(L[w]) if w in L else value, w) for d, (value, w) in zip(distances, best, strict=True)]

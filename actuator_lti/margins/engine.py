@@ -38,7 +38,8 @@ def stability_margins(
     margin (0 for an unstable loop), the smallest distance to -1.
 
     ``system``: the open loop L, one input and one output, continuous or sampled: StateSpace,
-    TransferFunction, `DelaySystem` or FrequencyResponseData. With ``dt=True`` the period counts as 1 s.
+    TransferFunction (of scipy.signal too), `DelaySystem` or FrequencyResponseData. With ``dt=True`` the
+    period counts as 1 s.
     Measured data give bounds between neighbouring points and no verdict.
 
     ``delay_s``: exact extra delay in series. In a sampled loop whole samples become states; part of a sample
@@ -68,6 +69,8 @@ def stability_margins(
     (True, 9.943, 61.3521, 10.70796)
     """
     delay_s, band_rad_s = delay_number(delay_s), _band(band_rad_s)
+    if certify not in (True, False):
+        raise InputError(f"certify = {shown(certify)}: must be True or False")
     if is_measured(system):
         return measured_margins(system, delay_s, band_rad_s)
     if hasattr(system, "delays_s"):

@@ -165,11 +165,15 @@ def _lines(m: StabilityMargins) -> list[str]:
         return [*lines, evidence, *(f"note: {note}" for note in m.notes)]
     named = (("gain", m.gain_margins), ("phase", m.phase_margins), ("delay", m.delay_margins))
     for name, margins in named:
-        if not margins:
-            lines.append(f"{name} margin: none")
-        lines += [f"{name} margin: {margin}" for margin in margins[:_PRINTED]]
+        label = f"{name} margin"
+        if name == "delay" and m.stable is False:
+            lines.append("delay margin: 0 s, as it is not stable")
+            label = "delay to the border"
+        elif not margins:
+            lines.append(f"{label}: none")
+        lines += [f"{label}: {margin}" for margin in margins[:_PRINTED]]
         if len(margins) > _PRINTED:
-            lines.append(f"{name} margin: {len(margins) - _PRINTED} more")
+            lines.append(f"{label}: {len(margins) - _PRINTED} more")
     if m.modulus_margin is not None and m.modulus_frequency_rad_s is not None:
         where = f"{m.modulus_margin:.6g} at {frequency_text(m.modulus_frequency_rad_s)}"
         lines.append(f"modulus margin: {where}{_within(m.modulus_range)}")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.plain_system import period_of
-from actuator_lti.types import Complex, Real
+from actuator_lti.types import Compared, Complex, Ints, Real, number_array
 
 CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
@@ -23,8 +23,8 @@ _FEWEST = 6  # points: of two residuals the median has one degree of freedom
 _UNKNOWN = f"not known, as so few points do not show it: no range is stated; {_KNOWN}"
 
 
-@dataclass(frozen=True)
-class MeasuredResponse:
+@dataclass(frozen=True, eq=False)
+class MeasuredResponse(Compared):
     """A measured loop L with the radius of a circle about each value that holds the true one.
 
     `stability_margins` takes it as it takes `control.FrequencyResponseData`; the ranges that it states are
@@ -61,7 +61,7 @@ class MeasuredResponse:
         Raises `InputError`: a negative or infinite standard deviation, or a confidence outside (0, 1).
         """
         omega, L, dt = _read(data)
-        sigma = _per_point(standard_deviation, L.size, "standard_deviation", math.inf)
+        sigma = _per_point("standard_deviation", standard_deviation, L.size)
         radius = sigma * math.sqrt(-math.log(1.0 - _checked(confidence)))
         return cls(omega, L, radius, dt, "given as a standard deviation")
 
@@ -81,8 +81,8 @@ class MeasuredResponse:
         Raises `InputError`: a coherence outside (0, 1], fewer than 2 averages.
         """
         omega, L, dt = _read(data)
-        g2 = _per_point(coherence, L.size, "coherence", 1.0)
-        if not (g2 > 0.0).all():
+        g2 = _per_point("coherence", coherence, L.size)
+        if not ((g2 > 0.0) & (g2 <= 1.0)).all():
             raise InputError("coherence: every value must lie in (0, 1]")
         if averages < 2:
             raise InputError(f"averages = {averages}: at least 2")
@@ -95,7 +95,7 @@ class MeasuredResponse:
         """Noise from the scatter of repeated measurements at the same frequencies; L is their mean.
 
         With n repeats |e|^2 over the estimated variance of the mean follows F(2, 2 n - 2): the radius grows
-        where there are few.
+        where there are few, and neighbouring frequencies then count along (`scatter_of_repeats`).
 
         Raises `InputError`: fewer than 2 repeats, or other frequencies.
         """
@@ -106,10 +106,12 @@ class MeasuredResponse:
         if any(w.shape != omega.shape or (np.abs(w - omega) > 1e-9 * omega).any() for w, _, _ in read):
             raise InputError("repeats: every one must have the same frequencies")
         values = np.array([L for _, L, _ in read])
-        n = len(repeats)
-        sigma = np.sqrt((np.abs(values - values.mean(axis=0)) ** 2).sum(axis=0) / (n - 1) / n)
-        radius = sigma * student(n - 1, _checked(confidence))
-        return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
+        mean, n, rising = values.mean(axis=0), len(repeats), np.argsort(omega)
+        squared, radius = (np.abs(values - mean) ** 2).sum(axis=0), np.empty(omega.size)
+        count = np.full(omega.size, n)
+        sigma, freedom = scatter_of_repeats(np.abs(mean)[rising], squared[rising], count)
+        radius[rising] = sigma * student(freedom, _checked(confidence))
+        return cls(omega, mean, radius, dt, f"scatter of {n} repeats")
 
     @classmethod
     def from_scatter(cls, data: Any) -> MeasuredResponse:
@@ -177,6 +179,29 @@ def _scatter(omega: Real, L: Complex) -> Real | None:
     return radius
 
 
+def scatter_of_repeats(size: Real, squared: Real, count: Ints) -> tuple[Real, Real]:
+    """Deviation of the mean of repeats in the unit of L, and its freedom, at rising frequencies; (m,) each.
+
+    ``size`` of the mean, ``squared``: sum of the squared distances from it, ``count`` of the repeats. Few
+    repeats are judged with those of the frequencies nearby, their noise being alike, or alike over the size:
+    whichever is the likelier there.
+    """
+    freedom = np.asarray(count - 1, dtype=float)
+    if freedom.min() >= NEIGHBOURS // 2:
+        return np.sqrt(squared / freedom / count), freedom
+    width = min(NEIGHBOURS, size.size)
+    start = np.clip(np.arange(size.size) - width // 2, 0, size.size - width)
+
+    def nearby(values: Real) -> Real:
+        return np.asarray(np.sum(values[start[:, None] + np.arange(width)], axis=1))
+
+    square, total = np.maximum(size, 1e-300) ** 2, nearby(freedom)
+    every = np.maximum(total, 1.0)
+    alike, over = nearby(squared), nearby(squared / square)
+    likelier = over * np.exp(nearby(freedom * np.log(square)) / every) < alike
+    return np.sqrt(np.where(likelier, square * over, alike) / every / count), total
+
+
 def at_once(radius: Real) -> Real:
     """Radii of circles that all hold at once as surely as each alone (Gaussian tails, Bonferroni)."""
     return radius * math.sqrt(1.0 + math.log(radius.size) / -math.log(1.0 - CONFIDENCE))
@@ -195,12 +220,15 @@ def _read(data: Any) -> tuple[Real, Complex, float | None]:
     return omega, L, dt
 
 
-def _per_point(values: ArrayLike, count: int, name: str, high: float) -> Real:
-    array = np.asarray(values, dtype=float)
+def _per_point(name: str, values: ArrayLike, count: int) -> Real:
+    try:
+        array = number_array(values)
+    except (TypeError, ValueError):
+        array = np.empty((0, 0))
     if array.shape not in ((), (count,)):
-        raise InputError(f"{name}: one number, or one for each of the {count} frequencies")
-    if not (np.isfinite(array) & (array >= 0.0) & (array <= high)).all():
-        raise InputError(f"{name}: every value must be finite and lie in [0, {high:g}]")
+        raise InputError(f"{name}: allowed: one number, or one for each of the {count} frequencies")
+    if not (np.isfinite(array) & (array >= 0.0)).all():
+        raise InputError(f"{name}: every value must be finite and not negative")
     return np.broadcast_to(array, (count,)).astype(float)
 
 

@@ -13,15 +13,15 @@ from actuator_lti.step.delayed import delayed_response
 from actuator_lti.step.motion import Motion, rational_motion
 from actuator_lti.step.search import Pieces, Search
 from actuator_lti.systems.delay_response import plain_behind_delay
-from actuator_lti.types import Real
+from actuator_lti.types import Compared, Real
 
 _SHOWN = 2000
 _EPS = float(np.finfo(float).eps)
 _TIE = 1e-12  # a sample this near to a level has reached it, and this near to the band is inside
 
 
-@dataclass(frozen=True)
-class StepFigures:
+@dataclass(frozen=True, eq=False)
+class StepFigures(Compared):
     """Figures of a unit step response.
 
     ``rise_time_s``: from 10 to 90 % of the final value, first passages.
@@ -61,7 +61,8 @@ def step_figures(system: Any) -> StepFigures:
     samples. A system with inner delays is walked along its first delays, and is then the free motion of its
     exact poles. All figures are relative to the final value, however small it is beside what comes before.
 
-    ``system``: a closed loop, one input, one output: StateSpace, TransferFunction or DelaySystem.
+    ``system``: a closed loop, one input, one output: StateSpace, TransferFunction (of
+    scipy.signal too) or DelaySystem.
 
     Raises `InputError`: the system is not stable, its final value is zero, or it is measured data; or a
     direct feed-through with a delay that is no plain shift: one in a loop or beside another path. Raises

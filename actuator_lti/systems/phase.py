@@ -18,7 +18,7 @@ from actuator_lti.margins.trust import Doubtful
 from actuator_lti.measured.bounds import bounds
 from actuator_lti.measured.response import is_measured, measured_response
 from actuator_lti.systems.delay_response import DelayResponse, plain_behind_delay
-from actuator_lti.types import Real
+from actuator_lti.types import Real, number_array
 
 _AT_REST = 1e-10  # of the median: a root this near to zero is one at zero, beside which the side is rounding
 _ON_AXIS = 1e-30  # relative: what certified roots leave of an undamped one
@@ -33,9 +33,9 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     negative gain; a root within rounding of zero counts as one there. An undamped resonance turns by
     -180 deg, as a damped one does.
 
-    ``system``: StateSpace, TransferFunction, DelaySystem or FrequencyResponseData of one input and one
-    output, continuous or sampled. Measured data have no factors: their phase is followed from point to point,
-    from between -180 and 180 deg at the first, straight over log frequency.
+    ``system``: StateSpace, TransferFunction (of scipy.signal too), DelaySystem or FrequencyResponseData of
+    one input and one output, continuous or sampled. Measured data have no factors: their phase is followed
+    from point to point, from between -180 and 180 deg at the first, straight over log frequency.
     ``omega_rad_s``: angular frequencies > 0 (for a sampled system up to the Nyquist frequency, for measured
     data within their band), any order, any shape, which is that of the result.
     ``delay_s``: exact delay in series, s.
@@ -53,7 +53,7 @@ def unwrapped_phase_deg(system: Any, omega_rad_s: ArrayLike, delay_s: float = 0.
     """
     delay_s = delay_number(delay_s)
     try:
-        omega = np.asarray(omega_rad_s, dtype=float)
+        omega = number_array(omega_rad_s)
     except (TypeError, ValueError):
         omega = np.array(np.nan)
     if not (np.isfinite(omega).all() and (omega > 0.0).all()):

@@ -28,7 +28,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.loops.sampled import reference_to_output
-from actuator_lti.types import Complexes, Floats
+from actuator_lti.types import Compared, Complexes, Floats
 from analyses.large_signal.classify import limiter_fractions
 from analyses.large_signal.tones import TANH_TOLERANCE, full_range, settling_ticks_of, tone
 from analyses.linear.responses import response_at
@@ -40,8 +40,8 @@ NO_MOTION = 1e-3  # of the command
 UPDATES = 400  # of the position loop in a window
 
 
-@dataclass(frozen=True)
-class RestSweep:
+@dataclass(frozen=True, eq=False)
+class RestSweep(Compared):
     """Response from rest, one entry a frequency."""
 
     # Shape (K,): command at the output shaft, peak

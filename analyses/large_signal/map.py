@@ -16,6 +16,7 @@ from actuator_lti.errors import whole_number
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
+from actuator_lti.types import Compared
 from analyses.finite import finite
 from analyses.friction_effects.breakaway import static_threshold
 from analyses.large_signal.classify import CAUSES, WAVEFORMS, causes, limiter_fractions, not_linear, waveforms
@@ -39,8 +40,8 @@ BELOW_ONSET = 0.95
 LONG = 0.1  # periods of the highest tone
 
 
-@dataclass(frozen=True)
-class AmplitudeMap:
+@dataclass(frozen=True, eq=False)
+class AmplitudeMap(Compared):
     """Sines of many amplitudes and frequencies, each settled; arrays of points are (amplitude, frequency)."""
 
     load_Nm: float
@@ -175,8 +176,8 @@ FINE = 64  # points between two frequencies of the map, at which the linear resp
 MINUS_3DB = 20.0 * math.log10(math.sqrt(0.5))
 
 
-@dataclass(frozen=True)
-class AmplitudeBode:
+@dataclass(frozen=True, eq=False)
+class AmplitudeBode(Compared):
     """Responses at the amplitudes that a design asks for, and how the bandwidth falls with amplitude."""
 
     load_Nm: float

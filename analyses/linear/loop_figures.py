@@ -31,8 +31,7 @@ from analyses.isolation import attempt
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
-OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
-"""How it stands then."""
+OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}  # how it stands then
 AWAY = "the load, cogging or falling friction drives it away"
 ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
 
@@ -210,6 +209,8 @@ def all_loop_figures(
                 result[name] = _position(loops, loop, step=step, certify=certify)
             else:
                 result[name] = loop_figures(loop, step=step, certify=certify)
+            if name == "velocity" and result[name].stable:
+                result[name] = _with_speed_told(loops.design, result[name])
             if name == "current" and wanted:
                 own = partial(_locked, loops, step=step, certify=certify)
                 with_it = own() if needed else attempt("current loop with the rotor locked", own, None)
@@ -230,6 +231,17 @@ def all_loop_figures(
             one = replace(one, held=held if held is not None and held.stable else None)
         result[name] = one
     return result
+
+
+def _with_speed_told(design: Design, figures: LoopFigures) -> LoopFigures:
+    """The same of an outermost velocity loop with a note where its measured speed is not the speed itself."""
+    encoder, velocity = design.encoder, design.controller.velocity
+    if velocity is None or design.controller.outermost != "velocity":
+        return figures
+    if encoder.speed == "ideal" and not encoder.filter_time_s and not velocity.filters_on("speed"):
+        return figures
+    note = "velocity loop: bandwidth and step are of the measured speed, behind its estimate and filters"
+    return replace(figures, notes=(*figures.notes, note))
 
 
 MATTERS = 0.01  # of a margin

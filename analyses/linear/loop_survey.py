@@ -254,11 +254,10 @@ def with_cogging(loops: Loops, border: Onset) -> Onset:
     """
     design, response = loops.design, loops.plain_response
     outermost = design.controller.outermost
-    if response is None or design.motor.cogging_Nm == 0.0 or outermost not in ("position", "velocity"):
+    if response is None or design.motor.cogging_Nm == 0.0 or outermost != "position":
         return border
     s = 1j * border.omega_rad_s
     turned = np.abs(response(np.exp(s * response.dt))) * design.total_ratio
-    turned = turned / np.abs(s) if outermost == "velocity" else turned
     own = COGGING_PART * 2.0 * np.pi / design.motor.cogging_periods / turned
     first = own < border.amplitude_rad
     active = tuple("cogging" if of else name for of, name in zip(first, border.active, strict=True))

@@ -177,7 +177,7 @@ class _Crossing:
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
     """The crossing nearest to a gain and an angle, by Newton's method: there the gain of a pole is real."""
-    if angle < LEAST_ANGLE:
+    if angle < LEAST_ANGLE and (t.at_rest or abs(nearest_pole(t.A, 1.0) - 1.0) <= ROUNDING):
         return _crossing_at_rest(t, gain)
 
     def at(turned: float) -> tuple[complex, complex]:
@@ -196,7 +196,7 @@ def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
 
     for _ in range(NEWTON_STEPS):
         now, slope = at(angle)
-        if abs(angle - pi) < LEAST_ANGLE or slope.imag == 0.0 or not np.isfinite(slope):
+        if min(angle, abs(angle - pi)) < LEAST_ANGLE or slope.imag == 0.0 or not np.isfinite(slope):
             break
         move = -now.imag / slope.imag
         if abs(move) < 1e-14 * angle:

@@ -105,7 +105,7 @@ class Tangent:
         return np.asarray(more * np.linalg.inv(np.eye(len(self.D)) + more * self.D))
 
     @cached_property
-    def _at_rest(self) -> int:
+    def at_rest(self) -> int:
         """Modes at rest that it has, whatever the gain."""
         n = len(self.A)
         return n - len(without_rest(self.A, self.entry_errors[:n, :n], n)[0])
@@ -116,7 +116,7 @@ class Tangent:
         back = np.hstack([np.eye(n), -self.B @ factor])
         seen = np.vstack([np.eye(n), -factor @ self.C])
         errors = np.abs(back) @ self.entry_errors @ np.abs(seen)
-        values, felt, _ = eigenvalues(*without_rest(self.at_gain(gain), errors, self._at_rest))
+        values, felt, _ = eigenvalues(*without_rest(self.at_gain(gain), errors, self.at_rest))
         return values, felt
 
     def __str__(self) -> str:

@@ -35,6 +35,7 @@ BENT = 1e-3  # of the way over which a torque bends, that the largest step may m
 GROWN, KNOWN = 8, 1e-9  # decades that a column's steps may grow by, while its error is more than that
 LEAST = 3  # steps of a column: two differences, of which the second says whether it bends
 SLOWEST = 1e-13  # rad a sample: what is slower is at rest
+NOTHING = 1e-150  # that a kick moves a number by: a rotor that is held
 FRESH = 4  # periods from when a number is first moved, in which its motion gives its scale
 
 
@@ -65,11 +66,16 @@ class Differences:
         self.scale = np.concatenate([scale, np.full(self.updates, self.kick)])
 
     def _led(self) -> None:
-        """Let the commands before the first be those of the motion: else it is fed forward to there."""
+        """Let the commands before the first be those of the motion: else it is fed forward to there.
+
+        What an integral of the position holds of a standing drive is in no row, either.
+        """
         setup, start = self.setup, self.drive.start
         place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
         if place is None or setup.outer != "position":
             return
+        if speed == 0.0 and place.integral_time_s is not None:
+            start[at.S_POSITION_INTEGRATOR] = setup.wanted
         size, since_s = self.injected.rows.values[0, [at.BIAS + 1, at.BIAS + 2]]
         now = -N * size * since_s if speed else N * size
         period_s = place.every * setup.design.controller.period_s
@@ -122,7 +128,7 @@ class Differences:
         for _ in range(16):
             moved = self._kicked(kick)
             if moved is not None:
-                places = continuous[moved[continuous] > 0.0]
+                places = continuous[moved[continuous] > NOTHING]
                 return places, moved[places], kick
             kick /= 10.0
         message = "every kick at it ends in an event; no operating motion without one"

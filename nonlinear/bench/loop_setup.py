@@ -29,7 +29,7 @@ from nonlinear.bench.steady_control import own_start, steady_state
 from nonlinear.rows import Rows
 
 STAGES = ("current", "velocity", "position")
-HELD = 1e12  # so many times its inertia holds the rotor at its speed
+HELD = 1e200  # so many times its inertia holds the rotor at its speed: what then moves it is `NOTHING`
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,12 @@ class LoopSetup:
                 row[name] *= HELD
         return row
 
-    def _start(self, row: Rows) -> None:
+    @cached_property
+    def wanted(self) -> float:
+        """What the position controller gives on the motion; 0 where it does not run."""
+        return self._start(self._base.copy())
+
+    def _start(self, row: Rows) -> float:
         """Write the steady state, from the motor outwards; a constant replaces controllers out of action."""
         bias, point = self.bias, "u"
         bias.load(row)
@@ -149,7 +154,7 @@ class LoopSetup:
                 if point == "w_ref":
                     row["speed_command_start"] = wanted
                 self._position(row, wanted)
-                return
+                return wanted
             if stage == self._own:
                 command, output = self._own_start(row, wanted), wanted
             else:
@@ -162,6 +167,7 @@ class LoopSetup:
         if self.outer == "current":
             row["current_command_start"] = 0.0  # filters of a velocity controller that is out of action
         row.step(point, wanted, -1.0)
+        return 0.0
 
     def _own_start(self, row: Rows, wanted: float) -> float:
         """A law of one's own in its steady state; returns the command of its stage."""
@@ -182,8 +188,10 @@ class LoopSetup:
             else:
                 row.ramp("bias", speed / N, -command / (speed / N))
             return
-        ahead = (wanted - row.value("feedforward") * speed) / row.value("position_gain")
-        at_output = self.design.controller.position_loop.sensor == "output"
+        place = self.design.controller.position_loop
+        holds = speed == 0.0 and place.integral_time_s is not None  # an integral needs no error
+        ahead = (wanted - row.value("feedforward") * speed) / row.value("position_gain") * (not holds)
+        at_output = place.sensor == "output"
         seen = N * self.bias.output_rad(self.design) if at_output else 0.0
         if speed == 0.0:
             row.step("bias", (ahead + seen) / N, -1.0)
@@ -192,10 +200,11 @@ class LoopSetup:
 
     @property
     def steady_start(self) -> bool:
-        """Whether the steady state is known that a run begins in; a ramp sets what a PI of position holds."""
+        """Whether a run begins in its steady state: no row has what a position controller remembers."""
         if self._own is not None and not own_start(self.design, self.bias, 0.0).steady:
             return False
-        return not (self.outer == "position" and remembers(self.design) and self.bias.speed_rad_s != 0.0)
+        moved = self.bias.speed_rad_s != 0.0 or self.wanted != 0.0
+        return not (self.outer == "position" and remembers(self.design) and moved)
 
     @cached_property
     def range(self) -> float:

@@ -16,6 +16,7 @@ from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import passed_moment_Nm, slopes_torque
 from actuator_lti.drive.operating import (
     Operating,
+    averaged,
     dry_torque,
     follows_angle,
     friction_slopes,
@@ -126,10 +127,12 @@ def may_stand(design: Design) -> bool:
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
     """A drive without friction that would give it two slopes where it is tested; others as they are.
 
-    One that has to stand knows no friction by direction; a rigid one whose load is damped none by load, which
-    grows with the speed and is no part of its loops.  ``like`` is the drive that is tested, if another.
+    One in motion feels no cogging. One that has to stand knows no friction by direction; a rigid one whose
+    load is damped none by load, which grows with the speed and is no part of its loops.  ``like`` is the
+    drive that is tested, if another.
     """
-    tested, friction = like or design, design.friction
+    design, tested = averaged(design), averaged(like or design)
+    friction = design.friction
     if follows_angle(tested):
         friction = replace(friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
     elif tested.coupling is None and tested.load.moment_damping_Nms_rad:

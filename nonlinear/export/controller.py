@@ -5,7 +5,7 @@ import re
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
-from actuator_lti.compiled.structs import Member, struct_text
+from actuator_lti.compiled.structs import Member, Struct, struct_text
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.start.extras import package_version
@@ -116,8 +116,15 @@ def _signal_words(member: Member) -> str:
 
 
 def _sizes(ours: Controller, single_precision: bool) -> str:
-    size = {"float": 4 if single_precision else 8}
-    return ", ".join(
-        f"{text} {sum(max(each.length, 1) * size.get(each.kind, 4) for each in struct.members)} bytes"
-        for text, struct in (("state", ours.state), ("input", ours.measured), ("output", ours.out))
-    )
+    named = (("state", ours.state), ("input", ours.measured), ("output", ours.out))
+    return ", ".join(f"{text} {_size(struct, 4 if single_precision else 8)} bytes" for text, struct in named)
+
+
+def _size(struct: Struct, real: int) -> int:
+    """Bytes of a structure in C, with what is left free before a wider member and at the end."""
+    end, widest = 0, 1
+    for each in struct.members:
+        one = real if each.kind == "float" else 4
+        end += -end % one + max(each.length, 1) * one
+        widest = max(widest, one)
+    return end + -end % widest

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.types import Complexes, Floats
+from actuator_lti.types import Compared, Complexes, Floats
 from nonlinear._kernels import layout as at
 
 COLUMNS = {name.lower(): place for name, place in vars(at).items() if name in at.COLUMN_NAMES}
@@ -45,8 +45,8 @@ def step_numbers(y: Floats, band: float) -> Floats:
     )
 
 
-@dataclass(frozen=True)
-class StepFigures:
+@dataclass(frozen=True, eq=False)
+class StepFigures(Compared):
     """Step response of each run, relative to the target; NaN where a level was not reached."""
 
     rise_time_s: Floats
@@ -55,8 +55,8 @@ class StepFigures:
     final_ratio: Floats
 
 
-@dataclass(frozen=True)
-class BatchResult:
+@dataclass(frozen=True, eq=False)
+class BatchResult(Compared):
     """Reduced results; arrays have one entry a run, in the order of the runs.
 
     Signals are named as in ``layout.SIGNALS``: ``reference_rad``, ``output_angle_rad``,

@@ -188,8 +188,8 @@ def _put_load(row: Floats, given: float | LoadMoment, tables: Tables) -> None:
 def put_torque(row: Floats, torque_Nm: npt.ArrayLike, tables: Tables) -> None:
     """Write an extra torque at the motor shaft: a number, or one value a tick."""
     values = numbers_of("disturbance_Nm", torque_Nm)
-    if not np.isfinite(values).all():
-        raise InputError("disturbance_Nm holds values that are not finite")
+    if not values.size or not np.isfinite(values).all():
+        raise InputError(f"disturbance_Nm = {shown(torque_Nm)}: must be finite numbers, at least one")
     row[at.TORQUE_TABLE], row[at.TORQUE_TABLE_LENGTH] = tables.add(values)
 
 

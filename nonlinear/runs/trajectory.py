@@ -18,7 +18,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown
 from actuator_lti.start.extras import need
-from actuator_lti.types import Floats
+from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 
 if TYPE_CHECKING:
@@ -138,8 +138,8 @@ class Energy:
         return abs(self.balance_error_J) / max(max(terms), 1e-300)
 
 
-@dataclass(frozen=True, kw_only=True)
-class ProbeRecord:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ProbeRecord(Compared):
     """Signals in front of and behind a probe, one value a row, in the unit of the point."""
 
     point: str
@@ -147,8 +147,8 @@ class ProbeRecord:
     after: Floats
 
 
-@dataclass(frozen=True, kw_only=True)
-class Trajectory:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Trajectory(Compared):
     """One run: a row a tick, sampled at t_k; motor side unless a name says output or reference.
 
     ``voltage_V`` is what the controller computes at t_k (it acts from t_k + d); ``current_command_A`` and

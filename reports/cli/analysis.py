@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from inspect import Parameter, Signature
 from pathlib import Path
@@ -99,6 +99,14 @@ def _example(one: Analysis) -> Any:
     return Annotated[bool, typer.Option("--example", is_eager=True, callback=show, help=words)]
 
 
+def _kept_gains(variants: Sequence[Any]) -> Iterable[str]:
+    """What is warned of each gain, of the first variant that changes what it does."""
+    from actuator_lti.design.suspicions import kept_gains
+
+    made = [(one.name, line) for one in variants if one.design is not None for line in kept_gains(one.design)]
+    return {line.partition(":")[0]: f"{name}: {line}" for name, line in reversed(made)}.values()
+
+
 def answer(
     one: Analysis,
     subject: Design | Study | None,
@@ -134,8 +142,9 @@ def answer(
         more: dict[str, Any] = {"progress": doing} if one.doing else {}
         more |= {"out": out} if one.keeps else {}
         result = one.run(subject, *asked, **more)
-    for warning in (*(warnings_of(drive) if one.warns else ()), *beyond):
-        print_warning(f"{drive.name}: {warning}")
+    own = [f"{drive.name}: {warning}" for warning in (*(warnings_of(drive) if one.warns else ()), *beyond)]
+    for warning in (*own, *_kept_gains(getattr(subject, "variants", ()))):
+        print_warning(warning)
     if (text := one.shows("text", lambda _: None)(result)) is not None:
         print_line(text)
         return

@@ -2,7 +2,15 @@
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import AS_PREDICTED, CYCLES_WATCHED, LimitCycles
-from analyses.motion.settling import FROM_THE_LARGEST, Settling, acting, judged_by, verdict_of, words
+from analyses.motion.settling import (
+    FROM_THE_LARGEST,
+    Settling,
+    acting,
+    faint_words,
+    judged_by,
+    verdict_of,
+    words,
+)
 from reports import document as doc
 from reports.sections.names import Unit, fine_unit, load_unit
 
@@ -33,11 +41,17 @@ def summary(result: LimitCycles) -> str:
     fine = fine_unit(result.design.axis)
     swing, count = result.hunting, len(result.confirmations)
     seen = sum(one.verdict == "confirmed" for one in result.confirmations)
-    tail = f"; {seen} of {count} predicted cycles confirmed" if count else "; no cycle is predicted"
+    tail = "; no cycle is predicted"
+    if count:
+        tail = f"; {seen} of {count} predicted cycles confirmed" + ", the simulation decides" * (seen < count)
     if swing is None:
-        left = [one for one in result.rests if one.hunting or one.swing_rad]  # too small, or not long enough
-        ends = (f"{fine.of(one.amplitude_rad)} it {words(one.rest, *fine)}" for one in left)
-        still = f", but after {', after '.join(ends)}" if left else ""
+        left = [one for one in result.rests if one.hunting]  # too small, or not long enough
+        ends = [f"after {fine.of(one.amplitude_rad)} it {words(one.rest, *fine)}" for one in left]
+        faint = [one for one in result.rests if not one.hunting and one.swing_rad]
+        if faint:
+            largest = max(faint, key=lambda one: one.swing_rad)
+            ends.append(f"for {faint_words(largest.rest, *fine)}")
+        still = f", but {', '.join(ends)}" if ends else ""
         return f"The drive as it is comes to rest after every step{still}{tail}."
     does = {
         Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",

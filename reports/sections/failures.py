@@ -34,7 +34,7 @@ def section(result: Failures) -> doc.Section:
         f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} "
         f"{load_unit(result.design)} (positive pushes forward). Deflection counts from where the output was; "
         f"the stop is {out.of(asked.stop_rad, 4)} away, and detection takes {1e3 * asked.detection_s:.4g} "
-        f"ms. The {push} is that in the coupling; in a rigid train the motor's torque times the reduction."
+        f"ms. The {push} is that in the coupling; in a rigid train the motor's, through the gears."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     blocks = [_table(result, out), _figure(result, out), *map(doc.text, left)]

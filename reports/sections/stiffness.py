@@ -115,7 +115,9 @@ def _lost_motion(result: Stiffness) -> doc.Block:
         doc.of(lambda row: row[1], "foreseen", "Predicted", **size),
         doc.of(lambda row: row[2], "seen", "Simulated", **size),
     ]
-    rows = [("play", lost.play_rad, None), ("lost motion", lost.foreseen_rad, lost.seen_rad)]
+    rows = [("play", lost.play_rad, None)]
+    if result.design.load.moment_max_Nm > 0.0:  # the largest load is known
+        rows.append(("lost motion", lost.foreseen_rad, lost.seen_rad))
     note = (
         "Lost motion as gear makers read it, the motor held: between the middles of hysteresis at ±3 % of "
         f"the largest load {push_words(result.design)}, without the load's friction."

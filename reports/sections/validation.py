@@ -90,11 +90,12 @@ def summary(validation: Validation) -> doc.Section:
     blocks += [doc.remark(note) for note in validation.notes]
     intro = (
         "Every prediction is held against the derivative of the running simulator, taken on its compiled "
-        "tick while the drive runs at constant speed (where dry friction is a constant torque) or stands, "
-        "then without dry friction and friction by load: its figures differ from those of sliding by that. "
-        "What is large, starts from rest, or is shaken by counts is a finding of its own. An error of less "
-        "than 10⁻⁹ of its value is rounding: that bound, or what is allowed where that is less, stands for "
-        "it. A break point at which both show the outermost loop again is listed as that loop."
+        "tick while the drive runs at constant speed (where dry friction is a constant torque and cogging "
+        "averages out) or stands, then without dry friction and friction by load: its figures differ "
+        "from those of sliding by that. What is large, starts from rest, or is shaken by counts is a "
+        "finding of its own. An error of less than 10⁻⁹ of its value is rounding: that bound, or what is "
+        "allowed where that is less, stands for it. A break point at which both show the outermost loop "
+        "again is listed as that loop."
     )
     words = " ".join(f"{capital(each)}." for each in validation.sentences())
     return doc.section(

@@ -15,6 +15,7 @@ from actuator_lti import (
     assemble_loops,
     closed_loop_bandwidth,
     load_design,
+    onset,
     stability_margins,
     step_figures,
     sweep,
@@ -32,6 +33,7 @@ from actuator_lti.design import (
 )
 from actuator_lti.design.loader import design_text
 from actuator_lti.loops.delay_budget import delay_budget
+from actuator_lti.margins import MeasuredResponse
 from analyses import (
     amplitude_map,
     compare,
@@ -88,6 +90,7 @@ def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
 
 
 SQUARE = control.nlsys(None, lambda t, x, u, params: u**2, inputs=1, outputs=1)
+THREE = control.frd([1j, 2j, 3j], [1.0, 2.0, 3.0])
 BAD = {
     "delay": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0]), delay_s="1 ms"),
     "counts of none": lambda: large_signals("ilr33-amber", counts=(0, 0)),
@@ -108,6 +111,14 @@ BAD = {
     "load torque": lambda: assemble_loops(DESIGN, load_Nm="4 N*m"),
     "form": lambda: assemble_loops(DESIGN, form=["sampled"]),
     "loop": lambda: assemble_loops(DESIGN)["speed"],
+    "amplitude": lambda: assemble_loops(DESIGN, speed_amplitude_rad_s=-1.0),
+    "amplitude text": lambda: assemble_loops(DESIGN, speed_amplitude_rad_s="x"),
+    "a delay that is true": lambda: stability_margins(control.tf([1.0], [1.0, 1.0]), delay_s=True),
+    "certify": lambda: stability_margins(control.tf([1.0], [1.0, 1.0]), certify="no"),
+    "no torque": lambda: simulate(DESIGN, commands.step(0.01), 0.1, disturbance_Nm=[]),
+    "a frequency as text": lambda: onset(assemble_loops(DESIGN), "1"),
+    "a phase's frequency": lambda: unwrapped_phase_deg(control.tf([1.0], [1.0, 1.0]), "1"),
+    "a noise as text": lambda: MeasuredResponse.with_noise(THREE, "1"),
     "nonlinear": lambda: stability_margins(SQUARE),
     "nonlinear, bandwidth": lambda: closed_loop_bandwidth(SQUARE),
     "nonlinear, step": lambda: step_figures(SQUARE),
@@ -149,6 +160,17 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
     with pytest.raises(InputError, match=r"allowed: |must be |one of |has one input") as caught:
         BAD[name]()
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("ask", "words"), [
+    (lambda: sweep(DESIGN, None, [1]), "key = None: allowed: a dotted key"),
+    (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 1.2, 0.9], 8), "(0, 1]"),
+    (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 0.0, 0.9], 8), "(0, 1]"),
+    (lambda: MeasuredResponse.with_noise(THREE, np.inf), "finite and not negative"),
+    (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
+])  # fmt: skip
+def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:
+    refused(ask, words=words)
 
 
 def test_a_system_of_scipy_is_that_system() -> None:
@@ -319,6 +341,29 @@ def test_the_hash_sees_values_and_requirements_and_nothing_else() -> None:
         {"friction.law": "tanh"},
     ):
         assert design_hash(with_overrides(AMBER, change)) != design_hash(AMBER)
+
+
+def test_results_can_be_compared_and_sent() -> None:
+    """Results with arrays are equal where their numbers are, nan as nan; loops are assembled again."""
+    grid = np.geomspace(0.1, 100.0, 20)
+    for made in (
+        lambda scale: step_figures(control.tf([scale], [1.0, 1.0])),
+        lambda scale: simulate(DESIGN, commands.step(0.01 * scale), 0.01),
+        lambda scale: MeasuredResponse.from_scatter(control.frd(scale / (1j * grid), grid)),
+    ):
+        result = made(1.0)
+        assert result == made(1.0) == pickle.loads(pickle.dumps(result))
+        assert result != made(2.0)
+        assert result != "another"
+    loops = assemble_loops(DESIGN, "continuous", "rest", load_Nm=2.0, inner_loops="open")
+    for sent in (pickle.loads(pickle.dumps(loops)), pickle.loads(pickle.dumps(survey_loops(DESIGN))).loops):
+        here = loops if sent.form == loops.form else assemble_loops(DESIGN)
+        assert sent.operating == here.operating
+        assert sent["position"].open_loop(1j) == here["position"].open_loop(1j)
+        path, own = sent.limiters["current"], here.limiters["current"]
+        assert path.response(1.0) == own.response(1.0)
+    assert repr(DESIGN) == "<Design ilr33-amber: rotary, position > velocity > current>"
+    assert repr(Drive(DESIGN)) == "<Drive ilr33-amber: tick 0>"
 
 
 def test_designs_can_be_sent_to_workers_and_kept_in_caches() -> None:

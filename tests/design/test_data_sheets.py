@@ -604,6 +604,11 @@ def test_a_gain_may_be_stated_by_what_it_does(constants: str, over: float, to_dc
         # in amperes from there on: the controller does not follow another load
         other = with_overrides(drive, {"load.inertia": "0 kg*m^2"})
         assert other.controller.velocity.gain == drive.controller.velocity.gain
+        lost = 80 * pi * 142e-7 / kM if "Nm" not in stated else gain
+        said = [line for line in warnings_of(other) if line.startswith("control.velocity.gain: keeps")]
+        now = f"; {stated} would now be {lost:.4g} A"
+        assert [now in line for line in said] == [True] * (lost != gain)
+        assert not any(": keeps" in line for line in warnings_of(drive))
 
 
 def test_a_velocity_gain_without_a_current_loop_is_in_volts() -> None:

@@ -58,6 +58,29 @@ def test_vectors_of_the_simulator_hold_and_no_library_is_called(name: str, singl
     assert (moved > 0.0) if single else (moved < 1e-10)
 
 
+SIZEOF = """#include "controller.h"
+#include <stdio.h>
+int main(void)
+{
+    printf("state %zu bytes, input %zu bytes, output %zu bytes.", sizeof(drive_controller_state),
+           sizeof(drive_controller_input), sizeof(drive_controller_output));
+    return 0;
+}
+"""
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("name", ["fin", "ballscrew"])
+def test_the_readme_says_what_sizeof_gives_and_how_to_compile(name: str, single: bool, tmp_path: Path):
+    """Padding is what the compiler says; the line of the readme links what a profile with a root calls."""
+    folder, readme = written(tmp_path, load_design(name), single=single), (tmp_path / "README.md")
+    (folder / "size.c").write_text(SIZEOF)
+    ran(folder, "gcc", "-std=c99", "size.c", "-o", "size")
+    assert ran(folder, "./size") in readme.read_text()
+    (line,) = re.findall(r"^    (cc .*) && ./vectors$", readme.read_text(), re.M)
+    ran(folder, *line.split())
+
+
 CHIP = """#include "controller.h"
 #include <math.h>
 float sqrtf(float x)

@@ -82,6 +82,23 @@ def test_the_torque_that_speeds_up_the_load_brings_friction_too() -> None:
     assert drive_figures(rigid, 0.5).acceleration_rad_s2 == pytest.approx(by_hand, rel=1e-12)
 
 
+def test_gravity_at_angle_zero_is_part_of_the_load() -> None:
+    """A level arm of 5 N m beside the stated load, whose sign counts; the gear's error averages in motion."""
+    bare = changed(amber(), load={"path": "back-drivable"})
+    arm = model.Gravity(mass_kg=5.0 / 9.80665, arm_m=1.0, offset_rad=np.pi / 2)
+    design = changed(bare, load={"gravity": arm})
+    friction, N, kM = design.friction, design.total_ratio, design.motor.torque_constant_Nm_A
+    carried = friction.dry_torque_Nm + (friction.load_coefficient + 1.0 / N) * 8.0
+    by_hand = carried + friction.viscous() * design.limits.speed_rad_s
+    assert capability(design, 3.0).motor_current_A == pytest.approx(by_hand / kM, rel=1e-12)
+    by_hand = (stall_torque_Nm(design) - carried) / design.inertia_kgm2 / N
+    free = changed(design, limits={"acceleration_rad_s2": np.inf})
+    assert drive_figures(free, 3.0).acceleration_rad_s2 == pytest.approx(by_hand, rel=1e-12)
+    assert capability(design, -5.0).motor_current_A == pytest.approx(capability(bare).motor_current_A)
+    wavy = changed(bare, load={"gear_error_Nm": 5.0, "gear_error_periods": 2, "gear_error_phase_rad": 1.0})
+    assert capability(wavy).motor_current_A == capability(bare).motor_current_A
+
+
 def test_torque_gain_with_a_p_current_loop_and_resistance_feedforward() -> None:
     """Rotor at rest: u = Kp (i_ref - i) + k R i_ref = R i, so i = (Kp + k R)/(Kp + R) i_ref."""
     design = controlled(drive_e(), current={"integral_time_s": None, "resistance_feedforward": 0.6})

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from loop_designs import controlled, source_drive
 
-from actuator_lti import InputError, load_design, write_design
+from actuator_lti import InputError, assemble_loops, load_design, write_design
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model, read_design_text
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
@@ -16,6 +17,8 @@ from actuator_lti.drive.operating import Operating, follows_angle, holding_torqu
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import TickProgram
+from analyses.validation.places import Bench
+from analyses.validation.small_signal import small_signal
 from nonlinear import State, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion
 from tests.changed import changed
@@ -95,6 +98,20 @@ def test_a_drive_in_motion_feels_its_mean_which_is_none(case: Case) -> None:
     at = Operating(speed_rad_s=40.0, angle_rad=0.3)
     own, plain = (TickProgram(wire(one, at), "voltage").tick(0).A for one in (case.put(rotor()), rotor()))
     assert np.array_equal(own, plain)
+
+
+@each
+def test_a_speed_drive_is_one_in_motion_but_at_rest(case: Case) -> None:
+    """A P loop against viscous friction has Kp/(Kp + Cv) at DC as it runs, none in a notch."""
+    plain = rotor(viscous=1e-3)
+    design = case.put(controlled(plain, velocity=model.VelocityLoop(gain=4e-3), position=None))
+    z = np.exp(1j * 1e-9)
+    sliding, rest = (assemble_loops(design, operating_point=at).velocity for at in ("sliding", "rest"))
+    assert abs(sliding.closed_loop(z)) == pytest.approx(0.8, rel=1e-6)
+    assert abs(rest.closed_loop(z)) < 1e-3
+    speed = simulate(design, commands.step(100.0 / N), 2.0).motor_speed_rad_s
+    assert np.mean(speed[10000:]) == pytest.approx(0.8 * 100.0, rel=1e-3)
+    assert {row.verdict for row in small_signal(Bench(design, design).place("velocity"))} == {Verdict.MET}
 
 
 @each

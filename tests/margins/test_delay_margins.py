@@ -251,3 +251,19 @@ def test_more_unstable_poles_than_collocation_found_are_counted() -> None:
     F = characteristic(np.concatenate((up, arc)))
     count = round(float(np.angle(F[1:] / F[:-1]).sum()) / (2.0 * np.pi))
     assert m.agreement.unstable_poles == count > 100
+
+
+def test_a_loop_below_the_resolution_of_the_search_is_nearest_where_it_is_real() -> None:
+    """1e-9/(s + 1) behind 1 s: w + arctan w = pi, there |1 + L| = 1 - |L|; not "1 at infinity"."""
+    result = stability_margins(control.tf([1e-9], [1.0, 1.0]), delay_s=1.0)
+    w = brentq(lambda x: x + np.arctan(x) - np.pi, 1.0, 3.0)
+    assert result.modulus_frequency_rad_s == pytest.approx(w, rel=1e-9)
+    assert 1.0 - result.modulus_margin == pytest.approx(1e-9 / np.hypot(1.0, w), rel=1e-6)
+
+
+def test_an_unstable_loop_prints_the_delay_margin_that_it_quotes() -> None:
+    """10/(s + 1) behind a delay beyond its margin arccos(-0.1)/w, w = sqrt(99): none is left."""
+    result = stability_margins(control.tf([10.0], [1.0, 1.0]), delay_s=1.0)
+    assert result.delay_margin_s == 0.0
+    assert "delay margin: 0 s, as it is not stable" in str(result)
+    assert "delay to the border: " in str(result)

@@ -164,7 +164,7 @@ def test_a_record_holds_the_whole_load_and_extra_torque_moves_what_friction_does
     assert not run.motor_speed_rad_s.any()  # below the dry friction
     run = simulate(AMBER, hold, 0.3, initial=start, disturbance_Nm=5e-3)
     assert run.output_angle_rad.max() > 10.0 / AMBER.total_ratio
-    refused(simulate, AMBER, hold, 0.3, disturbance_Nm=[0.0, np.nan], words="not finite")
+    refused(simulate, AMBER, hold, 0.3, disturbance_Nm=[0.0, np.nan], words="must be finite")
 
 
 def test_bits_of_single_runs_for_any_number_of_threads() -> None:

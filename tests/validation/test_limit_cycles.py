@@ -191,8 +191,10 @@ def test_a_drive_with_too_much_gain_hunts_and_says_so(cli) -> None:
 
 def test_section_and_refusal() -> None:
     made = section(limit_cycles(load_design("ballscrew")))
-    words = "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed."
-    assert made["result"] == words
+    words = (
+        "The drive as it is comes to rest after every step; 0 of 1 predicted cycles confirmed, the simulation"
+    )
+    assert made["result"] == f"{words} decides."
     with pytest.raises(InputError, match="position loop"):
         limit_cycles(changed(FIN, controller={"position": None}))
 

@@ -8,6 +8,7 @@ import pytest
 from actuator_lti import InputError, stability_margins
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import Design, load_design, shipped_designs
+from actuator_lti.design.law import LAW_WORDS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import Loops, assemble_loops, exact_margins, periodic_loop
 from analyses.validation import CHECKS, validate
@@ -24,6 +25,7 @@ from nonlinear.bench.operating_motion import (
     without_counts,
 )
 from tests.changed import changed
+from tests.loops.own_laws import random_law
 from tests.validation.random_drives import full_drive, is_stable
 
 Z = np.exp(1j * GRID)
@@ -106,6 +108,46 @@ def test_a_slow_pole_is_judged_by_its_own_error() -> None:
     rows = [row for place in places for row in small_signal(place) if row.name == "poles"]
     assert all(row.verdict != Verdict.NOT_MET for row in rows)
     assert rows[1].allowed > abs(seen[1] - seen[0])
+
+
+@pytest.mark.parametrize("integral_time_s", [None, 0.3])
+def test_a_standing_drive_stands_where_its_cogging_is_taken(integral_time_s: float | None) -> None:
+    """A law fed with the twist of a pressed coupling asks for a speed command: an error gives it, or the PI.
+
+    The motor stood off its angle by that error, on another slope of the cogging: 0.4 % off in a drawn drive.
+    """
+    plain = changed(
+        load_design("ilr33-amber-compliant"),
+        motor={"cogging_Nm": 2e-3, "cogging_periods": 5.0},
+        controller={"position": {"integral_time_s": integral_time_s}},
+        requirements=(),
+    )
+    gain = plain.controller.velocity.gain
+    law = ([], [], [], [[gain, -20.0 * gain]], plain.controller.period_of("velocity"))
+    bench, loops = stood(plain.with_law("velocity", law, ["error", "twist"]))
+    for place in ("position", "u", "output"):
+        off = relative(tangent(bench, place).closed(Z), predicted(bench, loops, place))
+        assert np.max(off) <= 1e-7, place
+
+
+def test_a_locked_rotor_moves_no_angle() -> None:
+    """The law sees an angle that stands: of it, however slow, the loop is that of the law on the error."""
+    base, T = load_design("ilr33-amber"), load_design("ilr33-amber").controller.period_s
+    own, other = (
+        tangent(base.with_law("current", ([], [], [], [[0.02, *more]], T), ["error", *names]), "current")
+        for more, names in (((), ()), ((-5e3,), ("angle",)))
+    )
+    z = np.exp(1j * np.array([1e-12, 1e-9, 1e-6, 1e-3, 1.0]))
+    assert other.closed(z) == pytest.approx(own.closed(z), rel=1e-9)
+
+
+def test_a_pole_that_passes_one_beside_another_slow_one_is_known_by_the_response_there() -> None:
+    """Poles 1e-6 apart, of which rounding leaves 1e-11: the gain at which one of them passes is 1/T(1)."""
+    design = random_law(np.random.default_rng([6_000_153, 0]), full_drive(6_000_153), "position", stable=True,
+                        words=LAW_WORDS)  # fmt: skip
+    rows = small_signal(Bench(design, design).place("output"))
+    assert any("; pole beside" in row.because and row.because.startswith("0 Hz") for row in rows)
+    assert all(row.verdict is Verdict.MET for row in rows)
 
 
 NOT_PROVEN_ONCE = {
