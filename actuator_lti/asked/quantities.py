@@ -189,8 +189,7 @@ CORNERED = {each.cornered: each for each in ANALYSIS_QUANTITIES.values() if each
 """Figures of loops whose worst over all corners is a figure of its own, with that figure."""
 CUSTOMARY = {"gain_margin": 6.0, "phase_margin": 30.0, "modulus_margin": 0.5}
 """What custom asks of margins where no requirement does: each keeps L about half away from -1."""
-LOOPS = ("current", "velocity", "position")
-"""The loops that a requirement may name, innermost first."""
+LOOPS = ("current", "velocity", "position")  # the loops that a requirement may name, innermost first
 MOST_RESONANCE_DB = 100.0
 """Over more than that the value at zero frequency is nothing that a resonance or a fall is measured from."""
 
