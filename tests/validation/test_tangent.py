@@ -132,7 +132,7 @@ def test_a_standing_drive_stands_where_its_cogging_is_taken(integral_time_s: flo
 
 @pytest.mark.parametrize("speed", ["difference", "tracking"])
 def test_a_speed_made_of_the_output_s_angle_is_none_behind_a_twisted_spring(speed: str) -> None:
-    """The sensor saw the output where it stands, off the motor by the twist: a jump was 10 % of a response."""
+    """The sensor saw the output where it stands, off the motor by the twist: a jump was 10 % off."""
     band = {"bandwidth_rad_s": 300.0} if speed == "tracking" else {}
     design = changed(
         load_design("ilr33-amber-compliant"),
