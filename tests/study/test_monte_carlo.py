@@ -235,6 +235,7 @@ def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alon
     path.write_text(first)
     assert 0.4 * 1.34e-3 <= load_design(path).friction.load_coefficient <= 1.6 * 1.34e-3
     made = cli.data("montecarlo", "--samples", 64, "--out", tmp_path, "--no-worst", "--step", "1 deg")
+    assert "allowed with --step" in cli.refused("montecarlo", "--duration", "2")
     assert made["verdict"] == "met"
     assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
 

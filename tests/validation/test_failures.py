@@ -135,7 +135,7 @@ def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
     result = failures(speed, Asked.of(speed, watched_s=0.1))
     assert [case.name for case in result.cases] == ["hard-over", "open-phase"]
     assert result.left_out["jam"] == "the drive has no position loop"
-    with pytest.raises(InputError, match="beyond the stop"):
+    with pytest.raises(InputError, match="beyond the stop, it is 2 times that"):
         Asked.of(AMBER, stop_rad=0.1, deflection_rad=0.2)
 
 
