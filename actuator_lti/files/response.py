@@ -15,13 +15,19 @@ from actuator_lti.errors import InputError, in_file
 from actuator_lti.files import response_columns as column
 from actuator_lti.files.mat5 import read_mat5
 from actuator_lti.files.reading import read_bytes, read_text, shown, shown_path
-from actuator_lti.measured.response import CONFIDENCE, GAUSSIAN, NEIGHBOURS, MeasuredResponse, student
-from actuator_lti.types import Compared, Floats, Ints
+from actuator_lti.measured.response import (
+    CONFIDENCE,
+    GAUSSIAN,
+    NEIGHBOURS,
+    MeasuredResponse,
+    scatter_of_repeats,
+    student,
+)
+from actuator_lti.types import Compared, Floats
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
-NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
-"""Of a row that is left out and counted."""
+NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")  # of a row that is left out and counted
 _COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # one value a row
 
 
@@ -215,20 +221,9 @@ def _averaged(read: RecordedResponse) -> RecordedResponse:
     made = replace(once, frequency_hz=f, response=z, deviation=deviation, coherence=coherence, radius=radius)
     if np.isfinite(radius).all():
         return made
-    off = np.abs(once.response - np.repeat(z, count)) ** 2 / np.repeat(size, count) ** 2
-    return _by_scatter(made, np.add.reduceat(off, first), count)
-
-
-def _by_scatter(read: RecordedResponse, squared: Floats, count: Ints) -> RecordedResponse:
-    """The noise as repeats nearby scatter, where they tell it as surely as neighbours do."""
-    width = min(NEIGHBOURS, count.size)
-    start = np.clip(np.arange(count.size) - width // 2, 0, count.size - width)
-    total, freedom = (
-        np.diff(np.append(0, np.cumsum(one))[np.stack((start, start + width))], axis=0)[0]
-        for one in (squared, count - 1)
-    )
-    if freedom.min() < NEIGHBOURS // 2:
-        return read
-    deviation = np.sqrt(total / freedom / count)
-    radius = deviation * student(freedom, CONFIDENCE)
-    return replace(read, deviation=deviation, radius=radius, noise="scatter of repeats")
+    squared = np.add.reduceat(np.abs(once.response - np.repeat(z, count)) ** 2, first)
+    scatter, freedom = scatter_of_repeats(size, squared, count)
+    if freedom.min() < NEIGHBOURS // 2:  # neighbours tell it as surely
+        return made
+    radius = scatter / size * student(freedom, CONFIDENCE)
+    return replace(made, deviation=scatter / size, radius=radius, noise="scatter of repeats")

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from actuator_lti.errors import InputError
 from actuator_lti.systems.plain_system import period_of
-from actuator_lti.types import Compared, Complex, Real, number_array
+from actuator_lti.types import Compared, Complex, Ints, Real, number_array
 
 CONFIDENCE = 0.99
 GAUSSIAN = math.sqrt(-math.log(1.0 - CONFIDENCE))  # radius over deviation of noise that is known
@@ -95,7 +95,7 @@ class MeasuredResponse(Compared):
         """Noise from the scatter of repeated measurements at the same frequencies; L is their mean.
 
         With n repeats |e|^2 over the estimated variance of the mean follows F(2, 2 n - 2): the radius grows
-        where there are few.
+        where there are few, and neighbouring frequencies then count along (`scatter_of_repeats`).
 
         Raises `InputError`: fewer than 2 repeats, or other frequencies.
         """
@@ -106,10 +106,12 @@ class MeasuredResponse(Compared):
         if any(w.shape != omega.shape or (np.abs(w - omega) > 1e-9 * omega).any() for w, _, _ in read):
             raise InputError("repeats: every one must have the same frequencies")
         values = np.array([L for _, L, _ in read])
-        n = len(repeats)
-        sigma = np.sqrt((np.abs(values - values.mean(axis=0)) ** 2).sum(axis=0) / (n - 1) / n)
-        radius = sigma * student(n - 1, _checked(confidence))
-        return cls(omega, values.mean(axis=0), radius, dt, f"scatter of {n} repeats")
+        mean, n, rising = values.mean(axis=0), len(repeats), np.argsort(omega)
+        squared, radius = (np.abs(values - mean) ** 2).sum(axis=0), np.empty(omega.size)
+        count = np.full(omega.size, n)
+        sigma, freedom = scatter_of_repeats(np.abs(mean)[rising], squared[rising], count)
+        radius[rising] = sigma * student(freedom, _checked(confidence))
+        return cls(omega, mean, radius, dt, f"scatter of {n} repeats")
 
     @classmethod
     def from_scatter(cls, data: Any) -> MeasuredResponse:
@@ -175,6 +177,29 @@ def _scatter(omega: Real, L: Complex) -> Real | None:
     radius = np.zeros(L.size)
     radius[usable] = np.abs(L[usable]) * reach
     return radius
+
+
+def scatter_of_repeats(size: Real, squared: Real, count: Ints) -> tuple[Real, Real]:
+    """Deviation of the mean of repeats in the unit of L, and its freedom, at rising frequencies; (m,) each.
+
+    ``size`` of the mean, ``squared``: sum of the squared distances from it, ``count`` of the repeats. Few
+    repeats are judged with those of the frequencies nearby, their noise being alike, or alike over the size:
+    whichever is the likelier there.
+    """
+    freedom = np.asarray(count - 1, dtype=float)
+    if freedom.min() >= NEIGHBOURS // 2:
+        return np.sqrt(squared / freedom / count), freedom
+    width = min(NEIGHBOURS, size.size)
+    start = np.clip(np.arange(size.size) - width // 2, 0, size.size - width)
+
+    def nearby(values: Real) -> Real:
+        return np.asarray(np.sum(values[start[:, None] + np.arange(width)], axis=1))
+
+    square, total = np.maximum(size, 1e-300) ** 2, nearby(freedom)
+    every = np.maximum(total, 1.0)
+    alike, over = nearby(squared), nearby(squared / square)
+    likelier = over * np.exp(nearby(freedom * np.log(square)) / every) < alike
+    return np.sqrt(np.where(likelier, square * over, alike) / every / count), total
 
 
 def at_once(radius: Real) -> Real:

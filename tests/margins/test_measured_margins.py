@@ -204,6 +204,23 @@ def test_circles_of_repeats_hold_the_truth_as_often_as_they_say(n: int) -> None:
     assert abs(share - 0.95) < 4 * math.sqrt(0.95 * 0.05 / omega.size)
 
 
+@pytest.mark.parametrize("n", [2, 3, 10])
+@pytest.mark.parametrize("alike", [False, True])
+def test_circles_of_few_repeats_hold_the_truth_in_an_antiresonance(n: int, alike: bool) -> None:
+    """Noise as large everywhere, or over L; two repeats judged alone make circles of 8.3 deviations."""
+    rng, omega = np.random.default_rng(n), np.geomspace(1.0, 300.0, 60)
+    L = 50.0 / (1j * omega) * (1.0 + 0.04 * 1j * omega / 20.0 - (omega / 20.0) ** 2)
+    deviation = 0.3 * np.ones(60) if alike else 0.02 * np.abs(L)
+    held, low = [], np.argsort(np.abs(L))[:6]
+    for _ in range(100):
+        values = L + deviation * circular(rng, (n, 60))
+        result = MeasuredResponse.from_repeats([control.frd(each, omega) for each in values])
+        held.append(np.abs(result.frdata - L) <= result.radius)
+        assert np.median(result.radius / deviation) * n**0.5 < 3.0
+    assert np.mean(held) > 0.975
+    assert np.mean(np.array(held)[:, low]) > 0.95
+
+
 def test_values_lost_in_noise_give_no_gain_margin() -> None:
     omega = np.geomspace(0.2, 1000, 400)
     data = control.frd(A1, omega)
