@@ -44,22 +44,16 @@ UNEVEN = 1.5  # times the usual interval: a longer one is a hole
 
 @dataclass(frozen=True)
 class Command:
-    """A signal of time; built by the functions of this module.
+    """A signal of time; built by the functions of this module."""
 
-    ``kind``: name of that function; ``code``: kind as the kernel knows it; ``numbers``: amplitude, start time
-    and what the kind needs (see ``_kernels.signals``); ``highest_hz``: highest frequency asked for, 0 where
-    that has no meaning; ``end_s``: when it is over, inf where it goes on; ``samples``: times (s) and values
-    of a tabulated command, shape (2, m), zero before the first of them; ``held``: whether each tabulated
-    value holds until the next; else linear between them.
-    """
-
-    kind: str
-    code: int
-    numbers: tuple[float, ...]
-    highest_hz: float = 0.0
-    end_s: float = float("inf")
+    kind: str  # name of that function
+    code: int  # kind as the kernel knows it
+    numbers: tuple[float, ...]  # amplitude, start time and what the kind needs (see ``_kernels.signals``)
+    highest_hz: float = 0.0  # highest frequency asked for, 0 where that has no meaning
+    end_s: float = float("inf")  # when it is over, inf where it goes on
+    # Times (s) and values of a tabulated command, shape (2, m), zero before the first of them
     samples: Floats | None = None
-    held: bool = False
+    held: bool = False  # whether each tabulated value holds until the next; else linear between them
 
     def later(self, start_s: float) -> Command:
         """A tabulated command that begins at ``start_s``, and is zero before.

@@ -144,12 +144,14 @@ _LIST = (
     Quantity("settling_time", "s", "loop", "to within 2 %", "settling time",
              "step.settling_time_s", -1, timed=True, heading="Settling 2 %", followed=True,
              tolerance=1e-07),
-    Quantity("output_rate", "deg/s", "drive", "largest speed of the output at a load", "output rate",
+    Quantity("output_rate", "deg/s", "drive",
+             "largest speed of the output at a load, its command's profile aside", "output rate",
              "output_rate_rad_s", 1, "m/s", source="capability"),
     Quantity("motor_current", "A", "drive", "motor current at top speed and a load",
              "motor current at top speed", "motor_current_A", -1, signed=True, source="capability"),
-    Quantity("acceleration", "deg/s^2", "drive", "largest acceleration of the output at a load",
-             "acceleration", "acceleration_rad_s2", 1, "m/s^2", source="capability"),
+    Quantity("acceleration", "deg/s^2", "drive",
+             "largest acceleration of the output at a load, its command's profile aside", "acceleration",
+             "acceleration_rad_s2", 1, "m/s^2", source="capability"),
     Quantity("torque_margin", "1", "drive", "motor torque at rest over what it takes to start against a load",
              "torque margin", "torque_margin", 1, source="capability"),
     Quantity("static_stiffness", "N*m/rad", "drive", "moment over deflection at 0 Hz, powered",
@@ -159,12 +161,12 @@ _LIST = (
     Quantity("lost_motion", "deg", "drive", "between the middles of hysteresis at +-3 % of load.moment_max",
              "lost motion", "lost_motion_rad", -1, "m", size=0.1, source="stiffness"),
     Quantity("hard_over_time", "s", "analysis", "from the hard-over of the power stage to failure.stop",
-             "time from hard-over to the stop", "hard_over_time_s", 1, source="analysis"),
+             "time from hard-over to the stop", "failures.hard_over_time_s", 1, source="analysis"),
     Quantity("failure_deflection", "deg", "analysis", "largest until detection, all failures",
-             "deflection until a failure is detected", "failure_deflection_rad", -1, "m",
+             "deflection until a failure is detected", "failures.failure_deflection_rad", -1, "m",
              source="analysis"),
     Quantity("failure_moment", "N*m", "analysis", "largest in the drive train, over all failures",
-             "moment in the train at a failure", "failure_moment_Nm", -1, "N", source="analysis"),
+             "moment in the train at a failure", "failures.failure_moment_Nm", -1, "N", source="analysis"),
     Quantity("duty_current", "A", "analysis", "rms of the motor current under [duty]",
              "rms current of the duty", "duty.rms_A", -1, source="analysis"),
     Quantity("winding_temperature", "degC", "analysis", "winding under [duty], in the long run",
@@ -189,8 +191,7 @@ CORNERED = {each.cornered: each for each in ANALYSIS_QUANTITIES.values() if each
 """Figures of loops whose worst over all corners is a figure of its own, with that figure."""
 CUSTOMARY = {"gain_margin": 6.0, "phase_margin": 30.0, "modulus_margin": 0.5}
 """What custom asks of margins where no requirement does: each keeps L about half away from -1."""
-LOOPS = ("current", "velocity", "position")
-"""The loops that a requirement may name, innermost first."""
+LOOPS = ("current", "velocity", "position")  # the loops that a requirement may name, innermost first
 MOST_RESONANCE_DB = 100.0
 """Over more than that the value at zero frequency is nothing that a resonance or a fall is measured from."""
 

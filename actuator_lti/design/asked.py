@@ -167,8 +167,7 @@ class Parameter:
     stated: str = field(default="", compare=False)  # what the file has, where it is computed from that
 
 
-FrozenMap = MappingProxyType
-"""A mapping that stays as it is, equal to any with the same items."""
+FrozenMap = MappingProxyType  # a mapping that stays as it is, equal to any with the same items
 
 
 def _frozen(items: dict[Any, Any]) -> MappingProxyType[Any, Any]:

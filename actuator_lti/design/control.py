@@ -30,8 +30,7 @@ Stage = Literal["position", "velocity", "current", "voltage"]
 AntiWindupKey = Annotated[AntiWindup, choice("what the integral does while the output is at its limit")]
 TrackingTime = Annotated[float | None, positive("time constant of back-calculation; default the integral "
     "time", "Tt", example="10 ms")]
-ABSENT = 0.0
-"""Gain of a stage that has a law of one's own in its place."""
+ABSENT = 0.0  # gain of a stage that has a law of one's own in its place
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,7 +16,7 @@ the motor has its resistance, and with a KV the back-EMF besides, up to 2.3 by v
 set, as is the supply; the driver keeps each phase between 0 and its own limit (defaults.h, FOCMotor.cpp,
 BLDCDriver3PWM.cpp). An output_ramp of 0 is none (pid.cpp).
 
-What the D part of an EPOS4 is filtered by is no object of its export: derivative_filter stays as it is.
+No object of an EPOS4's export is a filter of its D part: derivative_filter stays as it is.
 """
 
 import re
@@ -85,8 +85,7 @@ class Format:
     """Names without a key that are understood where they are 0: what they switch is off."""
     newer: Mapping[str, str] = field(default_factory=dict)
     """Parts of names of newer firmware, each with the older one that the settings are listed by."""
-    assumed: Mapping[str, float] = field(default_factory=dict)
-    """Numbers where the file has none."""
+    assumed: Mapping[str, float] = field(default_factory=dict)  # numbers where the file has none
 
 
 def _ratio(above: float, below: float) -> float:
@@ -213,7 +212,7 @@ FORMATS = (
             Setting("control.position.integral_time", "s", _ratio, "0x30A1.01", "0x30A1.02",
                     when="-velocity"),
             Setting("control.position.derivative_time", "s", _ratio, "0x30A1.03", "0x30A1.01",
-                    when="-velocity", said="its filter is no object of the export: "
+                    when="-velocity", said="the export has no filter of it: "
                     "control.position.derivative_filter stays as it is"),
             Setting("limits.continuous_current", "A", 1e-3, "0x3001.01"),
             Setting("limits.peak_current", "A", 1e-3, "0x3001.02"),

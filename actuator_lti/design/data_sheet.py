@@ -33,8 +33,7 @@ SHEET: tuple[Field, ...] = (
 )  # fmt: skip
 """Keys of a file that no part of a design has an attribute for."""
 
-FROM = "from data sheet: "
-"""What the source of a value begins with that follows from such keys."""
+FROM = "from data sheet: "  # what the source of a value begins with that follows from such keys
 _WORD = re.compile(r"(?P<table>motor|gear\.[^.=;,]+)\.(?P<key>no_load_\w+|efficiency) = (?P<text>.+)")
 _OPEN = "100.0 %"  # tolerance of a friction whose share is not said
 _TAKEN = {

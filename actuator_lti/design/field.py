@@ -171,20 +171,13 @@ def _declared(
 
 quantity = partial(_declared, "quantity", low=-BIG, high=BIG)
 """Any finite number; ``key`` and ``unit`` where they are not those of the attribute's name."""
-positive = partial(quantity, low=SMALL)
-"""A number above 0."""
-not_negative = partial(quantity, low=0.0)
-"""A number of at least 0."""
-quantities = partial(_declared, "quantities", low=-BIG, high=BIG)
-"""A list of numbers."""
-matrix = partial(_declared, "matrix", low=-BIG, high=BIG)
-"""Rows of as many numbers each."""
-names = partial(_declared, "names")
-"""Some words, those of the attribute's type, each once."""
-flag = partial(_declared, "flag")
-"""True or false."""
-text, label = partial(_declared, "text"), partial(_declared, "label")
-"""Any text; one that is not empty."""
+positive = partial(quantity, low=SMALL)  # a number above 0
+not_negative = partial(quantity, low=0.0)  # a number of at least 0
+quantities = partial(_declared, "quantities", low=-BIG, high=BIG)  # a list of numbers
+matrix = partial(_declared, "matrix", low=-BIG, high=BIG)  # rows of as many numbers each
+names = partial(_declared, "names")  # some words, those of the attribute's type, each once
+flag = partial(_declared, "flag")  # true or false
+text, label = partial(_declared, "text"), partial(_declared, "label")  # any text; one that is not empty
 day, limit = partial(_declared, "day"), partial(_declared, "limit")
 """A date; a limit of a requirement, in the unit of its quantity."""
 

@@ -1,5 +1,6 @@
 """Every key of a design file as a list to read, and how the numbers of one file are read."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from math import inf
 from typing import Annotated
@@ -104,4 +105,24 @@ def explained(design: Design) -> tuple[Explained, ...]:
         )
     sheet = (Explained(*stated, "friction, below") for stated in stated_in(design))
     at = next((k for k, one in enumerate(result) if one.path.startswith("friction.")), len(result))
-    return (*result[:at], *sheet, *result[at:])
+    return (*result[:at], *sheet, *result[at:], *_own_law(design))
+
+
+def _own_law(design: Design) -> Iterator[Explained]:
+    """What a law of one's own takes and gives: amperes and volts are those of the equivalent DC motor."""
+    own, dc = design.controller.own_law, "" if design.motor.constants == "dc" else " dc"
+    if own is None:
+        return
+    angle = "m" if design.axis == "linear" else "rad"
+    of = {"position": angle, "velocity": f"{angle}/s", "current": f"A{dc}", "voltage": f"V{dc}"}
+    kinds = {
+        "speed": "velocity",
+        "output_speed": "velocity",
+        "current": "current",
+        "command": own[0],
+        "error": own[0],
+    }
+    takes = ", ".join(f"{name} in {of[kinds.get(name, 'position')]}" for name in own[1].inputs)
+    stages = (*design.controller.stages, "voltage")
+    gives = stages[stages.index(own[0]) + 1]
+    yield Explained(f"control.{own[0]}.law", "inputs, output", takes, f"gives the {gives} in {of[gives]}")

@@ -50,8 +50,7 @@ def load_design(name_or_path: AnyDesign) -> Design:
     return read_design_text(design_text(name), shown(name, 200)[1:-1], Path(name).parent)
 
 
-as_design = load_design
-"""For what a function is given as a design."""
+as_design = load_design  # for what a function is given as a design
 
 
 def _name_of(given: object) -> str:

@@ -26,8 +26,7 @@ _HEADER = re.compile(rf"\s*(\[\[?)\s*({_KEY}(?:\s*\.\s*{_KEY})*)\s*\]")
 _ENTRY = re.compile(rf"\s*({_KEY}(?:\s*\.\s*{_KEY})*)\s*=")
 _PARTS = re.compile(_KEY)
 
-Refusal = tuple[str, object, str]
-"""Key, value as it is to be shown ("" for none), and what is allowed."""
+Refusal = tuple[str, object, str]  # key, value as it is to be shown ("" for none), and what is allowed
 Check = Callable[["Design"], Iterator[Refusal]]
 
 

@@ -18,7 +18,7 @@ from actuator_lti.design import model
 from actuator_lti.design.asked import FrozenMap, default_deflection
 from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
-from actuator_lti.design.field import Field, Structure
+from actuator_lti.design.field import MANY, Field, Structure
 from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
@@ -202,7 +202,9 @@ class Reader:
         if _fits(field, raw):
             return raw
         hint = nearest(raw, field.choices).strip() if isinstance(raw, str) else ""
-        return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {field.allowed('1')}")
+        near = get_close_matches(str(raw), field.choices, cutoff=0.0) if len(field.choices) > MANY else []
+        allowed = f"{field.allowed('1')}{', such as ' * bool(near)}{', '.join(near)}"
+        return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {allowed}")
 
     def words(self, field: Field, raw: Any, path: str) -> Any:
         """Some of the words that a key may have, each once."""

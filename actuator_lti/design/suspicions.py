@@ -7,7 +7,7 @@ from math import inf, isfinite, pi, sqrt
 from actuator_lti.design.data_sheet import FROM
 from actuator_lti.design.field import unit_on
 from actuator_lti.design.loader import as_design
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.plant import no_load_speed, torque_per_command
 from actuator_lti.design.reader import GAINS
 from actuator_lti.design.writing import read_value
@@ -210,14 +210,22 @@ def elastic_warnings(design: Design) -> Iterator[str]:
 
 def _asked_for(design: Design) -> Iterator[str]:
     """Requirements on what the drive can do, of more than the profile of its command asks for."""
+    for one in design.requirements:
+        if one.minimum is not None and (told := beyond_profile(design, one, one.minimum)):
+            yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {told}"
+
+
+def beyond_profile(design: Design, requirement: Requirement, value: float) -> str:
+    """What the profile of the command says to a rate or acceleration, in the unit of a requirement on it.
+
+    Empty where a command may ask for as much.
+    """
     command, turned = design.command, 180.0 / pi if design.axis == "rotary" else 1.0
     rate, acceleration = command.rate_rad_s * turned, command.acceleration_rad_s2 * turned
     most = {"output_rate": ("rate", rate), "acceleration": ("acceleration", acceleration)}
-    for one in design.requirements:
-        key, asked = most.get(one.quantity, ("", inf))
-        if one.minimum is not None and one.minimum > asked:
-            told = f"command.{key} lets no command ask for more than {asked:.4g} {one.unit}"
-            yield f"requirement {one.id}: at least {one.minimum:.4g} {one.unit}, but {told}"
+    key, asked = most.get(requirement.quantity, ("", inf))
+    unit = requirement.unit
+    return f"command.{key} lets no command ask for more than {asked:.4g} {unit}" if value > asked else ""
 
 
 def _pedigree(design: Design) -> Iterator[str]:

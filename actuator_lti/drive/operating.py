@@ -25,34 +25,26 @@ CONTACT = {"driving": 1.0, "driven": -1.0, "sliding": 1.0}  # sgn(w T_s) of the 
 
 @dataclass(frozen=True, kw_only=True)
 class Operating:
-    """Where a drive stands when it is made linear (model.md sections 3 and 6).
+    """Where a drive stands when it is made linear (model.md sections 3 and 6)."""
 
-    ``point``: ``sliding``: the viscous slope, as the dry part is a constant while the speed keeps its sign.
-    ``rest``: plus Tc/w_s, the slope of the tanh law at zero speed. ``describing-function``: the slope that
-    dry friction has for a sinusoidal speed. ``driving``, ``driven`` (only with a coupling): sliding, with the
-    coupling's torque against or with the motion, which decides the sign of the load-dependent friction;
-    ``sliding`` is ``driving`` there. ``gap``: the coupling open, k = c = 0.
-    ``load_Nm``: load torque at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9).
-    ``speed_amplitude_rad_s``: W (peak, motor side), for the describing function.
-    ``direction``: of motion, 1 or -1, for asymmetric friction.
-    ``speed_rad_s``: motor speed at which the slope of a friction map is taken.
-    ``angle_rad``: output angle at which torques that bend with the angle are made linear.
-    ``twist_rad``: twist of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A
-    spring that bends has the stiffness of this twist; without one, of that of `carried_Nm`.
-    ``torques_held``: whether torques that depend on the angle are taken as they stand, without their slopes.
-    ``torques_at_once``: whether they act at every instant, as they do on a motor, where model.md section 11
-    (and so the simulator) holds them over a tick.
-    """
-
+    # sliding: the viscous slope, as the dry part is a constant while the speed keeps its sign. rest: plus
+    # Tc/w_s, the slope of the tanh law at zero speed. describing-function: the slope that dry friction has
+    # for a sinusoidal speed. driving, driven (only with a coupling): sliding, with the coupling's torque
+    # against or with the motion, which decides the sign of the load-dependent friction; sliding is driving
+    # there. gap: the coupling open, k = c = 0
     point: OperatingPoint = "sliding"
-    load_Nm: float = 0.0
-    speed_amplitude_rad_s: float | None = None
-    direction: int = 1
+    load_Nm: float = 0.0  # at the output shaft; enters through Tc = C0 + CM |M_ext|, equation (9)
+    speed_amplitude_rad_s: float | None = None  # W (peak, motor side), for the describing function
+    direction: int = 1  # of motion, 1 or -1, for asymmetric friction
     rotor: RotorState = "free"
-    speed_rad_s: float = 0.0
-    angle_rad: float = 0.0
+    speed_rad_s: float = 0.0  # of the motor, at which the slope of a friction map is taken
+    angle_rad: float = 0.0  # of the output, at which torques that bend with the angle are made linear
+    # Of the coupling there, at its own shaft: the motor stands at N angle + N_c twist. A spring that bends
+    # has the stiffness of this twist; without one, of that under ``load_Nm``
     twist_rad: float = 0.0
-    torques_held: bool = False
+    torques_held: bool = False  # whether torques that depend on the angle are taken without their slopes
+    # Whether they act at every instant, as they do on a motor, where model.md section 11 (and so the
+    # simulator) holds them over a tick
     torques_at_once: bool = False
 
     def __post_init__(self) -> None:

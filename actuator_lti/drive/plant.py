@@ -24,8 +24,7 @@ from actuator_lti.errors import InputError
 
 Entries = dict[str, Any]
 """Numbers by the name of a state: floats, arrays of shape (K,) of stacked designs, or traced values."""
-MatrixEntries = dict[tuple[str, str], Any]
-"""The same by the names of row and column."""
+MatrixEntries = dict[tuple[str, str], Any]  # the same by the names of row and column
 
 
 @dataclass(frozen=True)

@@ -83,8 +83,7 @@ _LIMITERS = (
     Limiter("profile", "profile of the command", "w_ref", "command", "", 7),
     Limiter("current-rate", "slope limit of the current", "i_ref", "rate", "current_rate_A_s", 8),
 )
-LIMITERS = {limiter.name: limiter for limiter in _LIMITERS}
-"""Every limiter, in the order of its flag bit."""
+LIMITERS = {limiter.name: limiter for limiter in _LIMITERS}  # every limiter, in the order of its flag bit
 CLAMP_OF = {limiter.signal: limiter for limiter in _LIMITERS if limiter.kind == "value"}
 """The clamp of each signal that a stage drives."""
 REST_BIT = 4

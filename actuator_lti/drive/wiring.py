@@ -21,8 +21,7 @@ if TYPE_CHECKING:
 
 ERRORS = {"current": "e_i", "velocity": "e_w", "position": "e_th"}
 MEASURED = {"current": "i", "velocity": "w_meas", "position": "th"}
-LAW_OUTPUT = "law"
-"""What a law of one's own gives, before feed-forward and limits."""
+LAW_OUTPUT = "law"  # what a law of one's own gives, before feed-forward and limits
 COMMANDS = {"voltage": "u", "current": "i_ref", "velocity": "w_ref", "position": "th_ref"}
 
 

@@ -27,8 +27,7 @@ from actuator_lti.types import Compared, Floats
 
 Loop = Literal["L", "T", "S"]
 UNTITLED = ("f_hz", "gain_db", "phase_deg", "coherence")  # columns without a heading
-NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")
-"""Of a row that is left out and counted."""
+NO_VALUE = ("", "nan", "na", "n/a", "null", "-", "inf", "-inf")  # of a row that is left out and counted
 _COLUMNS = ("frequency_hz", "response", "deviation", "coherence", "radius")  # one value a row
 
 

@@ -27,16 +27,18 @@ class Asked:
 
     hot_degC: Annotated[float, Option("Winding and magnets when hot; the winding's limit, or 120.", "degC")]
     cold_degC: Annotated[float, Option("Winding and magnets when cold; -40.", "degC")]
-    supply_V: Annotated[float, Option("The low supply; 0.8 of limits.voltage.", "V")]
+    supply_V: Annotated[float, Option("The low (or high) supply; 0.8 of limits.voltage.", "V")]
     cold_viscous: Annotated[float, Option("Factor on viscous friction in the cold; 1.")] = 1.0
 
     def __post_init__(self) -> None:
         """Refuse what is no corner."""
-        if not -273.15 < self.cold_degC < self.hot_degC < 1000.0:
-            allowed = "cold below hot, both above -273.15 and below 1000 degC"
-            raise InputError(f"cold {self.cold_degC:g}, hot {self.hot_degC:g} degC: allowed: {allowed}")
+        for name, degC in (("cold", self.cold_degC), ("hot", self.hot_degC)):
+            if not -273.15 < degC < 1000.0:
+                raise InputError(f"{name} {degC:g} degC: allowed: above -273.15 and below 1000 degC")
+        if not self.cold_degC < self.hot_degC:
+            raise InputError(f"hot {self.hot_degC:g} degC: must be above cold, {self.cold_degC:g} degC")
         if not 0.0 < self.supply_V < inf:
-            raise InputError(f"low supply {self.supply_V:g} V: must be positive")
+            raise InputError(f"supply {self.supply_V:g} V: must be positive")
         if not 1.0 <= self.cold_viscous <= 1e3:
             raise InputError(f"cold viscous factor {self.cold_viscous:g}: allowed: 1 to 1000")
 

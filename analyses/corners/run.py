@@ -104,15 +104,16 @@ def _made(design: Design, asked: Asked) -> Iterator[tuple[str, str, Design]]:
     hot = at_temperature(design, asked.hot_degC)
     low = replace(design, limits=replace(design.limits, voltage_V=asked.supply_V))
     supply = f"{asked.supply_V:g} V"
+    named = f"{'low' if asked.supply_V <= design.limits.voltage_V else 'high'} supply"
     if design.motor.has_electrical_dynamics:
         yield "hot", f"winding and magnets at {asked.hot_degC:g} °C", hot
         thick = "" if asked.cold_viscous == 1.0 else f", viscous friction times {asked.cold_viscous:g}"
         cold = _thickened(at_temperature(design, asked.cold_degC), asked.cold_viscous)
         yield "cold", f"winding and magnets at {asked.cold_degC:g} °C{thick}", cold
-    yield "low supply", supply, low
+    yield named, supply, low
     if design.motor.has_electrical_dynamics:
         both = replace(hot, limits=low.limits)
-        yield "hot, low supply", f"{asked.hot_degC:g} °C and {supply}", both
+        yield f"hot, {named}", f"{asked.hot_degC:g} °C and {supply}", both
     for quantity in CORNERED:
         name, values = f"worst {QUANTITIES[quantity].words}", worst_ends(design, quantity)
         if values:

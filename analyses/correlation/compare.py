@@ -19,27 +19,22 @@ CHANCE = 2.0 * comb(16, 8) / comb(8, 4) ** 2
 
 @dataclass(frozen=True, kw_only=True)
 class SignalComparison:
-    """How far a modelled signal is from the measured one.
-
-    ``relative_error`` is the norm of the difference over the norm of the measured; ``fit_percent`` is
-    ``100 (1 - norm of the difference / norm of the measured about its mean)``; ``max_error`` is the largest
-    absolute difference, at ``max_error_time_s``; ``mean_error`` the mean of the absolute difference,
-    ``rms_error`` its root mean square. ``delay_s`` is by how much the measured signal comes later
-    than the model (negative: earlier), the shift that fits best; None where the signal does not tell.
-    ``noise_rms`` is the white noise that the measured signal shows from row to row, 0 where it shows none.
-    """
+    """How far a modelled signal is from the measured one."""
 
     name: str
     unit: str
     samples: int
-    relative_error: float
-    fit_percent: float
+    relative_error: float  # norm of the difference over the norm of the measured
+    fit_percent: float  # 100 (1 - norm of the difference / norm of the measured about its mean)
+    # Of the absolute difference: mean, root mean square, largest and where that is
     mean_error: float
     rms_error: float
     max_error: float
     max_error_time_s: float
+    # By how much the measured signal comes later than the model (negative: earlier), by the best fit;
+    # None where the signal does not tell
     delay_s: float | None
-    noise_rms: float
+    noise_rms: float  # white noise that the measured signal shows from row to row, 0 where it shows none
     time_s: Floats = field(repr=False)
     measured: Floats = field(repr=False)
     modelled: Floats = field(repr=False)

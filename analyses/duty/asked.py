@@ -21,7 +21,8 @@ class Asked:
 
     The duty is a sine under a load, for a share of the time; what is not given comes from [duty]. The
     temperature needs thermal_resistance and thermal_time in [temperature], the protection limits.peak_time.
-    The exit status is 1 where the duty is beyond the continuous rating, or where none is stated.
+    The exit status is 1 where the duty is beyond the continuous rating or misses a requirement on it, or
+    where neither is stated.
 
     Try: actuator-lti duty joint --amplitude "10 deg" --load "40 N*m" --share 0.3 --cycle 20
     """

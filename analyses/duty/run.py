@@ -2,15 +2,17 @@
 
 from bisect import bisect_left
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import exp, inf, isfinite, log
 
 import numpy as np
 
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
+from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import Trajectory, commands, simulate
 
 
@@ -55,8 +57,19 @@ class Duty:
     overload: Overload | None
     heating: Heating | None
 
+    @cached_property
+    def requirements(self) -> tuple[RequirementVerdict, ...]:
+        """Those of the design on a duty."""
+        return judged_by(self.design, "duty", self)
+
     @property
     def verdict(self) -> Verdict:
+        """The rating and the requirements; not proven where neither is stated."""
+        rated = [self.rated] if self.rated is not Verdict.NOT_PROVEN or not self.requirements else []
+        return (Tally.of(rated) + tally(self.requirements)).verdict
+
+    @property
+    def rated(self) -> Verdict:
         """Whether the drive may do this for ever by what is stated: current, protection, temperature."""
         stated = [self.rms_A <= self.continuous_A] if isfinite(self.continuous_A) else []
         if self.heating is not None and isfinite(self.heating.limit_degC):

@@ -21,7 +21,7 @@ class Asked:
 
     Prints for each failure the time to a stated deflection and to the mechanical stop, the deflection until
     the failure is detected, the largest current and the largest torque in the train. What is not given comes
-    from [failure] of the design.
+    from [failure] of the design. The exit status is 1 where a requirement on failures is not met.
 
     Try: actuator-lti failures joint --stop "25 deg" --deflection "2 deg" --detection 0.05
     """
@@ -51,8 +51,7 @@ class Asked:
                 raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
         near, stop, seen, end = self.deflection_rad, self.stop_rad, self.detection_s, self.watched_s
         if near > stop:
-            both = f"deflection {near:g} rad: must not be beyond the stop, {stop:g} rad"
-            raise InputError(f"{both} (on a linear axis m)")
+            raise InputError(f"deflection: must not be beyond the stop, it is {near / stop:.4g} times that")
         if seen > end:
             raise InputError(f"detection {seen:g} s: must not be after {end:g} s, the end")
         if not isfinite(self.load_Nm):

@@ -1,10 +1,12 @@
 """Run every failure of a design on the rig of `analyses.failures.cases`."""
 
 from dataclasses import dataclass
-from math import ceil, log
+from functools import cached_property
+from math import ceil, inf, log
 
 import numpy as np
 
+from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import assemble_loops
@@ -14,6 +16,7 @@ from analyses.failures.asked import Asked
 from analyses.failures.cases import Case, Rig, cases_of
 from analyses.motion.settling import Settling, outcome
 from analyses.specification.capability import drive_figures
+from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,32 @@ class Failures:
     cases: tuple[FailureCase, ...]
     left_out: dict[str, str]  # by name: why a case does not exist for the drive
     before: tuple[Settling, ...]  # what holding each start ends in, the drive whole
+
+    @property
+    def hard_over_time_s(self) -> float:
+        """From the hard-over of the power stage to the stop; inf where it is not reached while watched."""
+        reached = self.case("hard-over").to_stop_s
+        return inf if reached is None else reached
+
+    @property
+    def failure_deflection_rad(self) -> float:
+        """Largest deflection until detection over all failures."""
+        return max(case.at_detection_rad for case in self.cases)
+
+    @property
+    def failure_moment_Nm(self) -> float:
+        """Largest moment in the train over all failures."""
+        return max(case.peak_moment_Nm for case in self.cases)
+
+    @cached_property
+    def requirements(self) -> tuple[RequirementVerdict, ...]:
+        """Those of the design on failures."""
+        return judged_by(self.design, "failures", self)
+
+    @property
+    def verdict(self) -> Verdict | None:
+        """That of the requirements; ``None`` without any."""
+        return tally(self.requirements).verdict if self.requirements else None
 
     def case(self, name: str) -> FailureCase:
         """A case by its name; raises `InputError` where there is none."""

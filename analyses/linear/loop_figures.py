@@ -31,8 +31,7 @@ from analyses.isolation import attempt
 
 HELD = {"current": "rotor locked", "velocity": "load moment held"}
 """How an inner loop is judged that is unstable by itself, by its name."""
-OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}
-"""How it stands then."""
+OPEN = {"current": "outer loops open and rotor free", "velocity": "outer loops open"}  # how it stands then
 AWAY = "the load, cogging or falling friction drives it away"
 ACTIVE = "held over a tick, as here and in the simulator, a slope over the angle is slightly active"
 

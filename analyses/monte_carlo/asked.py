@@ -33,7 +33,7 @@ class Asked(OnMachines):
     step: Annotated[
         float | None, Option('Nonlinear step of every sample, such as "1 deg".', "ANGLE", kind="output")
     ] = None
-    duration_s: Annotated[float, Option("Duration of that step; 0.5.", "s")] = 0.5
+    duration_s: Annotated[float | None, Option("Duration of that step; 0.5.", "s")] = None
     load_Nm: Annotated[float, LOAD] = 0.0
     operating_point: Annotated[str, POINT] = "sliding"
     at_least: Annotated[
@@ -49,6 +49,8 @@ class Asked(OnMachines):
     def __post_init__(self) -> None:
         if self.at_least is not None and not 0.0 <= self.at_least <= 1.0:
             raise InputError(f"--at-least {self.at_least:g}: allowed: a probability from 0 to 1")
+        if self.duration_s is not None and self.step is None:
+            raise InputError(f"--duration {self.duration_s:g}: allowed with --step")
 
 
 def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None) -> MonteCarloResult | Design:
@@ -62,12 +64,13 @@ def study(design: Design, asked: Asked, *, out: Path, progress: Progress = None)
     from analyses.studies.sampling import read_table, sampler_of
 
     table = None if asked.from_samples is None else read_table(asked.from_samples, variable_paths(design))
+    lasting = StepCheck.duration_s if asked.duration_s is None else asked.duration_s
     settings = MonteCarloSettings(
         samples=asked.samples,
         seed=asked.seed,
         operating_point=asked.operating_point,  # type: ignore[arg-type]
         load_Nm=asked.load_Nm,
-        step=None if asked.step is None else StepCheck(asked.step, asked.duration_s, asked.load_Nm),
+        step=None if asked.step is None else StepCheck(asked.step, lasting, asked.load_Nm),
         table=table,
         worst_cases=asked.worst,
     )

@@ -57,33 +57,25 @@ class InputColumn:
 
 @dataclass(frozen=True, kw_only=True)
 class Record:
-    """Signals of one run, one row a sample.
-
-    ``time_s`` increases strictly and may be irregular; ``signals`` hold arrays of the same length in SI,
-    ``units`` their SI units. ``averaged`` tells how many rows of the file were averaged into one where the
-    file was too long to be held (1: none). ``inputs`` accounts for every column of the file.
-    ``left_out`` marks rows that no fit is to use. ``first_row`` is how many rows of the file come before the
-    first, ``as_read`` the record as it was before it was put on a grid (None: it is that). ``settings`` are
-    keys of a design, with their values, that were other than the design's while this record was taken.
-    ``between`` tells how the drive took its command between the rows (`driving.readings`; empty: as it meets
-    the record best).
-    """
+    """Signals of one run, one row a sample."""
 
     name: str
-    time_s: Floats = field(repr=False)
-    signals: Mapping[str, Floats] = field(repr=False)
-    units: Mapping[str, str]
+    time_s: Floats = field(repr=False)  # increases strictly and may be irregular
+    signals: Mapping[str, Floats] = field(repr=False)  # arrays of the same length in SI
+    units: Mapping[str, str]  # their SI units
     counts: RowCounts
-    averaged: int = 1
+    averaged: int = 1  # rows of a file too long to be held that were averaged into one
     sha256: str = ""
     constants: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
     notes: tuple[str, ...] = ()
-    inputs: tuple[InputColumn, ...] = ()
+    inputs: tuple[InputColumn, ...] = ()  # every column of the file
     resample_tolerance: float = RESAMPLE_TOLERANCE
-    left_out: Mask | None = field(default=None, repr=False)
-    first_row: int = field(default=0, repr=False)
-    as_read: Record | None = field(default=None, repr=False)
+    left_out: Mask | None = field(default=None, repr=False)  # rows that no fit is to use
+    first_row: int = field(default=0, repr=False)  # rows of the file that come before the first
+    as_read: Record | None = field(default=None, repr=False)  # before it was put on a grid; None: it is that
+    # Keys of a design, with values that were other than the design's while this record was taken
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
+    # How the drive took its command between the rows (`driving.readings`; empty: as it meets the record best)
     between: str = ""
 
     def drive(self, design: Design) -> Design:

@@ -63,22 +63,6 @@ class AskedFigures:
     corners = cached_property(lambda self: corners(self.design))
 
     @property
-    def hard_over_time_s(self) -> float:
-        """From the hard-over of the power stage to the stop; inf where it is not reached while watched."""
-        reached = self.failures.case("hard-over").to_stop_s
-        return inf if reached is None else reached
-
-    @property
-    def failure_deflection_rad(self) -> float:
-        """Largest deflection until detection over all failures."""
-        return max(case.at_detection_rad for case in self.failures.cases)
-
-    @property
-    def failure_moment_Nm(self) -> float:
-        """Largest moment in the train over all failures."""
-        return max(case.peak_moment_Nm for case in self.failures.cases)
-
-    @property
     def limit_cycle_rad(self) -> float | None:
         """Largest swing that a step of the drive as it is ends in; 0: it rests; ``None``: not known."""
         swing = self.cycles.hunting
@@ -94,7 +78,7 @@ class AskedFigures:
         return quantity.better * worst
 
     def figure(self, name: str) -> tuple[float | None, str]:
-        """A figure in its unit and, where there is none, why."""
+        """A figure in its unit, and what there is to say of it."""
         quantity = ANALYSIS_QUANTITIES[name]
         try:
             if quantity.cornered:
@@ -102,7 +86,6 @@ class AskedFigures:
             value = quantity.read(self, self.design.axis)
         except InputError as error:
             return None, error.message
-        said = "" if value is not None else "the design does not state what this needs"
-        if name == "limit_cycle":  # after which step that is
-            said = "" if self.cycles.hunting is None else ending_of(self.design, self.cycles.hunting)
-        return value, said
+        if name == "limit_cycle" and self.cycles.hunting is not None:  # after which step that is
+            return value, ending_of(self.design, self.cycles.hunting)
+        return value, ""

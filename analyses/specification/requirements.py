@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
 from math import inf
+from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
@@ -16,6 +17,7 @@ from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
+from actuator_lti.design.suspicions import beyond_profile
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
@@ -52,8 +54,11 @@ def evaluate_requirements(
 
 
 def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
-    """Beside a bandwidth to the command what rate and acceleration of the command make of it."""
-    of, limits = verdict.requirement, (design.command.rate_rad_s, design.command.acceleration_rad_s2)
+    """Beside a bandwidth, a rate or an acceleration what the profile of the command makes of it."""
+    of, value = verdict.requirement, verdict.value
+    if value is not None and (profile := beyond_profile(design, of, value)):
+        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, profile))))
+    limits = (design.command.rate_rad_s, design.command.acceleration_rad_s2)
     if (of.quantity, verdict.loop) != ("bandwidth", "position") or of.to == "reference" or min(limits) == inf:
         return verdict
     from analyses.specification.asked_figures import said_of
@@ -105,7 +110,8 @@ def judged(
         told = f"quantity = {requirement.quantity!r}: allowed are {', '.join(QUANTITIES)}"
         raise InputError(f"requirement {requirement.id}: {told}", where=design.origin or None)
     if quantity.scope == "analysis":
-        verdicts = [_verdict(requirement, None, *asked(quantity.name))]
+        value, reason = asked(quantity.name)
+        verdicts = [_verdict(requirement, None, value, reason or NOT_STATED * (value is None))]
     elif quantity.scope == "drive":
         value = float(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
         reason = "the design has no such figure" if math.isnan(value) else ""
@@ -115,6 +121,20 @@ def judged(
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
     waiver = design.waiver_of
     return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+
+
+NOT_STATED = "the design does not state what this needs"
+
+
+def judged_by(design: Design, analysis: str, result: object) -> tuple[RequirementVerdict, ...]:
+    """Judge the requirements on what one analysis finds, ``failures`` or ``duty``, by its result."""
+
+    def found(name: str) -> tuple[float | None, str]:
+        return QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis), ""
+
+    own = {name for name, one in QUANTITIES.items() if one.reader.startswith(f"{analysis}.")}
+    asked = (one for one in design.requirements if one.quantity in own)
+    return tuple(verdict for one in asked for verdict in judged(design, one, {}, found))
 
 
 def _judge_loop(

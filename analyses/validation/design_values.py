@@ -59,7 +59,8 @@ def _profile(pair: Pair) -> Iterator[Row]:
         unit = f"{angle}/s" + ("", "^2", "^3")[n]
         name = f"command_{key.split('_')[0]}"
         yield pair.judged(name, limit, found, unit, "first update of a large command")
-    if outermost == "position" and isfinite(min(model.jerk_rad_s3, own.jerk_rad_s3)):
+    keeps = outermost == "position" and pair.design.controller.position_loop.law is None  # its reference
+    if keeps and isfinite(min(model.jerk_rad_s3, own.jerk_rad_s3)):
         yield _jerk(pair, rows, T)
 
 

@@ -211,6 +211,7 @@ def _resolution(pair: Pair) -> Iterator[Row]:
     if current is None or current.law is not None or not (wanted and own):
         return
     rows = pair.rows(instruments=Instruments(current_resolution_A=own))
+    rows["own_gain"] = 0.0  # a law outside that takes the current gives a command
     drive = rows.running().begin(CURRENT=1.6 * wanted)
     gain = rows.value("current_gain") + rows.value("current_integral")
     found = -0.5 * drive.value("VOLTAGE_BEFORE") / gain

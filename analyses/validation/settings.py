@@ -29,10 +29,8 @@ class Settings:
     map_counts: tuple[int, int] = (17, 28)  # amplitudes and frequencies of the large-signal map
 
 
-QUICK = Settings(findings=())
-"""All that the verdict is made of, without findings."""
-CHECKS = Settings(own=False, findings=())
-"""The checks alone."""
+QUICK = Settings(findings=())  # all that the verdict is made of, without findings
+CHECKS = Settings(own=False, findings=())  # the checks alone
 
 
 @dataclass(frozen=True, kw_only=True)

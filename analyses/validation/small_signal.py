@@ -41,29 +41,21 @@ MOST_LOG = 70.0  # of a gain
 
 @dataclass(frozen=True, kw_only=True)
 class Place:
-    """A loop or a path in both writings.
-
-    ``condition``: the motion that it is tested on, in words.
-    ``predicted``: T at points z of the place's own rate, by the linear writing.
-    ``poles``: closed-loop poles over one base period, by the linear writing; of a loop or a break point.
-    ``figures``: of a loop; its margins are judged where it is not periodic.
-    ``exact``: of a break point with all loops closed.
-    ``critical``: eigenvalues over one base period at a gain, by the linear writing.
-    ``delayed``: tangent under a longer computing delay, and what gives its predicted poles over one base
-    period; only at the voltage.
-    ``quantity``: name of the row that judges the response.
-    """
+    """A loop or a path in both writings: predictions are by the linear one."""
 
     name: str
-    condition: str
+    condition: str  # the motion that it is tested on, in words
     tangent: Tangent
-    predicted: Callable[[Complexes], Complexes]
+    predicted: Callable[[Complexes], Complexes]  # T at points z of the place's own rate
+    # Of the closed loop over one base period; of a loop or a break point
     poles: Complexes = field(default_factory=lambda: np.empty(0, complex))
-    figures: LoopFigures | None = None
-    exact: ExactMargins | None = None
-    critical: Callable[[float], Complexes] | None = None
+    figures: LoopFigures | None = None  # of a loop; its margins are judged where it is not periodic
+    exact: ExactMargins | None = None  # of a break point with all loops closed
+    critical: Callable[[float], Complexes] | None = None  # eigenvalues over one base period at a gain
+    # Tangent under a longer computing delay, and what gives its predicted poles over one base period; only at
+    # the voltage
     delayed: Callable[[float], tuple[Tangent, Callable[[], Complexes]]] | None = None
-    quantity: str = "response"
+    quantity: str = "response"  # name of the row that judges the response
 
     @property
     def within(self) -> float:

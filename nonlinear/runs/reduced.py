@@ -62,15 +62,11 @@ class BatchResult(Compared):
     Signals are named as in ``layout.SIGNALS``: ``reference_rad``, ``output_angle_rad``,
     ``motor_speed_rad_s``, ``current_A``, ``voltage_V``, ``current_command_A``, ``speed_command_rad_s`` and
     ``probe_<point>_before``, ``probe_<point>_after``.  ``last = 0`` is the last window, 1 the one before.
-
-    ``rows``, shape (n, layout.SIZE): parameters.
-    ``outs``, shape (n, layout.OUT_SIZE): the kernel's numbers.
-    ``status``, shape (n,): 0: done; otherwise ``layout.TOO_MANY_EVENTS``, ``NOT_FINITE``.
     """
 
-    rows: Floats
-    outs: Floats
-    status: npt.NDArray[np.int64]
+    rows: Floats  # shape (n, layout.SIZE): parameters
+    outs: Floats  # shape (n, layout.OUT_SIZE): the kernel's numbers
+    status: npt.NDArray[np.int64]  # shape (n,): 0: done; else ``layout.TOO_MANY_EVENTS``, ``NOT_FINITE``
 
     @property
     def ok(self) -> npt.NDArray[np.bool_]:

@@ -324,4 +324,5 @@ class Trajectory(Compared):
 def _on(name: str) -> str:
     """A column's name on a linear axis."""
     name = name.replace("output_speed_reference_rad_s", "velocity_reference_m_s")
-    return name.replace("load_Nm", "load_force_N").replace("_rad", "_m")
+    name = name.replace("load_Nm", "load_force_N").replace("torque_Nm", "force_N")
+    return name.replace("_rad", "_m")

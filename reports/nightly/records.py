@@ -52,11 +52,7 @@ class Content:
 
 @dataclass(frozen=True, kw_only=True)
 class Result:
-    """What one design came to in one night.
-
-    ``home`` is the night whose file holds the content, an earlier one where all is as it was then; None where
-    there is no result.
-    """
+    """What one design came to in one night."""
 
     run: int
     name: str
@@ -70,6 +66,7 @@ class Result:
     worst: float | None = None
     worst_id: str = ""
     message: str = ""
+    # The night whose file holds the content, an earlier one where all is as it was then; None: no result
     home: int | None = None
     content: Content | None = None
 
@@ -107,15 +104,12 @@ class Baseline:
 
 @dataclass(frozen=True, kw_only=True)
 class Index:
-    """All nights: those that ended, when others began that did not, and what was approved.
-
-    ``begun`` counts every night that ever began; ``running`` says when the one began that has not ended.
-    """
+    """All nights: those that ended, when others began that did not, and what was approved."""
 
     id: str
     study: str = ""
-    begun: int = 0
-    running: str = ""
+    begun: int = 0  # every night that ever began
+    running: str = ""  # when the one began that has not ended
     runs: list[Run] = field(default_factory=list)
     interrupted: list[str] = field(default_factory=list)
     baselines: list[Baseline] = field(default_factory=list)

@@ -36,16 +36,14 @@ _SUFFIXES = (".py", ".toml", ".html", ".j2", ".css", ".js", ".typ", ".svg")
 
 @dataclass(frozen=True, kw_only=True)
 class Job:
-    """One report to build: a design or variant (any text is a name), or the comparison of a whole study.
-
-    ``payload`` is plain JSON and all that the result depends on, except the code; ``parameters``, dotted keys
-    with texts as written, are shown when a figure has moved.
-    """
+    """One report to build: a design or variant (any text is a name), or the comparison of a whole study."""
 
     name: str
     kind: str = "design"
+    # Plain JSON and all that the result depends on, except the code
     payload: Mapping[str, Any] = field(default_factory=dict)
     design_hash: str = ""
+    # Dotted keys with texts as written, which are shown when a figure has moved
     parameters: Mapping[str, str] = field(default_factory=dict)
     revision: str = ""
 

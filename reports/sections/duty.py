@@ -8,6 +8,7 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
+from reports.sections import requirements
 from reports.sections.names import load_unit, output_unit
 
 _SHOWN = 400
@@ -27,7 +28,8 @@ def section(result: Duty) -> doc.Section:
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
     told = doc.severity(result.verdict)
     told = "warn" if told == "info" and result.limited else told
-    blocks, words = [table, _figure(result)], summary(result)
+    own = requirements.table(result.requirements, load_unit(result.design))
+    blocks, words = [table, *own, _figure(result)], summary(result)
     return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
 
 
@@ -56,8 +58,8 @@ def asked_words(result: Duty) -> str:
 
 def summary(result: Duty) -> str:
     limited = f"; it is not followed as asked, limited by {' and '.join(result.limited)}"
-    said = f"{asked_words(result)} is {RATED[result.verdict]}: {_found(result)}"
-    return said + limited * bool(result.limited) + "."
+    said = f"{asked_words(result)} is {RATED[result.rated]}: {_found(result)}"
+    return said + limited * bool(result.limited) + f". {requirements.told(result.requirements)}".rstrip()
 
 
 def _found(result: Duty) -> str:

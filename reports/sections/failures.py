@@ -11,6 +11,7 @@ from analyses.motion.settling import noticed, told, verdict_of
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
+from reports.sections import requirements
 from reports.sections.names import Unit, load_unit, output_unit, push_words
 
 NAMES = {
@@ -37,10 +38,13 @@ def section(result: Failures) -> doc.Section:
         f"ms. The {push} is that in the coupling; in a rigid train the motor's, through the gears."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
-    blocks = [_table(result, out), _figure(result, out), *map(doc.text, left)]
+    own = requirements.table(result.requirements, load_unit(result.design))
+    blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
     told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
-    words = summary(result)
-    return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, told=told_as)
+    status = "info" if result.verdict is None else doc.severity(result.verdict)
+    told_as = told_as if status == "info" else status
+    words, title = summary(result), "Failure cases"
+    return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
 
 
 def summary(result: Failures) -> str:
@@ -58,7 +62,7 @@ def summary(result: Failures) -> str:
         words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
     if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
         words += "; the drive does not come to rest before it"
-    return f"{NAMES[worst.name]} {words}."
+    return f"{NAMES[worst.name]} {words}. {requirements.told(result.requirements)}".rstrip()
 
 
 def _table(result: Failures, out: Unit) -> doc.Block:

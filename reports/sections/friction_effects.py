@@ -44,6 +44,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     sizes = len(cycles.settlings)
     result = f"at rest after steps of {sizes} sizes" if sizes > 1 else "at rest after a step of one size"
     result = result if swing is None else told(design, swing, *fine)
+    alone = " without counts and noise" if swing is not None and quiet(design) != design else ""
     agree = "as predicted" if cycles.as_predicted else "not as predicted"
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
@@ -57,7 +58,7 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
         passed=verdict_of(design, swing),
         comparison="<=",
         reason=f"describing function of the whole loop: {predicted}; stick-slip analysis: {slip}; "
-        f"simulated: {result}; {agree}",
+        f"simulated{alone}: {result}; {agree}",
     )
 
 

@@ -47,6 +47,9 @@ def section(result: MonteCarloResult) -> doc.Section:
 def brief(result: MonteCarloResult) -> Brief:
     kept = ("label", "verdict", "probability", "low", "nominal", "worst", "unit")
     tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
+    if stepped := [one for one in result.columns.values() if one.name.startswith("nonlinear.")]:
+        shown = ("figure", "unit", "minimum", "q50", "maximum", "missing")
+        tables.append(doc.with_columns(_figure_table(stepped, "Nonlinear step"), shown))
     reasons: dict[str, list[str]] = {}
     for one in _verdicts(result):
         if one["verdict"] != Verdict.MET:
@@ -153,7 +156,9 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
     )  # fmt: skip
 
 
-def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
+def _figure_table(
+    columns: Iterable[ColumnStatistics], title: str = "Distribution of every figure"
+) -> doc.Block:
     def quantile(percent: int, c: ColumnStatistics) -> float | None:
         return in_shown(dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100), c.unit)
 
@@ -173,7 +178,7 @@ def _figure_table(columns: Iterable[ColumnStatistics]) -> doc.Block:
     note = (
         "Quantiles are values of samples. Missing: samples without such a figure (unstable, or not reached)."
     )
-    return doc.listing("Distribution of every figure", columns, shown, note)
+    return doc.listing(title, columns, shown, note)
 
 
 def _words(name: str) -> str:

@@ -9,7 +9,7 @@ from actuator_lti.design.model import Requirement
 from analyses.monte_carlo.result import Odds
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
-from reports.sections.names import QUANTITIES
+from reports.sections.names import QUANTITIES, in_shown
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
@@ -30,6 +30,25 @@ def result(verdicts: Sequence[RequirementVerdict]) -> str:
         names = [label(one) + (" (waived)" if one.waiver else "") for one in verdicts if one.verdict == word]
         said += [f"{word.capitalize()}: {'; '.join(names)}."] if names else []
     return " ".join(said)
+
+
+def told(verdicts: Sequence[RequirementVerdict]) -> str:
+    """What an analysis says of the requirements on what it finds; empty without any."""
+    return result(verdicts) if verdicts else ""
+
+
+def table(
+    verdicts: Sequence[RequirementVerdict], load_unit: str, title: str = "Requirements"
+) -> list[doc.Block]:
+    """Requirements that are counted elsewhere too: as a table, if there are any."""
+    columns = [
+        doc.of("id", "id", "Requirement"),
+        doc.of(lambda v: label(v, load_unit), "label", "What"),
+        doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Found", format="sig:4"),
+        doc.of(lambda v: limit_words(v.requirement), "limit", "Limit"),
+        doc.of("verdict.value", "verdict", "Verdict"),
+    ]
+    return [doc.listing(title, verdicts, columns, status=lambda v: v.role)] if verdicts else []
 
 
 def item(verdict: RequirementVerdict, load_unit: str = "N m") -> doc.VerdictItem:

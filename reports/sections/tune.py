@@ -2,20 +2,19 @@
 
 from pathlib import Path
 
-from actuator_lti.asked.quantities import shown_unit, with_unit
+from actuator_lti.asked.quantities import with_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.access import located
 from actuator_lti.design.fields import Structure
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import write_changed
 from actuator_lti.files.atomic import write_text
-from analyses.specification.requirements import RequirementVerdict
 from analyses.tuning.result import BindingRequirement, TuningResult
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit, in_shown, load_unit
-from reports.sections.requirements import item, label
+from reports.sections.names import Unit, load_unit
+from reports.sections.requirements import item, label, table
 
 
 def section(result: TuningResult) -> doc.Section:
@@ -23,7 +22,7 @@ def section(result: TuningResult) -> doc.Section:
     verdicts = doc.verdicts([*(_verdict(r, result.before) for r in result.requirements), *others])
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
-        *([confirmed(result)] if result.confirmed else []),
+        *table(result.confirmed, load_unit(result.before), "Confirmed by certified margins"),
         *([_curve(result)] if result.trade_off else []),
         *([checks(result)] if result.checks else []),
         *(doc.remark(note) for note in result.notes),
@@ -43,6 +42,8 @@ def write(result: TuningResult, folder: Path | None) -> list[str]:
 def summary(result: TuningResult) -> str:
     """What was found of what is searched for, and which of the other requirements are not met."""
     told = [_searched(result)]
+    if result.others and all(one.verdict is Verdict.MET for one in result.others):
+        told.append("The tuned design meets every other requirement.")
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         open_ones = (one for one in result.others if one.verdict == word and not one.passes)
         names = "; ".join(label(one, load_unit(result.before)) for one in open_ones)
@@ -120,20 +121,6 @@ def gains(result: TuningResult) -> doc.Block:
     if not any(g.object for g in result.gains):  # another drive than that controller
         columns, note = columns[:-3], ""
     return doc.listing("Gains", result.gains, columns, note)
-
-
-def confirmed(result: TuningResult) -> doc.Block:
-    def limit(v: RequirementVerdict) -> float | None:
-        return in_shown(v.requirement.bound, v.requirement.unit)
-
-    columns = [
-        doc.of("id", "label", "Requirement"),
-        doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Certified", format="sig:4"),
-        doc.of(limit, "limit", "Limit", format="sig:4"),
-        doc.of(lambda v: shown_unit(v.requirement.unit)[0], "unit", "Unit"),
-        doc.of(lambda v: v.verdict == "met", "met", "Met", format="yesno"),
-    ]
-    return doc.listing("Confirmed by certified margins", result.confirmed, columns, status=lambda v: v.role)
 
 
 def _curve(result: TuningResult) -> doc.Block:

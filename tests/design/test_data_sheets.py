@@ -2,6 +2,7 @@
 
 from math import pi, sqrt
 
+import control
 import pytest
 
 from actuator_lti.design import (
@@ -211,6 +212,11 @@ def test_a_design_is_explained_as_written_as_read_and_as_the_model_has_it(cli) -
     asked = cli.data("keys", "torque_constant", "--explain", "ilr33-amber")["keys"]
     assert asked == [{"path": "motor.torque_constant", **told}]
     assert "In the model as" in cli.text("keys", "--explain", "ilr33-amber")
+    gains = control.ss([], [], [], [[2.0, -0.5]], 6.25e-5)
+    own = SERVO.with_law("velocity", gains, inputs=["error", "current"])
+    law = {item.path: item for item in explained(own)}["control.velocity.law"]
+    assert law.read == "error in rad/s, current in A dc"
+    assert law.model == "gives the current in A dc"
     # what the friction was read from: 137 mA, 7580 rpm
     sheet_s = {item.path: item.read for item in explained(sheet("[[gear]]", "[[gear]]", 1))}
     assert (sheet_s["motor.no_load_current"], sheet_s["motor.no_load_speed"]) == (

@@ -38,6 +38,9 @@ def test_json_and_files_and_a_linear_axis_in_metres(run, tmp_path) -> None:
     facts, rows = run("emps --command ramp --amplitude 10")
     assert facts["final_output_m"] == pytest.approx(0.01, rel=0.05)
     assert {"output_angle_m", "motor_angle_m", "motor_speed_m_s"} <= set(rows.dtype.names)
+    names = run("ballscrew --amplitude 1 --duration 0.01 --load 100")[1].dtype.names
+    assert {"twist_m", "coupling_force_N", "load_force_N"} <= set(names)
+    assert not [name for name in names if "Nm" in name or "rad" in name]
 
 
 def test_a_record_is_a_command_from_its_start_and_a_log_of_events_is_held(run, tmp_path) -> None:

@@ -5,20 +5,23 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from built_report import Built, validated
-from live_page import opened, written
+from live_page import AMBER, Built, opened, written
 
-from actuator_lti import Design, load_design
+from actuator_lti import Design
+from analyses.validation import Settings, validate
 from reports.build import design_report
 from reports.html import write_report
+from reports.sections.validation import section
 
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory) -> Built:
-    """Build the report of ilr33-amber at a fixed time."""
+    """Build the report of ilr33-amber at a fixed time, with a coarse validation."""
+    findings = ("injected sweep", "motion from rest", "large signals")
+    coarse = Settings(findings=findings, rest_frequencies=10, map_counts=(10, 16))
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        document = design_report(load_design("ilr33-amber"), validated())
+        document = design_report(AMBER, section(validate(AMBER, coarse)))
     page, data = write_report(document, tmp_path_factory.mktemp("report"))
     return Built(document, page, data)
 

@@ -4,7 +4,7 @@ import json
 import math
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pytest
 from typer.testing import CliRunner
@@ -18,6 +18,8 @@ from reports.html import page as page_of
 
 Browser = Locator = Page = Any  # of playwright, which is not on every machine
 AMBER = load_design("ilr33-amber")
+HOSTILE = "<script>alert(1)</script> \"quoted\" 'single' & $x^2$ ]]> \u202e {{ 7*7 }}"
+SEEN = HOSTILE.replace("\u202e", "⟨U+202E⟩")  # a page shows marks of direction, and does not obey them
 LIVE = "JSON.parse(document.getElementById('live-data').textContent)"
 FIGURES = {  # of the page: of `margins --json`
     "gain_margin": "gain_margin_db",
@@ -36,6 +38,14 @@ ON_CURVE = """(node) => { // of its middle part, and under nothing else
     }
 }"""
 RESPONSE = ("bandwidth", "overshoot", "settling_time")
+
+
+class Built(NamedTuple):
+    """A report, its page and its JSON on disk."""
+
+    document: dict[str, Any]
+    page: Path
+    data: Path
 
 
 @cache

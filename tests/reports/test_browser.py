@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pypdf
 import pytest
-from built_report import Built
+from live_page import Built
 
 AXE = Path(__file__).parents[2] / "node_modules" / "axe-core" / "axe.min.js"  # by `make page`
 FOUND = """() => axe.run(document, { resultTypes: ["violations"] }).then(({ violations }) => violations

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_lti import assemble_loops, load_design, stability_margins
+from actuator_lti.loops.result import Loop
 from analyses import survey_loops
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures, loop_figures
 from reports.as_json import loop_json
@@ -71,3 +72,13 @@ def test_the_terminal_prints_the_evidence(cli):
     assert {result["evidence"] for result in loops.values()} == {"certified"}
     line = next(line for line in cli.text("margins", "ilr33-amber").splitlines() if "Margins are" in line)
     assert line.split() == ["Margins", "are"] + ["certified"] * 4  # the current loop, rotor free and locked
+
+
+def test_the_resonance_of_a_loop_of_second_order_has_its_frequency():
+    """``w0^2/(s^2 + 2 D w0 s + w0^2)`` is largest at ``w0 sqrt(1 - 2 D^2)``; for D above 0.707 nowhere."""
+    for damping, hertz in ((0.2, 5.0 * np.sqrt(1.0 - 2.0 * 0.2**2)), (0.8, None)):
+        omega = 2.0 * np.pi * 5.0
+        opened = control.tf([omega**2], [1.0, 2.0 * damping * omega, 0.0])
+        loop = Loop("velocity", "w_ref", opened, control.feedback(opened), None, None, "rad/s", "rad/s")
+        found = loop_json(loop_figures(loop, step=False))["resonance_hz"]
+        assert found == (None if hertz is None else pytest.approx(hertz))

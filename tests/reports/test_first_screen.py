@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_report import Built
+from live_page import Built
 
 from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs

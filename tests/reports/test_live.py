@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from built_report import HOSTILE, SEEN
-from live_page import Browser, Locator, Page
+from live_page import HOSTILE, SEEN, Browser, Locator, Page
 
 from analyses.linear.responses import Curve
 from reports import document as doc

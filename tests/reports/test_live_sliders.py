@@ -11,8 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from built_report import HOSTILE
-from live_page import AMBER, Browser, Page, command_line, page_text, same_figures, written
+from live_page import AMBER, HOSTILE, Browser, Page, command_line, page_text, same_figures, written
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import Design, check_design, with_values

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from built_report import HOSTILE, SEEN, Built
+from live_page import HOSTILE, SEEN, Built
 
 import actuator_lti
 import analyses

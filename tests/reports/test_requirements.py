@@ -27,6 +27,8 @@ from analyses.limit_cycles import limit_cycles
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
+from reports.sections.duty import section as duty_section
+from reports.sections.failures import section as failures_section
 
 AMBER = load_design("ilr33-amber")
 
@@ -153,6 +155,35 @@ def test_every_requirement_reads_its_analysis() -> None:
         for one in evaluate_requirements(replace(FIN, requirements=asked)):
             assert one.value == pytest.approx(wanted[one.id], rel=1e-9), one.id
             assert (one.verdict == "met") is (lower[one.id] is (shift < 0.0)), one.id
+
+
+@pytest.mark.parametrize(("ask", "section", "quantity", "limit"), [
+    (failures, failures_section, "failure_moment", {"maximum": 1e-3}),
+    (failures, failures_section, "hard_over_time", {"minimum": 1e-6}),
+    (duty, duty_section, "duty_current", {"maximum": 1e-3}),
+    (duty, duty_section, "winding_temperature", {"maximum": 1e4}),
+])  # fmt: skip
+def test_an_analysis_judges_the_requirements_on_what_it_finds_as_margins_does(ask, section, quantity, limit):
+    other = Requirement(id="other", quantity="phase_margin", unit="deg", loop="every", minimum=179.0)
+    design = replace(FIN, requirements=(requirement(quantity, **limit), other))
+    result = ask(design)
+    assert result.requirements == evaluate_requirements(design)[:1]
+    assert (
+        result.verdict == result.requirements[0].verdict == ("not met" if 1e-3 in limit.values() else "met")
+    )
+    words, status = (section(result)[key] for key in ("result", "status"))
+    assert status == ("fail" if result.verdict == "not met" else "info")
+    assert (f"Not met: Drive: {ANALYSIS_QUANTITIES[quantity].words}" in words) is (
+        result.verdict == "not met"
+    )
+    assert ask(FIN).requirements == ()
+
+
+def test_a_rate_beyond_the_profile_of_the_command_says_so() -> None:
+    slow = replace(AMBER, command=replace(AMBER.command, rate_rad_s=0.1))
+    keys = {"quantity": "output_rate", "unit": "deg/s", "minimum": 1.0}
+    told = "command.rate lets no command ask for more than 5.73 deg/s"
+    assert [judged(design, **keys).reason for design in (AMBER, slow)] == ["", told]
 
 
 def test_margins_at_the_corners() -> None:

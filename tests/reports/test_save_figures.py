@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from built_report import Built
-from live_page import Browser, Page
+from live_page import Browser, Built, Page
 from matplotlib.image import imread
 
 from reports import document as doc

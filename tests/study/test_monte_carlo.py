@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from toleranced import toleranced
+from toleranced import asked_twice, toleranced
 
-from actuator_lti import load_design, read_design_text
+from actuator_lti import load_design, read_design_text, write_design
 from actuator_lti.design.asked import Waiver
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
 from analyses.monte_carlo.judging import Reduction, reduced, unpacked
@@ -58,7 +58,7 @@ def test_odds_of_a_current_limit_are_the_closed_form(study, design):
 
 
 def test_the_worst_case_lies_in_the_corner_and_chunks_and_threads_change_no_bit(design, tmp_path):
-    settings = replace(PLAIN, worst_cases=True)
+    design, settings = asked_twice(design), replace(PLAIN, worst_cases=True)
     searched = monte_carlo(design, tmp_path / "searched", settings)
     case = next(w for w in searched.worst if w.requirement == "motor-current")
     corner = (2.25e-3 + 1.6 * 1.34e-3 * 8 + 5.25e-6 * 942.5) / 5.9e-3
@@ -208,7 +208,9 @@ def test_what_many_samples_come_to_does_not_grow(count, design):
 def wide(tmp_path_factory):
     """The baseline with a friction coefficient that may be 60 % off: some samples need too much current."""
     path = tmp_path_factory.mktemp("wide") / "wide.toml"
-    path.write_text(toleranced(friction={"load_coefficient": 60}))
+    path.write_text(
+        write_design(asked_twice(read_design_text(toleranced(friction={"load_coefficient": 60}))))
+    )
     return path
 
 
@@ -233,6 +235,7 @@ def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alon
     path.write_text(first)
     assert 0.4 * 1.34e-3 <= load_design(path).friction.load_coefficient <= 1.6 * 1.34e-3
     made = cli.data("montecarlo", "--samples", 64, "--out", tmp_path, "--no-worst", "--step", "1 deg")
+    assert "allowed with --step" in cli.refused("montecarlo", "--duration", "2")
     assert made["verdict"] == "met"
     assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
 

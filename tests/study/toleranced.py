@@ -1,11 +1,12 @@
 """What tests of studies are made of: tolerances of one's own, distributions, requirements."""
 
 import tomllib
+from dataclasses import replace
 
 import tomli_w
 
 from actuator_lti import load_design, write_design
-from actuator_lti.design.model import Requirement, Tolerance
+from actuator_lti.design.model import Design, Requirement, Tolerance
 from analyses.studies.sampling import Factor
 from analyses.tuning import TuningSettings
 
@@ -19,6 +20,12 @@ def toleranced(**percent: dict[str, float]) -> str:
         for key, share in keys.items():
             tree[table][key]["tolerance"] = f"{share:g} %"
     return tomli_w.dumps(tree)
+
+
+def asked_twice(design: Design) -> Design:
+    """Of its requirements the current of the motor and the gain margin of every loop: a search for each."""
+    kept = tuple(one for one in design.requirements if one.id in ("motor-current", "gain-margin"))
+    return replace(design, requirements=kept)
 
 
 def normal(path: str, nominal: float = 0.0, std: float = 1.0) -> Factor:

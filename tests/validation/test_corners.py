@@ -87,8 +87,12 @@ def test_command_and_section(cli) -> None:
     assert limits == [[6.0], [45.0]]
     seen = [item.words for panel in panels for item in panel.items if item.kind == "note"]
     assert seen == ["not stable"] * 2 * sum(not one.sound for c in fin.corners for one in c.figures.values())
-    for asked in (("--hot", "-60"), ("--cold", "-300"), ("--hot", "1500")):
-        allowed = "allowed: cold below hot, both above -273.15 and below 1000 degC"
+    between = "allowed: above -273.15 and below 1000 degC"
+    for asked, allowed in (
+        (("--hot", "-60"), "hot -60 degC: must be above cold, -40 degC"),
+        (("--cold", "-300"), f"cold -300 degC: {between}"),
+        (("--hot", "1500"), f"hot 1500 degC: {between}"),
+    ):
         assert allowed in cli.refused("corners", "fin", *asked)
 
 
@@ -109,6 +113,8 @@ def test_a_source_has_no_temperature() -> None:
     names = [one.name for one in corners(EMPS).corners]
     assert names == ["nominal", "low supply", "worst gain margin", "worst phase margin"]
     refused(Asked.of, EMPS, supply_V=-1.0, words="must be positive")
+    above = Asked.of(EMPS, supply_V=2.0 * EMPS.limits.voltage_V)
+    assert corners(EMPS, above).corners[1].name == "high supply"
 
 
 def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:

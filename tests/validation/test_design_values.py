@@ -1,5 +1,6 @@
 """Every number of a design is confronted, exactly: no false alarm, and 1 % is seen."""
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from math import isfinite, pi
@@ -8,13 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuator_lti import InputError
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import load_design, parameter_value, paths_of, shipped_designs, with_values
+from actuator_lti.design.law import LAW_WORDS
 from actuator_lti.design.model import Design, FrictionPoint, Instruments, Supply
 from analyses.validation.design_values import design_value_rows
 from analyses.validation.torque_values import edge, mechanics
 from nonlinear.bench.operating_motion import operating_motion_at
 from tests.changed import changed
+from tests.loops.own_laws import random_law
 from tests.validation.mutation_table import DRIVES, PAGE, keys_of, seen
 from tests.validation.random_drives import drives, full_drive
 
@@ -43,6 +47,19 @@ def test_no_false_alarm_on_random_drives() -> None:
     rounded = map(full_drive, (80365, 1094, 240, 723))
     for design in (*rounded, *drives(9000, 150)):
         assert red(design, design) == set(), design.name
+
+
+def test_no_false_alarm_beside_a_law_of_ones_own() -> None:
+    """Of any signals, in any stage: one that takes the current answers it, one of position has no error."""
+    tried = 0
+    for seed, design in enumerate(drives(9000, 120)):
+        rng = np.random.default_rng(seed)
+        stage = str(rng.choice(design.controller.stages))
+        with suppress(InputError):  # filters of the speed beside a law that takes it
+            own = random_law(rng, design, stage, words=LAW_WORDS)
+            assert red(own, own) == set(), (design.name, stage, own.controller.own_law[1].inputs)
+            tried += 1
+    assert tried > 50
 
 
 def larger(design: Design, path: str) -> Design:

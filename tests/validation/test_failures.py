@@ -72,7 +72,7 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     """The moment is N kM i; I2t from rest: tau ln(r^2/(r^2 - 1)) at the peak is the stated peak time."""
     slow = {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
     design = with_overrides(load_design("joint"), slow)
-    result = failures(design, Asked.of(design, stop_rad=1.0)).case("jam")
+    result = failures(design, Asked.of(design, stop_rad=1.0, watched_s=0.3)).case("jam")
     assert abs(result.deflection_rad).max() < 1e-6
     assert result.current_A[np.searchsorted(result.time_s, 0.15)] == pytest.approx(15.0, rel=1e-3)
     assert 0.1 < result.protected_s < 0.2  # a little was used on the way
@@ -82,7 +82,7 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     """The motor's inertia runs into the coupling: W sqrt(k J_m) N_c, the motor's own push beside it."""
     design = changed(load_design("ballscrew"), coupling={"damping_Nms_rad": 0.0})
-    case = failures(design).case("jam")
+    case = failures(design, Asked.of(design, watched_s=0.1)).case("jam")
     k, J, N = design.coupling.stiffness_Nm_rad, design.motor_side_inertia_kgm2, design.ratio_to_coupling
     half = 0.5 * design.validation.full_deflection_rad
     run = simulate(design, commands.step(2.0 * half), 0.5)
@@ -97,7 +97,7 @@ def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
 def test_a_frozen_sensor_runs_away_at_the_speed_of_its_error() -> None:
     """P position, perfect inner loops: rate Kv e, the error e constant (friction off the scale of 0.5 %)."""
     design = with_overrides(load_design("ballscrew"), {"control.position.sensor": "output"})
-    asked = Asked.of(design)
+    asked = Asked.of(design, watched_s=0.5)
     result = failures(design, asked).case("frozen-sensor")
     rate = design.controller.position_loop.gain * asked.deflection_rad
     seen = np.gradient(result.deflection_rad, result.time_s)[-200:].mean()
@@ -135,7 +135,7 @@ def test_a_drive_without_a_position_loop_has_fewer_cases() -> None:
     result = failures(speed, Asked.of(speed, watched_s=0.1))
     assert [case.name for case in result.cases] == ["hard-over", "open-phase"]
     assert result.left_out["jam"] == "the drive has no position loop"
-    with pytest.raises(InputError, match="beyond the stop"):
+    with pytest.raises(InputError, match="beyond the stop, it is 2 times that"):
         Asked.of(AMBER, stop_rad=0.1, deflection_rad=0.2)
 
 
@@ -163,7 +163,7 @@ def test_the_sine_is_one_that_the_profile_of_the_command_lets_pass() -> None:
 def test_no_deflection_is_beyond_the_stop_and_a_drive_without_a_current_limit_has_all_cases() -> None:
     """The stop is hard: the tick that passes it is not seen, the time on the way to it is."""
     design = changed(AMBER, limits={"peak_current_A": inf, "peak_time_s": None})
-    found = failures(design, Asked.of(design, detection_s=0.5))
+    found = failures(design, Asked.of(design, detection_s=0.3, watched_s=0.3))
     free = failures(design, replace(found.asked, stop_rad=10.0))
     case, other = (one.case("hard-over") for one in (found, free))
     assert case.at_detection_rad == found.asked.stop_rad == case.deflection_rad.max()
@@ -188,7 +188,7 @@ def test_a_jam_at_speed_is_left_out_where_the_drive_is_too_slow() -> None:
     """A gain Kv alone is half-way after ln(2)/Kv: 6.9 s at 0.1 1/s, more than 5 s; 1.4 s at 0.5."""
     for gain, there in ((0.1, False), (0.5, True)):
         design = with_overrides(load_design("emps"), {"control.position.gain": f"{gain} 1/s"})
-        result = failures(design)
+        result = failures(design, Asked.of(design, watched_s=0.1))
         assert ("jam" in {case.name for case in result.cases}) is there
         assert result.left_out == ({} if there else {"jam": SLOW})
 
