@@ -41,9 +41,10 @@ def section(result: Failures) -> doc.Section:
     own = requirements.table(result.requirements, load_unit(result.design))
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
     told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
-    told_as = told_as if result.verdict in (None, Verdict.MET) else doc.severity(result.verdict)
-    words = summary(result)
-    return doc.section("failures", "Failure cases", blocks, result=words, intro=intro, told=told_as)
+    status = "info" if result.verdict is None else doc.severity(result.verdict)
+    told_as = told_as if status == "info" else status
+    words, title = summary(result), "Failure cases"
+    return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
 
 
 def summary(result: Failures) -> str:

@@ -500,10 +500,7 @@ WORDS: dict[str, list[tuple[str, ...]]] = {  # by place: a line, and what each l
             "(it is integral_time)",
         ),
     ],
-    "position": [
-        ('bandwidth = "9 Hz"', "(it is gain)", "like V/rad"),
-        ('Kv = "40 V/rad"', "position.Kv = "),
-    ],
+    "position": [('bandwidth = "9 Hz"', "(it is gain)", "like V/rad"), ('Kv = "40 V/rad"', "position.Kv = ")],
     "period": [
         ('period = "0 Hz"', '"0 Hz": allowed: above 0'),
         ('period = "-5 Hz"', '"-5 Hz": allowed: above 0'),
@@ -528,12 +525,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
     ('"48 V"', '"100-120 VAC"', "behind a rectifier, 141.4 V to 169.7 V"),
     ('"48 V"', '"48 V', "a quote that is opened in this line is not closed"),
     ("back_emf_constant =", "speed_constant =", 'which takes "317 rpm/V" too'),
-    (
-        'back_emf_constant = "317',
-        'speed_constant = "107',
-        'which takes "107 rpm/V" too',
-        "within 10 %",
-    ),
+    ('back_emf_constant = "317', 'speed_constant = "107', 'which takes "107 rpm/V" too', "within 10 %"),
     ('torque_constant = "30', 'Kt = "30', "(it is torque_constant)\n"),
     ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),
     ("computing_delay", "pwm_frequency", "control.computing_delay: missing", "not needed, part of "),

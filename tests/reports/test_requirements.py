@@ -171,7 +171,8 @@ def test_an_analysis_judges_the_requirements_on_what_it_finds_as_margins_does(as
     assert (
         result.verdict == result.requirements[0].verdict == ("not met" if 1e-3 in limit.values() else "met")
     )
-    words = section(result)["result"]
+    words, status = (section(result)[key] for key in ("result", "status"))
+    assert status == ("fail" if result.verdict == "not met" else "info")
     assert (f"Not met: Drive: {ANALYSIS_QUANTITIES[quantity].words}" in words) is (
         result.verdict == "not met"
     )

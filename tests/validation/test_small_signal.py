@@ -166,6 +166,12 @@ def test_gravity_twists_a_spring_that_bends_and_the_validator_stands_there(monke
     for load_Nm, k in ((0.0, 600.0), (-3.0, design.coupling.stiffness_Nm_rad), (4.0, 900.0), (-9.0, 900.0)):
         assert drive_figure(design, "static_stiffness", load_Nm) == pytest.approx(k, rel=1e-6)
     assert verdicts(design, design, "position") <= {Verdict.MET}
+    seen = changed(design, encoder={"speed": "difference"}, controller={"velocity": {"sensor": "output"}})
+    for one in (design, seen):  # a drive that differences the output's angle stands as well
+        calm = Bench(one, one).setup("velocity").rows().running()
+        before = calm.value("OUTPUT")
+        calm.run(500)
+        assert calm.value("OUTPUT") == pytest.approx(before, rel=1e-9, abs=1e-12)
     monkeypatch.setattr(operating, "carried_Nm", lambda _, at: -at.load_Nm)  # as if there were no gravity
     assert Verdict.NOT_MET in verdicts(design, design, "position")
 
