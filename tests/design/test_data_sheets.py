@@ -609,6 +609,15 @@ def test_a_gain_may_be_stated_by_what_it_does(constants: str, over: float, to_dc
         assert not any(": keeps" in line for line in warnings_of(drive))
 
 
+def test_variants_say_once_of_a_gain_that_it_keeps_its_number(tmp_path, cli) -> None:
+    file, ways = tmp_path / "mine.toml", ("load.inertia=0 kg*m^2", "load.inertia=1e-4 kg*m^2")
+    file.write_text(f'{SHEET}{CURRENT}gain = "40 Hz"\n')
+    asked = [word for way in ways for word in ("--set", way)]
+    ran = cli("compare", f"{file}", *asked, "--no-validate", "--quiet", "--out", f"{tmp_path / 'out'}")
+    said = [line for line in ran.err.splitlines() if ": keeps " in line]
+    assert [line.startswith(f"warning: {ways[0]}: control.velocity.gain: keeps") for line in said] == [True]
+
+
 def test_a_velocity_gain_without_a_current_loop_is_in_volts() -> None:
     drive = read_design_text(f'{SHEET}[control.velocity]\ngain = "0.01 N*m*s/rad"\n')
     assert drive.controller.velocity.gain == pytest.approx(0.01 * 0.299 / 0.0302, rel=1e-12)
