@@ -35,8 +35,7 @@ def stability_margins(
 
     ``system``: the open loop L, one input and one output, continuous or sampled: StateSpace,
     TransferFunction (of scipy.signal too), `DelaySystem` or FrequencyResponseData. With ``dt=True`` the
-    period counts as 1 s.
-    Measured data give bounds between neighbouring points and no verdict.
+    period counts as 1 s. Measured data give bounds between neighbouring points and no verdict.
 
     ``delay_s``: exact extra delay in series. In a sampled loop whole samples become states; part of a sample
     is the factor exp(-j w delay) up to the Nyquist frequency, where L jumps to its conjugate by way of the

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
+import analyses
 from actuator_lti import (
     InputError,
     assemble_loops,
@@ -34,20 +35,6 @@ from actuator_lti.design import (
 from actuator_lti.design.loader import design_text
 from actuator_lti.loops.delay_budget import delay_budget
 from actuator_lti.margins import MeasuredResponse
-from analyses import (
-    amplitude_map,
-    compare,
-    correlate_record,
-    evaluate_requirements,
-    import_campaign,
-    large_signals,
-    load_campaign,
-    open_record,
-    sawtooth,
-    survey_loops,
-    tune,
-    validate,
-)
 from analyses.friction_effects import friction_effects
 from analyses.monte_carlo import monte_carlo
 from analyses.specification import specification
@@ -82,8 +69,9 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
 
 
 @pytest.mark.parametrize("ask", [
-    evaluate_requirements, friction_effects, large_signals, sawtooth, specification, stiffness, survey_loops,
-    tune, validate, lambda name: monte_carlo(name, "nowhere"), lambda name: amplitude_map(name, None),
+    analyses.evaluate_requirements, friction_effects, analyses.large_signals, analyses.sawtooth,
+    specification, stiffness, analyses.survey_loops, analyses.tune, analyses.validate,
+    lambda name: monte_carlo(name, "nowhere"), lambda name: analyses.amplitude_map(name, None),
 ])  # fmt: skip
 def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
     refused(ask, "ilr33-ambre", words='nearest known: "ilr33-amber"')
@@ -93,9 +81,9 @@ SQUARE = control.nlsys(None, lambda t, x, u, params: u**2, inputs=1, outputs=1)
 THREE = control.frd([1j, 2j, 3j], [1.0, 2.0, 3.0])
 BAD = {
     "delay": lambda: stability_margins(signal.TransferFunction([1.0], [1.0, 1.0]), delay_s="1 ms"),
-    "counts of none": lambda: large_signals("ilr33-amber", counts=(0, 0)),
-    "counts in part": lambda: large_signals("ilr33-amber", counts=(5.5, 6)),
-    "settings": lambda: tune("ilr33-amber", 3),
+    "counts of none": lambda: analyses.large_signals("ilr33-amber", counts=(0, 0)),
+    "counts in part": lambda: analyses.large_signals("ilr33-amber", counts=(5.5, 6)),
+    "settings": lambda: analyses.tune("ilr33-amber", 3),
     "load": lambda: load_design(3),
     "text": lambda: read_design_text(b"x"),
     "write": lambda: write_design(3),
@@ -143,14 +131,14 @@ BAD = {
     "events": lambda: simulate(DESIGN, commands.step(0.01), 0.1, max_events=None),
     "limiter": lambda: simulate(DESIGN, commands.step(0.01), 0.001).limit_active("brake"),
     "drive": lambda: Drive(3),
-    "tune": lambda: tune(3),
-    "sawtooth": lambda: sawtooth(3),
-    "study": lambda: compare(3),
+    "tune": lambda: analyses.tune(3),
+    "sawtooth": lambda: analyses.sawtooth(3),
+    "study": lambda: analyses.compare(3),
     "a report's folder": lambda: report(DESIGN, out=3),
-    "a record's path": lambda: open_record(3),
-    "a campaign's path": lambda: load_campaign(3),
-    "a record": lambda: correlate_record(DESIGN, "record.csv"),
-    "a campaign": lambda: import_campaign("campaign.toml"),
+    "a record's path": lambda: analyses.open_record(3),
+    "a campaign's path": lambda: analyses.load_campaign(3),
+    "a record": lambda: analyses.correlate_record(DESIGN, "record.csv"),
+    "a campaign": lambda: analyses.import_campaign("campaign.toml"),
     "filter": lambda: DESIGN.add_filter("velocity", kind="lowpass", frequency=[1.0]),
 }
 
@@ -356,7 +344,8 @@ def test_results_can_be_compared_and_sent() -> None:
         assert result != made(2.0)
         assert result != "another"
     loops = assemble_loops(DESIGN, "continuous", "rest", load_Nm=2.0, inner_loops="open")
-    for sent in (pickle.loads(pickle.dumps(loops)), pickle.loads(pickle.dumps(survey_loops(DESIGN))).loops):
+    survey = pickle.loads(pickle.dumps(analyses.survey_loops(DESIGN)))
+    for sent in (pickle.loads(pickle.dumps(loops)), survey.loops):
         here = loops if sent.form == loops.form else assemble_loops(DESIGN)
         assert sent.operating == here.operating
         assert sent["position"].open_loop(1j) == here["position"].open_loop(1j)

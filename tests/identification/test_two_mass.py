@@ -9,22 +9,14 @@ import pytest
 
 from actuator_lti.design import read_design_text
 from actuator_lti.design.model import Design, Friction
+from analyses.identification import two_mass
 from analyses.identification.frequency_bench import identify_frequency
-from analyses.identification.two_mass import (
-    NAMES,
-    Lines,
-    angle_responses,
-    excited_lines,
-    fit_two_mass,
-    period_of_excitation,
-    start_of,
-)
 from analyses.records.record import Record
 from tests.changed import changed
 from tests.identification.bench_records import record_of, two_mass_design
 from tests.refusals import refused
 
-TRUTH = dict(zip(NAMES, (2e-5, 2e-3, 400.0, 0.02, 1e-5, 1e-3), strict=True))
+TRUTH = dict(zip(two_mass.NAMES, (2e-5, 2e-3, 400.0, 0.02, 1e-5, 1e-3), strict=True))
 N, RATE, PERIODS, KM = 10.0, 2000, 8, 0.05
 HERTZ = np.arange(2.0, 400.0, 2.0)
 
@@ -46,7 +38,7 @@ def _noiseless(seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     omega = 2.0 * np.pi * HERTZ
     phase = np.random.default_rng(7 + seed).uniform(0.0, 2.0 * np.pi, len(HERTZ))
     torque = 0.02 * np.exp(1j * phase)
-    motor, load = angle_responses(omega, TRUTH, N)
+    motor, load = two_mass.angle_responses(omega, TRUTH, N)
     time = np.arange(RATE) / RATE
     lines = np.exp(1j * np.outer(time, omega))
     return tuple(np.tile(np.real(lines @ a), PERIODS + 1) for a in (torque, motor * torque, load * torque))
@@ -68,20 +60,20 @@ def _record(seed: int) -> Record:
     return record_of(time, "sweep", **signals)
 
 
-def _lines(seed: int, *outputs: str) -> Lines:
+def _lines(seed: int, *outputs: str) -> two_mass.Lines:
     record = _record(seed)
     told = replace(record, signals={**record.signals, "torque": KM * record["current"]})
-    return excited_lines(told, ("torque", *outputs), 0.5)
+    return two_mass.excited_lines(told, ("torque", *outputs), 0.5)
 
 
 def test_intervals_hold_the_truth_at_their_rate_over_100_seeds() -> None:
     """95 % intervals: of 100 draws 88 to 100 hold the truth, for every parameter and both resonances."""
-    held = dict.fromkeys((*NAMES, "resonance", "antiresonance"), 0)
+    held = dict.fromkeys((*two_mass.NAMES, "resonance", "antiresonance"), 0)
     truths = TRUTH | {"resonance": 632.4555, "antiresonance": 447.2136}
     for seed in range(100):
         lines = _lines(seed, "angle", "output_angle")
-        fit = fit_two_mass(lines, start_of(lines, N), N)
-        found = {name: (fit[name], fit.std(name)) for name in NAMES}
+        fit = two_mass.fit_two_mass(lines, two_mass.start_of(lines, N), N)
+        found = {name: (fit[name], fit.std(name)) for name in two_mass.NAMES}
         found |= {"resonance": fit.resonance_rad_s, "antiresonance": fit.antiresonance_rad_s}
         for name, (value, std) in found.items():
             held[name] += abs(value - truths[name]) <= 1.96 * std
@@ -102,23 +94,23 @@ def test_a_speed_that_still_settles_moves_no_value() -> None:
         motor = motor + moved + 1e-6 * rng.standard_normal(len(time))
         load = load + moved / N + 1e-7 * rng.standard_normal(len(time))
         record = record_of(time, "sweep", torque=torque, angle=motor, output_angle=load)
-        lines = excited_lines(record, ("torque", "angle", "output_angle"), 0.5)
-        fit = fit_two_mass(lines, start_of(lines, N), N)
+        lines = two_mass.excited_lines(record, ("torque", "angle", "output_angle"), 0.5)
+        fit = two_mass.fit_two_mass(lines, two_mass.start_of(lines, N), N)
         assert fit.std("load_inertia") < 1e-3 * TRUTH["load_inertia"]
-        found.append([(fit[name] - TRUTH[name]) / fit.std(name) for name in NAMES])
+        found.append([(fit[name] - TRUTH[name]) / fit.std(name) for name in two_mass.NAMES])
     assert np.mean(np.square(found)) == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / np.size(found)))
 
 
 def test_the_motors_angle_alone_tells_the_drive_and_the_command_its_period() -> None:
     lines = _lines(1, "angle")
-    fit = fit_two_mass(lines, start_of(lines, N), N)
+    fit = two_mass.fit_two_mass(lines, two_mass.start_of(lines, N), N)
     for name in ("motor_inertia", "load_inertia", "stiffness"):
         assert fit[name] == pytest.approx(TRUTH[name], abs=4.0 * fit.std(name))
         assert fit[name] == pytest.approx(TRUTH[name], rel=0.01)
-    assert period_of_excitation(_record(0), "current_reference") == pytest.approx(0.5)
+    assert two_mass.period_of_excitation(_record(0), "current_reference") == pytest.approx(0.5)
     noise = np.random.default_rng(0).standard_normal(4000)
     record = replace(_record(0).slice(0, 4000), signals={"current_reference": noise})
-    refused(period_of_excitation, record, "current_reference", words="does not repeat itself")
+    refused(two_mass.period_of_excitation, record, "current_reference", words="does not repeat itself")
 
 
 def test_a_two_mass_model_of_something_else_is_refused() -> None:
@@ -127,7 +119,7 @@ def test_a_two_mass_model_of_something_else_is_refused() -> None:
     omega = 2.0 * np.pi * HERTZ
     mode = 0.3 / (1.0 + 0.04j * omega / 1300.0 - (omega / 1300.0) ** 2)
     phase = np.random.default_rng(11).uniform(0.0, 2.0 * np.pi, len(HERTZ))
-    motor, _ = angle_responses(omega, TRUTH, N)
+    motor, _ = two_mass.angle_responses(omega, TRUTH, N)
     time = np.arange(RATE) / RATE
     extra = np.real(np.exp(1j * np.outer(time, omega)) @ (0.02 * np.exp(1j * phase) * motor * mode))
     angle = record["angle"] + np.tile(extra, PERIODS + 1)
