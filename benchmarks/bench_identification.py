@@ -94,13 +94,7 @@ def _emps() -> Row:
     for form in ("symmetric", "per-direction"):
         fit_records(design, [emps], form=form)
     seconds = time.perf_counter() - start
-    return Row(
-        group=GROUP,
-        name="EMPS, both friction forms",
-        measured=seconds,
-        unit="s",
-        target=1.0,
-    )
+    return Row(group=GROUP, name="EMPS, both friction forms", measured=seconds, unit="s", target=1.0)
 
 
 def _streaming(quick: bool) -> Iterable[Row]:

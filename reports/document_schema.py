@@ -124,18 +124,15 @@ class _Asked(TypedDict):
 
 
 class VerdictItem(_Asked):
-    """One verdict; ``waiver`` says by what one that is not proven is waived, else it is empty.
-
-    ``gathers`` counts the checks that it stands for, where these are several.
-    """
+    """One verdict."""
 
     distance: float | None
-    waiver: str
+    waiver: str  # by what one that is not proven is waived, else empty
     source: str
     reason: str
     loop: NotRequired[str | None]
     quantity: NotRequired[str]
-    gathers: NotRequired[Counts]
+    gathers: NotRequired[Counts]  # the checks that it stands for, where these are several
 
 
 class VerdictsBlock(TypedDict):

@@ -8,13 +8,7 @@ import numpy as np
 
 from actuator_lti.bandwidth.results import SQUARES, Bandwidth, Level, Range
 from actuator_lti.errors import InputError
-from actuator_lti.margins.measured.margins import (
-    between,
-    measured_points,
-    passed,
-    refuse_coarse,
-    single_passages,
-)
+from actuator_lti.margins.measured import margins
 from actuator_lti.margins.single import frequency_text
 from actuator_lti.measured.bounds import Bounds, Strip, bounds
 from actuator_lti.measured.response import MeasuredResponse, at_once, measured_response
@@ -42,9 +36,9 @@ def measured_bandwidth(data: Any, delay_s: float, level: Level) -> Bandwidth:
     the sign open.
     """
     response = measured_response(data)
-    omega, T, radius = measured_points(response, None)
+    omega, T, radius = margins.measured_points(response, None)
     result = bounds(omega, T, radius, delay_s)
-    refuse_coarse(omega, T, result)
+    margins.refuse_coarse(omega, T, result)
     rest = _at_rest(response, omega, T, result)
     gain = _relative(result.log_gain, rest)
     falls, fall_range = _falls(omega, gain, 0.5 * math.log(SQUARES[level]))
@@ -110,13 +104,14 @@ def _relative(strip: Strip, rest: _Rest) -> Strip:
 
 def _falls(omega: Real, strip: Strip, level: float) -> tuple[tuple[float, ...], Range | None]:
     """Where a level is passed for sure, and the range of the first: from where on it may have been."""
-    groups = single_passages(strip, level)
-    sure = [(group, at) for group in groups if (at := passed(strip, level, group)) is not None]
+    groups = margins.single_passages(strip, level)
+    sure = [(group, at) for group in groups if (at := margins.passed(strip, level, group)) is not None]
     if not sure:
         return (), None
     first, last = groups[0], sure[0][0]
-    low, high = between(omega, first.first, float(first.t0[0])), between(omega, last.last, float(last.t1[-1]))
-    return tuple(between(omega, k, t) for _, (k, t) in sure), (low, high)
+    low = margins.between(omega, first.first, float(first.t0[0]))
+    high = margins.between(omega, last.last, float(last.t1[-1]))
+    return tuple(margins.between(omega, k, t) for _, (k, t) in sure), (low, high)
 
 
 def _db(log_gain: float) -> float:

@@ -32,20 +32,14 @@ def present(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Drive:
-    """A design (its numbers may be arrays, stacked over designs) at an operating point, as the loops need it.
-
-    ``stages``: the stages present, innermost first, of ``"current"``, ``"velocity"``, ``"position"``.
-    ``interval``: ticks between two updates of each stage, and of the speed measurement (``"speed"``).
-    ``target``: the signal that each stage drives: ``"u"``, ``"i_ref"`` or ``"w_ref"``.
-    ``blocks_at``, ``margins_at``: loops cut at a break point, and how far they are from their border, kept by
-    `actuator_lti.loops.periodic`.
-    """
+    """A design (its numbers may be arrays, stacked over designs) at an operating point, as loops need it."""
 
     design: Design
     operating: Operating
-    stages: tuple[str, ...]
-    interval: dict[str, int]
-    target: dict[str, str]
+    stages: tuple[str, ...]  # those present, innermost first, of "current", "velocity", "position"
+    interval: dict[str, int]  # ticks between two updates of each, and of the speed measurement ("speed")
+    target: dict[str, str]  # the signal that each stage drives: "u", "i_ref" or "w_ref"
+    # Loops cut at a break point, how far they are from their border, kept by `actuator_lti.loops.periodic`
     blocks_at: dict[str, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
     margins_at: dict[Any, Any] = field(default_factory=dict, init=False, repr=False, compare=False)
 

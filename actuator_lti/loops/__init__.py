@@ -4,12 +4,7 @@ Light to import; python-control is loaded when loops are assembled.
 """
 
 from actuator_lti.loops.assemble import assemble_loops
-from actuator_lti.loops.periodic import (
-    ExactMargins,
-    PeriodicLoop,
-    exact_margins,
-    periodic_loop,
-)
+from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margins, periodic_loop
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 __all__ = [

@@ -45,12 +45,9 @@ class Flow:
 
 @dataclass(frozen=True)
 class FlowProgram(Program):
-    """The linear drive in continuous time (see `Program`).
+    """The linear drive in continuous time (see `Program`)."""
 
-    ``delays`` says which of `ALL` are kept: none is the form ``ideal``; some, for the delay budget.
-    """
-
-    delays: frozenset[str] = ALL
+    delays: frozenset[str] = ALL  # which are kept: none is the form ``ideal``; some, for the delay budget
 
     def flow(self) -> Flow:
         """Walk once."""

@@ -179,9 +179,7 @@ def _integral_clamped(design: Design, stage: str) -> bool:
 
 
 def limiter_paths(
-    wired: Drive,
-    evaluate: Callable[[tuple[str, ...], int, bool], Response],
-    nyquist_rad_s: float,
+    wired: Drive, evaluate: Callable[[tuple[str, ...], int, bool], Response], nyquist_rad_s: float
 ) -> dict[str, LimiterPath]:
     """All limiter paths; ``evaluate(signals, every, rate)`` gives the function of frequency."""
     time = wired.design.limits.overload_time_s

@@ -127,13 +127,10 @@ def _plain(value: Any) -> Any:
 
 @dataclass(frozen=True)
 class Compliance:
-    """From M_ext at the output shaft to the output angle, all loops closed; one design or stacked ones.
+    """From M_ext at the output shaft to the output angle, all loops closed; one design or stacked ones."""
 
-    One block for each tick (of ``period_s``) of a period, with the same states.
-    """
-
-    blocks: Sequence[Block]
-    period_s: Any
+    blocks: Sequence[Block]  # one for each tick of a period, with the same states
+    period_s: Any  # of a tick
 
     @property
     def moves(self) -> bool:

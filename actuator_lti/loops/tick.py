@@ -198,12 +198,9 @@ def seen(depends: np.ndarray, start: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Block:
-    """A sampled SISO system ``x+ = A x + B v, y = C x + D v``.
+    """A sampled SISO system ``x+ = A x + B v, y = C x + D v``."""
 
-    Shapes (n,n), (n,1), (1,n), (1,1), or stacked over designs in front. ``states`` are their names.
-    """
-
-    A: np.ndarray
+    A: np.ndarray  # shapes (n, n), (n, 1), (1, n), (1, 1), or stacked over designs in front
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray

@@ -19,11 +19,7 @@ MOST_STATES = 200  # of a loop for exact arithmetic: 7 s there, 3 s of 140, minu
 
 
 def stability_margins(
-    system: Any,
-    delay_s: float = 0.0,
-    band_rad_s: tuple[float, float] | None = None,
-    *,
-    certify: bool = False,
+    system: Any, delay_s: float = 0.0, band_rad_s: tuple[float, float] | None = None, *, certify: bool = False
 ) -> StabilityMargins:
     """Find all margins of a loop L closed by negative unit feedback.
 

@@ -23,10 +23,7 @@ _NOTHING: Real = np.empty(0)
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Coefficients (highest power first, leading zeros trimmed), or a state space where ``A`` is not None.
-
-    ``samples`` whole samples of delay stand behind a sampled loop.
-    """
+    """Coefficients (highest power first, leading zeros trimmed), or a state space where ``A`` is not None."""
 
     period_s: float | None
     numerator: Real = field(default_factory=lambda: _NOTHING)
@@ -35,7 +32,7 @@ class Given:
     b: Real = field(default_factory=lambda: _NOTHING)
     c: Real = field(default_factory=lambda: _NOTHING)
     d: float = 0.0
-    samples: int = 0
+    samples: int = 0  # whole samples of delay behind a sampled loop
 
     @cached_property
     def _bits(self) -> tuple[object, ...]:

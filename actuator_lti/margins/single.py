@@ -39,19 +39,13 @@ class AtFrequency:
 
 @dataclass(frozen=True)
 class GainMargin(AtFrequency):
-    """A real factor on the loop that brings a closed-loop pole to the border.
+    """A real factor on the loop that brings a closed-loop pole to the border."""
 
-    ``ratio``: the factor (> 1: an upper limit, < 1: a lower limit).
-    ``frequency_rad_s``: where the pole reaches the border; 0 and the Nyquist frequency are possible, infinity
-    where the loop has a direct feed-through.
-    ``tangent``: the curve touches the negative real axis there without crossing it.
-    ``bracket_rad_s``: measured data: the two frequencies between which the crossing lies.
-    ``ratio_range``: measured data: where the ratio lies, between the points and within the noise.
-    """
-
-    ratio: float
+    ratio: float  # > 1: an upper limit, < 1: a lower limit
+    # Where the pole reaches the border; may be 0, the Nyquist frequency, or infinity (direct feed-through)
     frequency_rad_s: float
-    tangent: bool = False
+    tangent: bool = False  # the curve touches the negative real axis there without crossing it
+    # Of measured data: frequencies between which the crossing lies, and where the ratio does, with the noise
     bracket_rad_s: tuple[float, float] | None = None
     ratio_range: tuple[float, float] | None = None
 
@@ -69,18 +63,12 @@ class GainMargin(AtFrequency):
 
 @dataclass(frozen=True)
 class PhaseMargin(AtFrequency):
-    """A phase lag (negative: a lead) that brings a closed-loop pole to the border.
+    """A phase lag (negative: a lead) that brings a closed-loop pole to the border."""
 
-    ``deg``: 180 deg plus the phase of the loop, in (-180, 180].
-    ``frequency_rad_s``: the gain crossover.
-    ``tangent``: the gain touches one there without crossing it.
-    ``bracket_rad_s``, ``deg_range``: measured data: two frequencies between which the crossing lies, and
-    where the margin does.
-    """
-
-    deg: float
-    frequency_rad_s: float
-    tangent: bool = False
+    deg: float  # 180 deg plus the phase of the loop, in (-180, 180]
+    frequency_rad_s: float  # the gain crossover
+    tangent: bool = False  # the gain touches one there without crossing it
+    # Of measured data: two frequencies between which the crossing lies, and where the margin does
     bracket_rad_s: tuple[float, float] | None = None
     deg_range: tuple[float, float] | None = None
 
@@ -92,15 +80,12 @@ class PhaseMargin(AtFrequency):
 
 @dataclass(frozen=True)
 class DelayMargin(AtFrequency):
-    """The smallest delay in the loop that brings a closed-loop pole to the border at this gain crossover.
-
-    ``samples``: the same in sampling periods; ``None`` for a continuous loop.
-    ``seconds_range``: measured data: where the delay lies, by the ranges of phase margin and crossover.
-    """
+    """The smallest delay in the loop that brings a closed-loop pole to the border at this gain crossover."""
 
     seconds: float
-    samples: float | None
+    samples: float | None  # the same in sampling periods; None for a continuous loop
     frequency_rad_s: float
+    # Of measured data: where the delay lies, by the ranges of phase margin and crossover
     seconds_range: tuple[float, float] | None = None
 
     def __str__(self) -> str:
@@ -113,13 +98,12 @@ class DelayMargin(AtFrequency):
 class DiskMargin(AtFrequency):
     """Balanced disk margin (S + T, skew 0) of Seiler, Packard, Gahinet 2020.
 
-    The loop may be multiplied by any complex factor (2 + d)/(2 - d) with |d| < alpha, which is the smallest
-    of |2 (1 + L)/(1 - L)|. ``alpha_range``: of measured data, between the points and within the noise.
+    The loop may be multiplied by any complex factor (2 + d)/(2 - d) with |d| < alpha.
     """
 
-    alpha: float
+    alpha: float  # the smallest of |2 (1 + L)/(1 - L)|
     frequency_rad_s: float
-    alpha_range: tuple[float, float] | None = None
+    alpha_range: tuple[float, float] | None = None  # of measured data: between the points, within the noise
 
     @property
     def deg(self) -> float:
@@ -143,14 +127,11 @@ class DiskMargin(AtFrequency):
 
 @dataclass(frozen=True)
 class Agreement:
-    """How many closed-loop poles are unstable: by the poles themselves, and by the Nyquist count.
+    """How many closed-loop poles are unstable: by the poles themselves, and by the Nyquist count."""
 
-    ``None`` where a way does not apply; ``border_poles`` lie on the stability boundary itself.
-    """
-
-    unstable_poles: int | None
+    unstable_poles: int | None  # None where a way does not apply
     unstable_nyquist: int | None
-    border_poles: int = 0
+    border_poles: int = 0  # on the stability boundary itself
 
     @property
     def agree(self) -> bool:

@@ -136,6 +136,8 @@ def at_ticks(driven: Driven, time_s: Floats, duration_s: float, early_s: Floats)
     starts, ends = [0, *later], [*later, len(time_s)]
     edges = np.searchsorted(ticks, time_s[starts] - [0.0, *early_s] - 1e-6 * period)
     edges[0] = 0
+    if driven.between == HELD:
+        return ticks, np.repeat(driven.values[starts], np.diff(edges, append=len(ticks)))
     for start, end, first, last in zip(starts, ends, edges, [*edges[1:], len(ticks)], strict=True):
         part = slice(start, end)
         values[first:last] = curve(time_s[part], driven.values[part], ticks[first:last])

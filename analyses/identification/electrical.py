@@ -10,12 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit, Fixed
-from analyses.estimation.least_squares import (
-    scaled_lstsq,
-    solve,
-    told_apart,
-    wider_covariance,
-)
+from analyses.estimation.least_squares import scaled_lstsq, solve, told_apart, wider_covariance
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
 from analyses.identification.rows import motion_of, recipe_for

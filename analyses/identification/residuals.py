@@ -20,15 +20,15 @@ class ResidualTest:
 
     The innovations are what an autoregressive noise model leaves of the residual; an input has passed the
     same filter. Where they are white and independent, each correlation has the standard deviation
-    ``1/sqrt(n)``; ``bound`` is left at any of the ``lags`` (rows) with a probability of 1 %.
+    ``1/sqrt(n)``.
     """
 
     record: str
     name: str
     input: str
-    lags: Ints = field(repr=False)
+    lags: Ints = field(repr=False)  # rows
     correlation: Floats = field(repr=False)
-    bound: float
+    bound: float  # left at any of the lags with a probability of 1 %
 
     @property
     def largest(self) -> float:

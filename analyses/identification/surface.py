@@ -32,27 +32,21 @@ class Outlier:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceFit(Fit):
-    """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are.
+    """The coefficients C0 (N m), Cv (N m s/rad), CM, and how sure they are; one that is fixed has no error.
 
-    ``covariance`` holds everything: ``random_covariance`` from the runs' scatter and the instruments' shared
-    errors, whose bounds move the coefficients by ``shared_shifts[name]`` and the torques of the runs by the
-    columns of ``shared_effects``. ``half_widths`` are those of the 95 % intervals, from propagated
-    distributions. ``residuals_Nm`` (``own_residuals_Nm``: less the most likely shared errors) and
-    ``residual_stds_Nm`` are those of the runs used, in the order of ``points``. ``run_scatter_Nm`` is the
-    scatter between runs that their own noise does not explain, ``birge_ratio`` the ratio of the two (1:
-    explained). ``fixed`` holds the coefficients that were not fitted, with the reason; their errors are zero.
+    Their covariance is the random one and that of the instruments' shared errors.
     """
 
-    points: tuple[SteadyPoint, ...]
-    random_covariance: Floats
-    shared_shifts: dict[str, Floats]
-    half_widths: Floats
-    shared_effects: Floats = field(repr=False)
+    points: tuple[SteadyPoint, ...]  # the runs used, in the order of the residuals
+    random_covariance: Floats  # from the runs' scatter
+    shared_shifts: dict[str, Floats]  # by which the bounds of the shared errors move the coefficients
+    half_widths: Floats  # of the 95 % intervals, from propagated distributions
+    shared_effects: Floats = field(repr=False)  # on the torques of the runs, a column each shared error
     residuals_Nm: Floats
-    own_residuals_Nm: Floats
+    own_residuals_Nm: Floats  # less the most likely shared errors
     residual_stds_Nm: Floats
-    run_scatter_Nm: float
-    birge_ratio: float
+    run_scatter_Nm: float  # between runs, that their own noise does not explain
+    birge_ratio: float  # of the scatter between runs to their own noise; 1: explained
     outliers: tuple[Outlier, ...]
     freedom: int
 

@@ -21,7 +21,8 @@ import numpy as np
 import numpy.typing as npt
 
 from actuator_lti.design.model import Design
-from actuator_lti.drive.operating import Operating, level, rubs
+from actuator_lti.drive.facts import passed_moment_Nm
+from actuator_lti.drive.operating import Operating, holding_moment_Nm, level, rubs
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.drive.wiring import wire
 from actuator_lti.errors import InputError
@@ -217,9 +218,9 @@ class _Release:
         design, closed = bench.drive, bench.figures[name].loop.plain_closed
         self.kind, self.part, self.sizes = kind, part, full_range(design)
         setup, still = bench.setup(name), OperatingMotion(0.0, 0.0, 0.0, friction_on)
-        # with the loops around it open, gravity or a spring would swing the drive whatever this loop does
-        own = level(setup.design) if setup.outer != design.controller.outermost else setup.design
-        self.setup = replace(setup, design=own, bias=still, limits_on=True, held=False)
+        if setup.outer != design.controller.outermost:
+            setup, still = replace(setup, design=level(setup.design)), _carrying(setup.design, still)
+        self.setup = replace(setup, bias=still, limits_on=True, held=False)
         tick_s = design.controller.period_s
         settling = min(settling_ticks_of(closed, self.setup.hold_ticks, design.name), MOST_SETTLING)
         travel, cycle = ceil(1.3 * _travel_s(design, name, part) / tick_s), 1.0 / (hertz * tick_s)
@@ -252,6 +253,14 @@ class _Release:
         shares = [float(result.window_limit_fraction(name)[0]) for name in LIMITERS]
         swing = 0.5 * float(np.ptp(result.span("output_angle_rad")))
         return LIMITERS[int(np.argmax(shares))] if max(shares) > 0.0 else "", swing
+
+
+def _carrying(design: Design, still: OperatingMotion) -> OperatingMotion:
+    """The load's own moment as a constant, held: where it changes, it swings a drive of open outer loops."""
+    carried, coupling = holding_moment_Nm(design), design.coupling
+    twist = 0.0 if coupling is None else coupling.twist_rad(carried / design.ratio_behind_coupling)
+    extra = passed_moment_Nm(design, carried)
+    return replace(still, load_Nm=-carried, twist_rad=float(twist), extra_Nm=extra)
 
 
 def _travel_s(design: Design, stage: str, part: float) -> float:

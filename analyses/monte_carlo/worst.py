@@ -30,13 +30,10 @@ _LEAST = 1e-9  # of an eigenvalue of a correlation matrix: below, the direction 
 
 @dataclass(frozen=True)
 class Group:
-    """Parameters that are correlated: columns of a draw, and the axes of their ellipsoid in scores.
-
-    ``s = axes e`` with ``|e| <= radius``; axes of shape (len(columns), rank).
-    """
+    """Parameters that are correlated: columns of a draw, and the axes of their ellipsoid in scores."""
 
     columns: tuple[int, ...]
-    axes: np.ndarray
+    axes: np.ndarray  # shape (len(columns), rank): ``s = axes e`` with ``|e| <= radius``
     radius: float
 
     @classmethod

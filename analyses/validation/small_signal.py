@@ -155,15 +155,12 @@ def _worse(off: float, within: float, other: float, other_within: float) -> bool
 
 @dataclass(frozen=True)
 class _Crossing:
-    """A closed-loop pole on the circle: gain, angle over a base period, and which way it goes with the gain.
-
-    ``outward``: how far outside the circle it lies for a relative change of the gain of 1; ``error``: of the
-    gain, relative, that follows from the stated error of the pole, where that of the response does not count.
-    """
+    """A closed-loop pole on the circle: gain, angle over a base period, and where it goes with the gain."""
 
     gain: float
     angle: float
-    outward: float
+    outward: float  # how far outside the circle it lies for a relative change of the gain of 1
+    # Of the gain, relative: from the stated error of the pole, where that of the response does not count
     error: float | None = None
 
 

@@ -88,12 +88,7 @@ def _torque_drive(design: Design, seed: int) -> Design:
     instruments = replace(design.instruments, seed=seed)
     load = design.load.bare()
     return replace(
-        design,
-        controller=controller,
-        command=Command(),
-        instruments=instruments,
-        load=load,
-        requirements=(),
+        design, controller=controller, command=Command(), instruments=instruments, load=load, requirements=()
     )
 
 

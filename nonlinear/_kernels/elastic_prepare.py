@@ -11,13 +11,7 @@ import math
 from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
-from nonlinear._kernels.elastic_steps import (
-    double_step,
-    growth_of,
-    keep_step,
-    norm_of,
-    put_short_step,
-)
+from nonlinear._kernels.elastic_steps import double_step, growth_of, keep_step, norm_of, put_short_step
 
 SHORT = 0.5  # norm of A times the shortest interval
 MOST_LEVELS = 30

@@ -31,21 +31,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from nonlinear._kernels import layout as at
 from nonlinear.runs.running import Piece, Running
-from nonlinear.settling.drift import (
-    DRIFT,
-    MOST_LEAPS,
-    STILL,
-    Scales,
-    change,
-    even,
-    eventless,
-    leap,
-    matter,
-    overload,
-    small,
-    stays_overloaded,
-    ticks_until_it_acts,
-)
+from nonlinear.settling import drift
 
 Verdict = Literal["at rest", "limit cycle", "still moving", "diverging"]
 
@@ -125,13 +111,13 @@ class _Watch:
     ranges: list[tuple[Floats, Floats]] = field(default_factory=list)  # per piece, of _RANGED
     acted: list[tuple[int, int, int]] = field(default_factory=list)  # entries, flags, events
     stood: list[_Stand] = field(default_factory=list)  # before it broke away
-    scales: Scales = field(init=False)
+    scales: drift.Scales = field(init=False)
     period_s: float = field(init=False)
 
     def __post_init__(self) -> None:
         """Begin with the state that is there."""
         self.period_s = self.drive.base_ticks * float(self.drive.p[at.PERIOD])
-        self.scales = Scales(self.drive, DRIFT * self.period_s)
+        self.scales = drift.Scales(self.drive, drift.DRIFT * self.period_s)
 
     def judged(self) -> Rest:
         """Go on until the verdict is known."""
@@ -208,39 +194,39 @@ class _Watch:
 
     def quiet(self) -> bool:
         """Whether nothing changes any more; an even drift is leapt over, up to what happens next."""
-        drive, places = self.drive, matter(self.drive)
+        drive, places = self.drive, drift.matter(self.drive)
         states, pieces = [drive.s[places]], []
         for _ in range(2):
-            pieces.append(self._advance(DRIFT))
+            pieces.append(self._advance(drift.DRIFT))
             states.append(drive.s[places])
-        if any(piece.flags.size < DRIFT for piece in pieces):
+        if any(piece.flags.size < drift.DRIFT for piece in pieces):
             return False  # cut short, as the work is done
         scale = self.scales.states[places]
-        before, step = change(states[1], states[0]), change(states[2], states[1])
-        kept = (places == at.S_OVERLOAD) & stays_overloaded(drive)
-        still = small(before, scale) & small(step, scale)
+        before, step = drift.change(states[1], states[0]), drift.change(states[2], states[1])
+        kept = (places == at.S_OVERLOAD) & drift.stays_overloaded(drive)
+        still = drift.small(before, scale) & drift.small(step, scale)
         if all(self._still(piece) for piece in pieces) and ((kept | still).all() or self._turning):
             return True
-        if not all(eventless(piece) for piece in pieces):
+        if not all(drift.eventless(piece) for piece in pieces):
             return False
         if places[~still].tolist() == [at.S_OVERLOAD]:
             self._wait_for_overload()
             return False
-        if not even(step, before, scale):
+        if not drift.even(step, before, scale):
             return False
-        windows = leap(drive, places, step, before, scale)
-        self.periods += windows * DRIFT
+        windows = drift.leap(drive, places, step, before, scale)
+        self.periods += windows * drift.DRIFT
         if windows:
             followed, motor = (float(values[-1]) for values in self.seen[-1][1:])
             self.stood.append(_Stand(self.period_s * self.periods, len(self.seen), followed, motor))
-        return windows >= MOST_LEAPS
+        return windows >= drift.MOST_LEAPS
 
     def _wait_for_overload(self) -> None:
         """Nothing moves but the overload memory: set it forward to the window before the one it acts in."""
-        p, s, window = self.drive.p, self.drive.s, DRIFT * self.drive.base_ticks
-        windows = max(ticks_until_it_acts(p, s) // window - 1, 0)
-        s[at.S_OVERLOAD] = overload(p, s, float(s[at.S_CURRENT]), windows * window)
-        self.periods += windows * DRIFT
+        p, s, window = self.drive.p, self.drive.s, drift.DRIFT * self.drive.base_ticks
+        windows = max(drift.ticks_until_it_acts(p, s) // window - 1, 0)
+        s[at.S_OVERLOAD] = drift.overload(p, s, float(s[at.S_CURRENT]), windows * window)
+        self.periods += windows * drift.DRIFT
 
     def _returns(self) -> tuple[_Swing, int] | None:
         """The swing between two returns to where the drive stands, and its first piece; None: not yet known.
@@ -270,7 +256,7 @@ class _Watch:
     def _still(self, piece: Piece) -> bool:
         """Whether all signals keep their values; of a speed drive, all but the angles."""
         names = [2, 3, 4, 5, 6] if self._turning else [1, 2, 3, 4, 5, 6, at.HISTORY_ANGLE]
-        return bool((np.ptp(piece.columns[names], axis=1) <= STILL * self.scales.signals[names]).all())
+        return bool((np.ptp(piece.columns[names], axis=1) <= drift.STILL * self.scales.signals[names]).all())
 
     @property
     def _turning(self) -> bool:
@@ -302,7 +288,7 @@ class _Watch:
     @property
     def _least(self) -> float:
         """A motion that counts for none, beside the largest angle."""
-        return STILL * float(self.scales.signals[1])
+        return drift.STILL * float(self.scales.signals[1])
 
     def _bent(self) -> bool:
         """Whether anything but a linear drive is in the last half: events, limits, counts, waves."""

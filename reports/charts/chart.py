@@ -123,10 +123,7 @@ class Band:
 
 @dataclass(frozen=True, kw_only=True)
 class Note:
-    """Words near a point (kept off curves and inside the frame), or at a corner of the frame.
-
-    ``over``: on the point itself where that is free; ``pinned``: there in any case.
-    """
+    """Words near a point (kept off curves and inside the frame), or at a corner of the frame."""
 
     kind: Literal["note"] = "note"
     words: str
@@ -134,8 +131,8 @@ class Note:
     corner: str = ""
     colour: Colour = "ink"
     bold: bool = False
-    pinned: bool = False
-    over: bool = False
+    pinned: bool = False  # on the point itself in any case
+    over: bool = False  # there where that is free
 
 
 Item = Annotated[Curve | Shape | Rule | Band | Note, Discriminator("kind")]

@@ -32,12 +32,9 @@ ONLY = Option("Approve only this design; may be repeated.", "NAME", flag="design
 
 @dataclass(frozen=True, kw_only=True)
 class Settings(OnMachines):
-    """How a night is run; without workers and scheduler in this process, without a time limit.
+    """How a night is run; without workers and scheduler in this process, without a time limit."""
 
-    ``build`` is ``module:function`` that makes ``(meta, files)`` of a job's payload.
-    """
-
-    build: ClassVar[str] = "reports.nightly.compute:build"
+    build: ClassVar[str] = "reports.nightly.compute:build"  # makes ``(meta, files)`` of a job's payload
     workers: Annotated[int | None, Option("Worker processes; 2.", "N")] = 2
     time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "s")] = 900.0
     memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = JOB_MEMORY_MB

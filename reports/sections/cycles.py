@@ -2,15 +2,7 @@
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import AS_PREDICTED, CYCLES_WATCHED, LimitCycles
-from analyses.motion.settling import (
-    FROM_THE_LARGEST,
-    Settling,
-    acting,
-    faint_words,
-    judged_by,
-    verdict_of,
-    words,
-)
+from analyses.motion import settling
 from reports import document as doc
 from reports.sections.names import Unit, fine_unit, load_unit
 
@@ -46,20 +38,20 @@ def summary(result: LimitCycles) -> str:
         tail = f"; {seen} of {count} predicted cycles confirmed" + ", the simulation decides" * (seen < count)
     if swing is None:
         left = [one for one in result.rests if one.hunting]  # too small, or not long enough
-        ends = [f"after {fine.of(one.amplitude_rad)} it {words(one.rest, *fine)}" for one in left]
+        ends = [f"after {fine.of(one.amplitude_rad)} it {settling.words(one.rest, *fine)}" for one in left]
         faint = [one for one in result.rests if not one.hunting and one.swing_rad]
         if faint:
             largest = max(faint, key=lambda one: one.swing_rad)
-            ends.append(f"for {faint_words(largest.rest, *fine)}")
+            ends.append(f"for {settling.faint_words(largest.rest, *fine)}")
         still = f", but {', '.join(ends)}" if ends else ""
         return f"The drive as it is comes to rest after every step{still}{tail}."
     does = {
-        Verdict.MET: f"comes to rest as far as is asked ({judged_by(result.design)})",
+        Verdict.MET: f"comes to rest as far as is asked ({settling.judged_by(result.design)})",
         Verdict.NOT_MET: "does not come to rest",
         Verdict.NOT_PROVEN: "is not known to come to rest",
-    }[verdict_of(result.design, swing)]
+    }[settling.verdict_of(result.design, swing)]
     at = f"{swing.load_Nm:g} {load_unit(result.design)}"
-    return f"The drive as it is {does}: {words(swing.rest, *fine)} under {at}{tail}."
+    return f"The drive as it is {does}: {settling.words(swing.rest, *fine)} under {at}{tail}."
 
 
 def _predicted(result: LimitCycles, fine: Unit) -> doc.Block:
@@ -85,10 +77,10 @@ def _predicted(result: LimitCycles, fine: Unit) -> doc.Block:
 
 
 def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
-    def end(one: Settling) -> str:
+    def end(one: settling.Settling) -> str:
         stands = one.rest.verdict == "still moving" and not one.swing_rad
         words = "stands still, not known for how long" if stands else one.rest.verdict
-        return words + acting(one.rest)
+        return words + settling.acting(one.rest)
 
     size = fine.column()
     columns = [
@@ -99,7 +91,8 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
         doc.of(lambda one: one.rest.motor_amplitude or None, "motor", "Motor, at the output", **size),
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
-    note = f"The drive as it is: dry friction, play, quantisation and limits at work. {FROM_THE_LARGEST}"
+    note = "The drive as it is: dry friction, play, quantisation and limits at work. "
+    note += settling.FROM_THE_LARGEST
     return doc.listing(
         "What steps end in", result.rests, columns, note, lambda one: "warn" if one.hunting else None
     )

@@ -500,10 +500,7 @@ WORDS: dict[str, list[tuple[str, ...]]] = {  # by place: a line, and what each l
             "(it is integral_time)",
         ),
     ],
-    "position": [
-        ('bandwidth = "9 Hz"', "(it is gain)", "like V/rad"),
-        ('Kv = "40 V/rad"', "position.Kv = "),
-    ],
+    "position": [('bandwidth = "9 Hz"', "(it is gain)", "like V/rad"), ('Kv = "40 V/rad"', "position.Kv = ")],
     "period": [
         ('period = "0 Hz"', '"0 Hz": allowed: above 0'),
         ('period = "-5 Hz"', '"-5 Hz": allowed: above 0'),
@@ -528,12 +525,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
     ('"48 V"', '"100-120 VAC"', "behind a rectifier, 141.4 V to 169.7 V"),
     ('"48 V"', '"48 V', "a quote that is opened in this line is not closed"),
     ("back_emf_constant =", "speed_constant =", 'which takes "317 rpm/V" too'),
-    (
-        'back_emf_constant = "317',
-        'speed_constant = "107',
-        'which takes "107 rpm/V" too',
-        "within 10 %",
-    ),
+    ('back_emf_constant = "317', 'speed_constant = "107', 'which takes "107 rpm/V" too', "within 10 %"),
     ('torque_constant = "30', 'Kt = "30', "(it is torque_constant)\n"),
     ("[control]", '[control]\npwm-frequency = "8 kHz"', "part of computing_delay"),
     ("computing_delay", "pwm_frequency", "control.computing_delay: missing", "not needed, part of "),
@@ -615,6 +607,15 @@ def test_a_gain_may_be_stated_by_what_it_does(constants: str, over: float, to_dc
         now = f"; {stated} would now be {lost:.4g} A"
         assert [now in line for line in said] == [True] * (lost != gain)
         assert not any(": keeps" in line for line in warnings_of(drive))
+
+
+def test_variants_say_once_of_a_gain_that_it_keeps_its_number(tmp_path, cli) -> None:
+    file, ways = tmp_path / "mine.toml", ("load.inertia=0 kg*m^2", "load.inertia=1e-4 kg*m^2")
+    file.write_text(f'{SHEET}{CURRENT}gain = "40 Hz"\n')
+    asked = [word for way in ways for word in ("--set", way)]
+    ran = cli("compare", f"{file}", *asked, "--no-validate", "--quiet", "--out", f"{tmp_path / 'out'}")
+    said = [line for line in ran.err.splitlines() if ": keeps " in line]
+    assert [line.startswith(f"warning: {ways[0]}: control.velocity.gain: keeps") for line in said] == [True]
 
 
 def test_a_velocity_gain_without_a_current_loop_is_in_volts() -> None:

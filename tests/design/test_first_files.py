@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_lti.design import (
-    Design,
-    design_hash,
-    load_design,
-    read_design_text,
-    with_values,
-    write_design,
-)
+from actuator_lti.design import Design, design_hash, load_design, read_design_text, with_values, write_design
 from actuator_lti.design.writing import write_changed
 from actuator_lti.loops import assemble_loops
 from analyses.linear.loop_figures import all_loop_figures

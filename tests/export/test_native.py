@@ -184,10 +184,7 @@ def of_another_machine(_: pytest.MonkeyPatch, library: Library) -> None:
     ("lack", "words"),
     [
         (no_compiler, r"gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins"),
-        (
-            lambda patch, _: patch.setattr(os, "access", lambda *_: False),
-            "no compiled kernels of these",
-        ),
+        (lambda patch, _: patch.setattr(os, "access", lambda *_: False), "no compiled kernels of these"),
         (of_another_machine, "does not load"),
     ],
 )

@@ -249,7 +249,7 @@ def ends_alike(design: Design, settlings: Iterable[Settling]) -> None:
             assert verdict == one.rest.verdict, (one, ticks)
 
 
-@pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 29, 35, 43])
+@pytest.mark.parametrize("seed", [2, 4, 9, 13, 20, 35, 43, 44])
 def test_all_who_ask_get_one_answer(seed: int) -> None:
     """`cycles`, `validate`, `failures`, `simulate` after two lengths; the words of the report."""
     design = stable_position_drive(seed)

@@ -111,8 +111,7 @@ def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> No
 
 
 @pytest.mark.parametrize(
-    "change",
-    [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}],
+    "change", [{"passed": True}, {"verdict": "not proven"}, {"parts": {"requirements": ALL_MET}}]
 )
 def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str, Any], tmp_path) -> None:
     path = tmp_path / "report.json"

@@ -83,8 +83,7 @@ def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("play", "dry"),
-    [*((play, dry) for play in (0.0, 2e-4, 3e-3) for dry in (0.02, 0.5))],
+    ("play", "dry"), [*((play, dry) for play in (0.0, 2e-4, 3e-3) for dry in (0.02, 0.5))]
 )
 def test_lost_motion_is_read_at_3_percent_of_the_rated_moment(play: float, dry: float) -> None:
     """0.36 N m of 12: play and 2 m/k, whatever the load's friction, so never below the play."""

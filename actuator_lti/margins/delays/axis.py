@@ -201,10 +201,7 @@ def smallest(axis: Axis, distance: Distance, start: Place = NOWHERE, top: float 
     """
     loop, at_end, somewhere = axis.loop, distance.at_no_gain, 10.0 * axis.loop.lowest
     value, w = min(
-        start,
-        (at_end, math.inf),
-        _at_rest(axis, distance),
-        (_value(axis, distance, somewhere), somewhere),
+        start, (at_end, math.inf), _at_rest(axis, distance), (_value(axis, distance, somewhere), somewhere)
     )
     for level in _AT_END:
         for _ in range(_ROUNDS):

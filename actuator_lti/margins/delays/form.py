@@ -13,14 +13,11 @@ from actuator_lti.types import Mask, Real
 
 @dataclass(frozen=True)
 class DelayForm:
-    """Linear fractional form with exact delays, one matrix: (dx/dt, v, y) = whole (x, z, u).
-
-    z_k(t) = v_k(t - delays_s_k), and all of it stands behind one more delay ``series_s``.
-    """
+    """Linear fractional form with exact delays, one matrix: (dx/dt, v, y) = whole (x, z, u)."""
 
     whole: Real  # (n + q + 1, n + q + 1): [A, B2, B1; C2, D22, D21; C1, D12, D11]
-    delays_s: Real  # (q,)
-    series_s: float = 0.0
+    delays_s: Real  # (q,): z_k(t) = v_k(t - delays_s_k)
+    series_s: float = 0.0  # one more delay, behind all of it
 
     @property
     def states(self) -> int:

@@ -63,11 +63,7 @@ def _near_one(N: fmpz, D: fmpz) -> bool:
 
 
 def _crossings(
-    N: Split,
-    D: Split,
-    p: fmpz_poly,
-    off: Callable[[arb], arb],
-    touched_ends: Sequence[bool] = (False, False),
+    N: Split, D: Split, p: fmpz_poly, off: Callable[[arb], arb], touched_ends: Sequence[bool] = (False, False)
 ) -> list[Crossing]:
     """The positive roots of p, touches merged; ``off`` is the distance to the line.
 
