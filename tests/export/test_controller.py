@@ -263,7 +263,7 @@ int main(void)
 
 
 def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: Path) -> None:
-    """A count is 12 urad; times gain and ratio less than 0.5 rad/s; from the motor's zero it would run off."""
+    """A count is 12 urad, times gain and ratio 0.01 rad/s; from the motor's zero it would run off."""
     written(tmp_path, load_design("joint"), single=True)
     (tmp_path / "stay.c").write_text(STAY)
     ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "stay.c", "controller.c", "-lm", "-o", "stay")
