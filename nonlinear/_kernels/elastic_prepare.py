@@ -46,6 +46,9 @@ def prepare_elastic_sizes(p):
 @kernel
 def prepare_elastic(p, s):
     """Fill the modes, after `prepare_elastic_sizes` and `prepare`; ``s`` lends its work space."""
+    if p[layout.RIGID] <= 0.0:
+        turned = p[layout.ANGLE_START] / p[layout.RATIO_TO_COUPLING] - p[layout.TWIST_START]
+        p[layout.OUTPUT_START] = turned / p[at.EL_RATIO_BEHIND]
     for number in range(mode_count(p)):
         m = at.EL_MODES + number * int(p[at.EL_MODE_SIZE])
         put_mode(p, number, m)

@@ -247,6 +247,7 @@ MODES = SLIP + 4 * TRANSITION  # two directions
 DECAY = MODES + 2 * MODAL  # of the locked current, two segments
 LENGTH = DECAY + 2  # of the two segments, s
 (
+    OUTPUT_START,  # angle of the output at the start [rad]
     RELAX,  # R/L
     LOCKED_GAIN,  # 1/R; 0 for a torque source
     SMOOTH,  # 1: no dry friction and one viscous slope, so nothing happens at w = 0
@@ -274,11 +275,11 @@ LENGTH = DECAY + 2  # of the two segments, s
     AT_WORK,  # of the work space
     STATE_SIZE,
     PARAMETER_SIZE,  # length of the row of parameters with all that is derived
-) = range(LENGTH + 2, LENGTH + 29)
+) = range(LENGTH + 2, LENGTH + 30)
 
 # integrals over a whole segment as forms of (i, w, u, T): of i (4), of i^2, i w and w^2 (10 each)
 FORM = 34
-FORMS = LENGTH + 29  # four: direction, segment
+FORMS = LENGTH + 30  # four: direction, segment
 P_SIZE = FORMS + 4 * FORM
 
 # --- behind that, either the block of an elastic drive train, as long as it needs ---------------------

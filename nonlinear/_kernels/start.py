@@ -160,6 +160,7 @@ def derive(p, s):
         prepare_forms(p, s)
     if p[layout.LAW] > 0.0:
         prepare_tanh(p, s)
+    p[layout.OUTPUT_START] = p[layout.ANGLE_START] / p[layout.RATIO]
     if p[layout.ELASTIC_DRIVE] > 0.0:
         prepare_elastic(p, s)
 

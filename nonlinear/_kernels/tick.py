@@ -16,7 +16,8 @@ from nonlinear._kernels.sense import applied_voltage, sense
 @kernel
 def init_controller(p, s):
     """Start values of the controller, all histories those of rest or of constant speed."""
-    th = p[layout.ANGLE_START]
+    at_output = p[layout.OUTPUT_SENSOR] > 0.0
+    th = p[layout.RATIO] * p[layout.OUTPUT_START] if at_output else p[layout.ANGLE_START]
     s[layout.S_CURRENT_INTEGRATOR] = p[layout.CURRENT_INTEGRATOR_START]
     s[layout.S_VELOCITY_INTEGRATOR] = p[layout.VELOCITY_INTEGRATOR_START]
     s[layout.S_SPEED_COMMAND] = s[layout.S_SPEED_REFERENCE] = p[layout.SPEED_COMMAND_START]
@@ -33,7 +34,8 @@ def init_controller(p, s):
 @kernel
 def init_estimate(p, s):
     """Start values of the speed measurement: those of constant speed."""
-    w, th, T = p[layout.SPEED_START], p[layout.ANGLE_START], p[layout.VELOCITY_PERIOD]
+    w, T, at_output = p[layout.SPEED_START], p[layout.VELOCITY_PERIOD], p[layout.SPEED_SENSOR] > 0.0
+    th = p[layout.RATIO] * p[layout.OUTPUT_START] if at_output else p[layout.ANGLE_START]
     m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])
     for j in range(m):
         s[at + j] = counted(th - (m - j) * T * w, p[layout.COUNTS_PER_RAD])
@@ -48,7 +50,8 @@ def init_estimate(p, s):
 @kernel
 def init_command(p, s):
     """Start values of profile and command filter: those of the outermost stage."""
-    r = p[layout.ANGLE_START] / p[layout.RATIO]
+    at_output = p[layout.OUTPUT_SENSOR] > 0.0
+    r = p[layout.OUTPUT_START] if at_output else p[layout.ANGLE_START] / p[layout.RATIO]
     if p[layout.HAS_POSITION] <= 0.0:
         r = p[layout.VOLTAGE_START]
         if p[layout.HAS_CURRENT] > 0.0:

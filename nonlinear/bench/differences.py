@@ -68,14 +68,10 @@ class Differences:
     def _led(self) -> None:
         """Let the commands before the first be those of the motion: else it is fed forward to there.
 
-        What an integral of the position holds of a standing drive, and the angles that a sensor at the output
-        saw behind a twisted spring, are in no row, either.
+        What an integral of the position holds of a standing drive is in no row, either.
         """
-        setup, start, p = self.setup, self.drive.start, self.drive.p
+        setup, start = self.setup, self.drive.start
         place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
-        if p[at.SPEED_SENSOR] > 0.0:
-            seen = int(p[at.AT_ANGLES]) + np.arange(int(p[at.DIFFERENCE_SAMPLES]))
-            start[[*seen, at.S_TRACKED_ANGLE]] += N * setup.bias.output_rad(setup.design)
         if place is None or setup.outer != "position":
             return
         if speed == 0.0 and place.integral_time_s is not None:

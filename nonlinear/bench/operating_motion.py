@@ -143,13 +143,13 @@ def on_its_stand(design: Design, like: Design | None = None) -> Design:
 def standing(design: Design) -> OperatingMotion:
     """At rest, motor at zero, no dry friction: a constant torque there holds it, and a constant moment.
 
-    A coupling carries the load's own moment at output angle 0, but where `_remembers_output`; one with play
-    is pressed where that does not close it.  The drive is one that `may_stand`, `on_its_stand`.
+    A coupling carries the load's own moment at output angle 0; one with play is pressed where that does not
+    close it.  The drive is one that `may_stand`, `on_its_stand`.
     """
     coupling, torque, carried = design.coupling, holding_torque_Nm(design), holding_moment_Nm(design)
     if coupling is None:
         return OperatingMotion(0.0, 0.0, 0.0, False, carried, extra_Nm=torque)
-    coupling_Nm = 0.0 if _remembers_output(design) else carried / design.ratio_behind_coupling
+    coupling_Nm = carried / design.ratio_behind_coupling
     if coupling.play_rad > 0.0 and abs(coupling_Nm) < _closing_Nm(coupling):
         press = PRESSED[0] * full_torque_Nm(design) * design.ratio_to_coupling
         coupling_Nm = max(press, _closing_Nm(coupling))
@@ -158,14 +158,6 @@ def standing(design: Design) -> OperatingMotion:
     moment = holding_moment_Nm(design, -twist / design.ratio_behind_coupling)
     moment -= coupling_Nm * design.ratio_behind_coupling
     return OperatingMotion(0.0, 0.0, 0.0, False, moment, twist, coupling_Nm, extra_Nm=torque)
-
-
-def _remembers_output(design: Design) -> bool:
-    """Whether a history is of the output's angle, which a run takes to begin at the motor's, no twist."""
-    control = design.controller
-    filtered = design.command.filter_time_s > 0.0 and control.position is not None
-    stages = (control.velocity, control.position if filtered else None)
-    return any(stage is not None and stage.sensor == "output" for stage in stages)
 
 
 def _closing_Nm(coupling: Coupling) -> float:

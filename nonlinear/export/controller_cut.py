@@ -106,7 +106,7 @@ def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
 def _look(p: Floats, constant: dict[int, float], row: str, place: int) -> float | None:
     if row == "s":
         return constant.get(place)
-    return float(p[place]) if row == "p" and place != layout.ANGLE_START else None
+    return float(p[place]) if row == "p" and place not in (layout.ANGLE_START, layout.OUTPUT_START) else None
 
 
 def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr | None:

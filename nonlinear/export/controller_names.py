@@ -25,8 +25,9 @@ _WORDS = {
 _SIGNALS = {
     "IN_COMMAND": "command", "IN_CURRENT": "motor_current", "IN_SPEED": "motor_speed",
     "IN_ANGLE": "motor_angle", "ANGLE_START": "motor_angle", "IN_OUTPUT": "output_angle",
-    "IN_OUTPUT_SPEED": "output_speed", "IN_BUS": "bus_voltage", "IO_VOLTAGE": "voltage",
-    "IO_CURRENT_COMMAND": "current_command", "IO_SPEED_COMMAND": "speed_command", "IO_FLAGS": "flags",
+    "OUTPUT_START": "output_angle", "IN_OUTPUT_SPEED": "output_speed", "IN_BUS": "bus_voltage",
+    "IO_VOLTAGE": "voltage", "IO_CURRENT_COMMAND": "current_command", "IO_SPEED_COMMAND": "speed_command",
+    "IO_FLAGS": "flags",
 }  # fmt: skip
 SIGNAL_AT = {getattr(layout, name): name for name in _SIGNALS}
 """Name in the layout of each input and output, by its place."""

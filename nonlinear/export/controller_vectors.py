@@ -82,7 +82,9 @@ def roundings(ours: Controller) -> int:
 
 def _places(struct: Struct, member: Member) -> npt.NDArray[np.intp]:
     """Where the row of the state, or of inputs, has what a member is."""
-    elsewhere = {"out": _OUT, "in": {at.ANGLE_START: at.IN_ANGLE}}.get(struct.argument, {})
+    elsewhere = {"out": _OUT, "in": {at.ANGLE_START: at.IN_ANGLE, at.OUTPUT_START: at.IN_OUTPUT}}.get(
+        struct.argument, {}
+    )
     first = elsewhere.get(member.first, member.first)
     return np.arange(first, first + max(member.length, 1))
 

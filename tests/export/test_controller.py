@@ -238,3 +238,33 @@ def test_counts_of_the_encoder_go_round(tmp_path: Path) -> None:
     (tmp_path / "round.c").write_text(ROUND)
     ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
     ran(tmp_path, "./round")
+
+
+STAY = """#include "controller.h"
+int main(void)
+{
+    drive_controller_state state;
+    drive_controller_output out = {0};
+    drive_controller_input in = {0};
+    in.output_angle_rad = 0.5f;
+    in.output_counts = 41722; /* floor(0.5 * 524288/(2 pi)) */
+    in.motor_counts = 1234; /* an incremental encoder: of another zero */
+    in.command_rad = 0.5f;
+    drive_controller_start(&state, &in);
+    for (int k = 0; k < 400; k += 1) {
+        drive_controller_step(&state, &in, &out);
+        if (out.speed_command_rad_s > 0.5f || out.speed_command_rad_s < -0.5f) {
+            return 1;
+        }
+    }
+    return 0;
+}
+"""
+
+
+def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: Path) -> None:
+    """A count is 12 urad, times gain and ratio 0.01 rad/s; from the motor's zero it would run off."""
+    written(tmp_path, load_design("joint"), single=True)
+    (tmp_path / "stay.c").write_text(STAY)
+    ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "stay.c", "controller.c", "-lm", "-o", "stay")
+    ran(tmp_path, "./stay")

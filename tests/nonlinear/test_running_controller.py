@@ -74,7 +74,7 @@ def command(tick: int) -> float:
 
 
 def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space() -> None:
-    """NaN in all of them before every tick, and then in a drive begun anew: not one bit is different."""
+    """1e300 in all of them before every tick, and then in a drive begun anew: not one bit is different."""
     assert elastic_layout.ES_END - layout.ELASTIC_STATE == layout.ELASTIC_STATE_SIZE
     for design in drives():
         plain, spoilt = Drive(design), Drive(design)
@@ -87,7 +87,7 @@ def test_every_number_has_a_kind_and_nothing_goes_on_from_notes_and_work_space()
         held &= design.instruments == model.Instruments()  # noise goes on from what counts as a note
         for k in range(STATE_TICKS):
             state = spoilt.get()
-            state[held] = np.nan
+            state[held] = 1e300
             spoilt = Drive(design) if k == STATE_TICKS // 2 else spoilt
             spoilt.set(state)
             for drive in (plain, spoilt):
@@ -223,3 +223,18 @@ def test_any_drive(part: int) -> None:
         assert run.events_per_tick <= 50, seed
         assert design.friction.law == "tanh" or run.energy.relative_error < 1e-9, seed
     assert tried > 25
+
+
+@pytest.mark.parametrize("speed", ["difference", "tracking"])
+def test_a_sensor_at_the_output_begins_where_the_output_is(speed: str) -> None:
+    """Behind a twisted spring, commanded to stay: no error, no speed, so no voltage at the first tick."""
+    encoder = model.Encoder(speed=speed, bandwidth_rad_s=2000.0)
+    at_output = {"sensor": "output"}
+    design = changed(
+        load_design("ilr33-amber-compliant"), encoder=encoder, instruments=model.Instruments(),
+        command=model.Command(filter_time_s=2e-3, rate_rad_s=1.0),
+        controller={"position": {**at_output, "feedforward": 0.8}, "velocity": at_output},
+    )  # fmt: skip
+    start = State(motor_angle_rad=0.3 * design.total_ratio, output_angle_rad=0.29)
+    run = simulate(design, commands.hold(0.29), initial=start, duration_s=2e-3)
+    assert abs(run.voltage_V[0]) < 1e-6
