@@ -234,7 +234,7 @@ def test_a_pole_on_the_unit_circle_is_no_verdict(seed: int, tmp_path) -> None:
     assert page["current"]["doubtful"]
 
 
-@pytest.mark.parametrize("seed", [15, 28, 40, 44, 113])
+@pytest.mark.parametrize("seed", [28, 40, 44, 113])
 def test_a_hidden_mode_at_rest_withholds_no_figures(seed: int) -> None:
     """A spring of cogging; the velocity loop's margin lies at rest, beside a mode it does not show.
 
