@@ -8,11 +8,13 @@ from scipy.signal import lfilter
 
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
-from analyses.correlation.driving import command_of
+from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import solve, told_apart
 from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding
 from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
+
+PLACES = ("angle", "output_angle", "position")
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,8 @@ def followed(
     model = simulated[place]
     own = record[place][: len(model)]  # of a long one the first part
     columns = [model]
-    if driven.stage == "position" and control.position:
-        factor, lag = design.total_ratio if place == "angle" else 1.0, control.position.gain * record.period_s
-        error = factor * driven.values[: len(model)] - model
-        columns = [-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error), model]
+    if (by_clock := moved_by_clock(driven, record, place, model)) is not None:
+        columns = [by_clock, model]
     table = np.column_stack([values - values.mean() for values in columns])
     kept, _ = told_apart(table, ("clock", "motion")[-len(columns) :])
     if 0 not in kept or not np.ptp(own):
@@ -83,6 +83,20 @@ def followed(
     shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
     _, alike = ratio_of(own - own.mean(), model - model.mean())
     return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())
+
+
+def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) -> Floats | None:
+    """By what a simulated motion changes for each part that its record's clock is off, see `followed`.
+
+    ``place``: the signal that ``model`` is of. None where that is no place, or no position is commanded.
+    """
+    control = driven.design.controller
+    if place not in PLACES or driven.stage != "position" or control.velocity is None or not control.position:
+        return None
+    factor = driven.design.total_ratio if place == "angle" else 1.0
+    lag = control.position.gain * record.period_s
+    error = factor * driven.values[: len(model)] - model
+    return np.asarray(-lfilter([-np.expm1(-lag)], [1.0, -np.exp(-lag)], error))
 
 
 def following_finding(design: Design, one: Followed) -> Finding:

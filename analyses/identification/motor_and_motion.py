@@ -11,6 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS
 from analyses.correlation.driving import SMOOTH, command_of, readings
+from analyses.correlation.following import moved_by_clock
 from analyses.estimation.fit import Fit
 from analyses.identification import to_design
 from analyses.identification.asked import Settings, fixed_values, held_by_name
@@ -69,18 +70,25 @@ def _misses(design: Design, tried: Sequence[Found]) -> Floats:
     """What the simulated records miss the signals by, shape (ways, blocks): the less, the likelier.
 
     Half the squares over the mean square of the way that meets a signal best, summed over the signals and
-    over root n blocks of root n rows each.
+    over root n blocks of root n rows each. A command that is held is late, which a clock that is off feigns:
+    what that would explain of a motion is no miss.
     """
     sums = []
     pairs = [zip(one.right.records, one.right.model.simulated, strict=False) for one in tried]
     for ways in zip(*pairs, strict=False):
         names = [name for name in AXIS_SIGNALS[design.axis] if name in ways[0][0].signals]
-        off = np.array([[own[name][: len(like)] - like[name] for name in names] for own, like in ways])
+        off = np.array([[_missed(design, own, like, name) for name in names] for own, like in ways])
         size = np.min(np.mean(off**2, axis=2), axis=0)
         rows = np.sum(0.5 * off**2 / np.maximum(size, 1e-300)[:, None], axis=1)
         blocks = np.array_split(rows, int(np.sqrt(rows.shape[1])), axis=1)
         sums.append(np.transpose([np.sum(block, axis=1) for block in blocks]))
     return np.concatenate(sums, axis=1)
+
+
+def _missed(design: Design, own: Record, like: Record, name: str) -> Floats:
+    off, driven = own[name][: len(like)] - like[name], command_of(design, own)
+    column = moved_by_clock(driven, own, name, like[name]) if driven else None
+    return off if column is None or not np.any(column) else off - column * (column @ off) / (column @ column)
 
 
 def _widened(plain: Design, taken: Found, other: Found, share: float) -> Found:

@@ -125,12 +125,7 @@ def test_a_drive_is_found_from_its_record(case: Case, tmp_path, identify, cli) -
     assert errors[0] < case.met < errors[1]
 
 
-NOT_PROVEN = pytest.mark.xfail(
-    reason="not proven, not failed, since the command is read in three ways", strict=True
-)
-
-
-@pytest.mark.parametrize("name", ["ballscrew", pytest.param("fin", marks=NOT_PROVEN)])
+@pytest.mark.parametrize("name", ["ballscrew", "fin"])
 @pytest.mark.parametrize("clock", [1.05, 0.95])
 def test_a_clock_that_is_off_shows_in_the_following_error(name, clock, tmp_path, identify) -> None:
     """A position and a current alone: inertia and friction agree with any clock, the loops' gains do not."""
