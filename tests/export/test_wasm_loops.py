@@ -38,10 +38,11 @@ STAGES = {
     "w_ref": linear.AT_SPEED, "i_ref": linear.AT_CURRENT, "u": linear.AT_VOLTAGE,
 }  # fmt: skip
 ANGLES = np.geomspace(1e-2, 3.1, 40)  # rad per sample; below, z I - A of the linear form loses digits
-# Of the random drives. Four are 1e-9 beyond what a nudge of the design's values moves: the rounding of the
-# matrices moves them, whose poles lie 1e-8 from one (3, 61), whose inner loop grows by 4e10 a sample (57), or
-# whose states before the current are 1e5 (8). 1, 32: more states than figures of many designs take.
-MISSED = (1, 3, 8, 32, 57, 61)
+# Of the random drives. Five are 1e-9 beyond what a nudge of the design's values moves: the rounding of the
+# matrices moves them, whose poles lie 1e-8 from one (3, 61), whose inner loop grows by 4e10 a sample (57),
+# whose states before the current are 1e5 (8), or whose peak is 700 times its final value, which an ulp of one
+# entry moves by 2e-10 (75). 1, 32: more states than figures of many designs take.
+MISSED = (1, 3, 8, 32, 57, 61, 75)
 FURTHEST_DB = 200.0  # a crossing further off than this is where rounding makes the phase
 
 pytestmark = needs_node
@@ -84,8 +85,6 @@ def figures_agree(design: Design, ours: dict[str, Any]) -> int:
             if same or a == pytest.approx(b, rel=1e-9, abs=least):
                 continue
             allowed = 4.0 * moved_by_an_ulp(design, loop)[name]
-            if name == "overshoot":  # the final value, 100/b of the peak, is known to 1e-11 of that
-                allowed = max(allowed, 1e-13 * b * b)
             if name in TIMES:  # whole ticks
                 period = float(ours[loop]["period"])
                 allowed = (round(allowed / period) + 1e-6) * period
@@ -189,7 +188,7 @@ def drawn(seed: int) -> Design:
 
 def random_drives() -> list[Design]:
     """Everything that a design file may hold, over decades."""
-    designs = [drawn(seed) for seed in range(100) if seed not in MISSED]
+    designs = [drawn(seed) for seed in range(101) if seed not in MISSED]
     coupled = [design for design in designs if design.coupling is not None]
     assert len(coupled) > 10
     assert sum(design.load.moment_damping_Nms_rad > 0.0 for design in coupled) > 2
@@ -236,7 +235,7 @@ def test_a_pole_on_the_unit_circle_is_no_verdict(seed: int, tmp_path) -> None:
     assert page["current"]["doubtful"]
 
 
-@pytest.mark.parametrize("seed", [28, 40, 44, 113])
+@pytest.mark.parametrize("seed", [28, 40, 44, 113, 148])
 def test_a_hidden_mode_at_rest_withholds_no_figures(seed: int) -> None:
     """A spring of cogging; the velocity loop's margin lies at rest, beside a mode it does not show.
 
