@@ -11,7 +11,7 @@ import numpy.typing as npt
 from actuator_lti.bounds import RUN_TICKS
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, finite_number, shown
-from actuator_lti.types import Floats
+from actuator_lti.types import Compared, Floats
 from nonlinear._kernels import layout as at
 from nonlinear.bench.probe import Probe, write_probe
 from nonlinear.commands import Command, numbers_of, write
@@ -33,8 +33,8 @@ STATE_PLACES = {  # where a run begins with each number of a `State` (in the row
 }
 
 
-@dataclass
-class Tables:
+@dataclass(eq=False)
+class Tables(Compared):
     """All time series of one or many runs, end to end; a run knows offsets and lengths."""
 
     parts: list[Floats] = field(default_factory=list)

@@ -337,6 +337,7 @@ def test_results_can_be_compared_and_sent() -> None:
     for made in (
         lambda scale: step_figures(control.tf([scale], [1.0, 1.0])),
         lambda scale: simulate(DESIGN, commands.step(0.01 * scale), 0.01),
+        lambda scale: onset(assemble_loops(DESIGN), scale * grid),
         lambda scale: MeasuredResponse.from_scatter(control.frd(scale / (1j * grid), grid)),
     ):
         result = made(1.0)
