@@ -243,9 +243,9 @@ def kept_gains(design: Design) -> Iterator[str]:
     """Gains read from what they did with the drive as it was (model.md section 11) and do no more."""
     for path in GAINS:
         item = design.parameters.get(path)
-        said = "" if item is None else item.source.partition("; ")[0].removeprefix("from ")
-        if item is None or said == item.source.partition("; ")[0]:
+        if item is None or not item.source.startswith("from "):
             continue
+        said = item.source.partition("; ")[0].removeprefix("from ")
         with suppress(InputError):  # of a source that a user wrote
             now, unit = read_value(design, path, said), item.text.partition(" ")[2]
             if abs(now - item.value) > 1e-9 * item.value:

@@ -212,7 +212,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
 
 
 def _with_own_Nm(design: Design, load_Nm: float) -> Any:
-    """A load torque with the load's own moment at output angle 0, gravity; but for what a motion averages."""
+    """A load torque and the load's own moment at output angle 0 (gravity), without gear error, together."""
     return load_Nm + design.load.over_angle.at(0.0, moving=True)
 
 

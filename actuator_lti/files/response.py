@@ -213,6 +213,8 @@ def _averaged(read: RecordedResponse) -> RecordedResponse:
         return np.asarray(np.add.reduceat(values, first) / count)
 
     z = np.asarray(np.add.reduceat(once.response, first) / count, dtype=np.complex128)
+    if not z.all():
+        raise InputError("repeats whose mean is 0; allowed: values that do not cancel")
     size, own = np.abs(z), np.abs(once.response)
     deviation, radius = (
         np.sqrt(mean((one * own) ** 2) / count) / size for one in (once.deviation, once.radius)

@@ -195,7 +195,7 @@ def scatter_of_repeats(size: Real, squared: Real, count: Ints) -> tuple[Real, Re
     def nearby(values: Real) -> Real:
         return np.asarray(np.sum(values[start[:, None] + np.arange(width)], axis=1))
 
-    square, total = np.maximum(size, 1e-300) ** 2, nearby(freedom)
+    square, total = np.maximum(size, 1e-100) ** 2, nearby(freedom)
     every = np.maximum(total, 1.0)
     alike, over = nearby(squared), nearby(squared / square)
     likelier = over * np.exp(nearby(freedom * np.log(square)) / every) < alike

@@ -24,6 +24,7 @@ CLEARED = np.array([
     layout.CURRENT_START, layout.SPEED_START, layout.ANGLE_START, layout.CURRENT_INTEGRATOR_START,
     layout.VELOCITY_INTEGRATOR_START, layout.SPEED_COMMAND_START, layout.CURRENT_COMMAND_START,
     layout.VOLTAGE_START, layout.LOAD_TABLE_LENGTH, layout.TORQUE_TABLE_LENGTH, layout.WITH_ENERGY,
+    *range(layout.BEND_TORQUE, layout.BEND_STIFFNESS_2 + 1),
     layout.HALF_PLAY, layout.LOAD_DRY, layout.LOAD_OFFSET, layout.TWIST_START, layout.LOAD_SPEED_START,
     layout.MAP_COUNT, layout.MAP_COUNT_REVERSE, layout.OWN_COUNTS, layout.OWN_OUTPUT_COUNTS,
     *range(layout.OWN_START, layout.OWN_START + layout.MOST_STATES),
@@ -35,14 +36,34 @@ UNLIMITED = np.array([
 
 
 @kernel
+def averaged(p):
+    """How many waves a drive has the mean of: the first of each torque, gear error and cogging, in motion."""
+    return 1 if p[layout.HAS_VELOCITY] > 0.0 and p[layout.HAS_POSITION] <= 0.0 else 0
+
+
+@kernel
 def slope_at_zero(p, slope, waves, peak, order):
     """Slope of a torque over its angle at zero; what rounding leaves of it, as at a quarter turn, is none."""
     size = abs(slope)
-    for j in range(waves):
+    for j in range(averaged(p), waves):
         steepest, phase = p[peak + j] * p[order + 2 * j], p[order + 2 * j + 1]
         slope += steepest * math.cos(phase)
         size += abs(steepest) * (abs(math.cos(phase)) + abs(phase))
     return 0.0 if abs(slope) <= ROUNDED * size else slope
+
+
+@kernel
+def stiffness_at_zero(p):
+    """Stiffness of the spring's piece on which the load's own moment at angle zero leaves the drive."""
+    moment, k = 0.0, p[layout.STIFFNESS]
+    for j in range(averaged(p), layout.MOMENT_WAVES):
+        moment += p[layout.MOMENT_PEAK + j] * math.sin(p[layout.MOMENT_ORDER + 2 * j + 1])
+    torque = abs(moment) * p[layout.RATIO_TO_COUPLING] / p[layout.RATIO]
+    for j in range(2):
+        bend = layout.BEND_TORQUE + 2 * j
+        if p[bend] > 0.0 and torque > p[bend]:
+            k = p[bend + 1]
+    return k
 
 
 @kernel
@@ -51,6 +72,7 @@ def linear_row(p, q):
     for k in range(layout.SIZE):
         q[k] = p[k]
     peak, order = layout.MOMENT_PEAK, layout.MOMENT_ORDER
+    q[layout.STIFFNESS] = stiffness_at_zero(p)
     q[layout.LOAD_SLOPE] = slope_at_zero(p, p[layout.LOAD_SLOPE], layout.MOMENT_WAVES, peak, order)
     peak, order = layout.TORQUE_PEAK, layout.TORQUE_ORDER
     q[layout.TORQUE_SLOPE] = slope_at_zero(p, p[layout.TORQUE_SLOPE], layout.TORQUE_WAVES, peak, order)

@@ -19,7 +19,7 @@ from actuator_lti import Loop, assemble_loops, stability_margins
 from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import load_design, shipped_designs, with_values
-from actuator_lti.design.model import Design, Instruments
+from actuator_lti.design.model import Design, Gravity, Instruments
 from actuator_lti.drive.signals import LIMITERS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.periodic import point_blocks
@@ -299,6 +299,18 @@ def test_zero_frequency_itself_counts_behind_a_spring(base: str, tmp_path) -> No
                 assert got["gain_margin"] == pytest.approx(truth.gain_margin_db, rel=1e-9), name
             at_rest += any(each.frequency_rad_s == 0.0 for each in truth.gain_margins)
     assert at_rest > 0 or base != "ilr33-amber"
+
+
+def test_the_page_stands_where_the_report_does(tmp_path) -> None:
+    """A speed drive averages cogging; gravity twists a spring past where it bends."""
+    cogging = {"cogging_Nm": 0.002, "cogging_periods": 12.0}
+    runs = changed(load_design("ilr33-amber"), controller={"position": None}, motor=cogging)
+    level = {"gravity": Gravity(mass_kg=6.0, arm_m=0.3, offset_rad=0.5 * math.pi)}
+    bent = {"torque_1_Nm": 10.0, "stiffness_2_Nm_rad": 60000.0}
+    joint = changed(load_design("joint"), coupling=bent)
+    designs = [runs, changed(joint, load=level), changed(joint, load={"gravity": None})]
+    for design, ours in zip(designs, in_node(designs, tmp_path), strict=True):
+        assert figures_agree(design, ours)
 
 
 def test_a_crossover_below_the_scan_withholds_the_figures(tmp_path) -> None:
