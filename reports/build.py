@@ -39,7 +39,6 @@ from reports.sections import (
     stiffness,
     validation,
 )
-from reports.sections.names import load_unit
 from reports.study_pages import design_head, in_amperes, notices
 
 Step = Callable[[str], AbstractContextManager[Progress]]
@@ -193,7 +192,7 @@ def validation_sections(design: Design, progress: Progress = None) -> list[doc.S
 def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) -> list[doc.Section]:
     design, figures, onset = survey.design, survey.figures, survey.onset
     makers: dict[str, Callable[[], doc.Section]] = {
-        "Requirements": lambda: requirements.section(verdicts, load_unit(design)),
+        "Requirements": lambda: requirements.section(verdicts, design.load_unit),
         "Margins": lambda: margins.of_loops(figures, survey.operating_points),
     }
     for name, result in figures.items():

@@ -176,6 +176,11 @@ class Design:
         return next((item for item in self.waivers if item.requirement in names), None)
 
     @property
+    def load_unit(self) -> str:
+        """In which loads on the output are told: N on a linear axis."""
+        return "N" if self.axis == "linear" else "N m"
+
+    @property
     def total_ratio(self) -> float:
         """N, motor angle over output angle; 1 without gears."""
         return prod(gear.ratio for gear in self.gears)

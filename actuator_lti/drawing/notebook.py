@@ -38,8 +38,8 @@ def loops_html(loops: Loops) -> str:
     for name, loop in loops.present.items():
         every = "continuous" if loop.period_s is None else f"{1e3 * loop.period_s:g} ms"
         rows.append((name, loop.break_point, loop.unit_in, every))
-    unit = "N" if loops.design.axis == "linear" else "N m"
-    head = f"{loops.design.name}: {loops.form}, {loops.operating_point}, load {loops.load_Nm:g} {unit}"
+    load = f"load {loops.load_Nm:g} {loops.design.load_unit}"
+    head = f"{loops.design.name}: {loops.form}, {loops.operating_point}, {load}"
     return html_table(head, ("loop", "cut at", "unit", "period"), rows)
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from actuator_lti.design.model import Design
 from actuator_lti.drive.choice import finite, larger, smaller, where
-from actuator_lti.drive.operating import dry_torque, friction_slopes
+from actuator_lti.drive.operating import Operating, dry_torque, friction_slopes, stiffness_there
 from actuator_lti.drive.steady import circuit_resistance_ohm, droop, winding
 from actuator_lti.drive.wiring import present
 from actuator_lti.errors import InputError
@@ -50,12 +50,14 @@ def stall_torque_Nm(design: Design) -> Any:
     return winding(motor)[1] * current
 
 
-def resonance_rad_s(design: Design) -> Any:
-    """Resonance of motor and load on the coupling, undamped: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``."""
-    coupling, ratio = design.coupling, design.ratio_to_coupling
-    assert coupling is not None
+def resonance_rad_s(design: Design, load_Nm: float = 0.0) -> Any:
+    """Resonance of motor and load on the coupling, undamped: ``sqrt(k (1/J_l + 1/(J_m N_c^2)))``.
+
+    ``k`` is that of the piece on which the drive stands under a load.
+    """
+    ratio = design.ratio_to_coupling
     inverse = 1.0 / design.load_side_inertia_kgm2 + 1.0 / (design.motor_side_inertia_kgm2 * ratio**2)
-    return (coupling.stiffness_Nm_rad * inverse) ** 0.5
+    return (stiffness_there(design, Operating(load_Nm=load_Nm)) * inverse) ** 0.5
 
 
 def passed_moment_Nm(design: Design, load_Nm: float) -> Any:

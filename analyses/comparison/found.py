@@ -125,7 +125,7 @@ def _name(key: str, design: Design) -> FigureName:
     elif known is not None and known.source == "stiffness":
         at = ""  # no load changes it
     elif at:
-        at = f"{at} {'N' if design.axis == 'linear' else 'N m'}"
+        at = f"{at} {design.load_unit}"
     return FigureName(key, f"{words} at {at}" if at else words, "" if unit == "1" else unit, group, better)
 
 

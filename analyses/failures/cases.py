@@ -93,7 +93,6 @@ class Rig:
 
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
-FLAT_DB = 0.1  # a response that rises by less has no resonance
 OPEN = 1e4  # times the resistance: of a winding with an open phase
 
 Course = Callable[[float], float]
@@ -191,7 +190,7 @@ def _sines(design: Design, size: float) -> Iterator[tuple[float, str]]:
     command cuts a sine of the size there, the highest that it lets pass.
     """
     band = all_loop_figures(assemble_loops(design), step=False)["position"].bandwidth
-    if band is not None and band.resonance_peak_db > FLAT_DB:
+    if band is not None and band.resonance_hz:
         yield band.resonance_hz, "the resonance of its response"
     if band is not None and band.minus3db_hz is not None:
         highest, words = band.minus3db_hz, "its bandwidth"

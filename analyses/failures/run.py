@@ -1,6 +1,6 @@
 """Run every failure of a design on the rig of `analyses.failures.cases`."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, inf, log
 
@@ -117,10 +117,18 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
         rig = settled[case.start_rad].copy()
         if _reaches(rig, case):
             one = _followed(rig, asked, case)
-            made[case.name] = max(one, made.get(case.name, one), key=lambda each: each.at_detection_rad)
+            made[case.name] = _worse(made.get(case.name, one), one)
         else:
             left_out |= {case.name: f"its output does not get half-way to the stop in {LONGEST_S:g} s"}
     return Failures(design, asked, tuple(made.values()), left_out, tuple(before.values()))
+
+
+def _worse(first: FailureCase, second: FailureCase) -> FailureCase:
+    """That of the larger deflection until detection, with the larger peaks of both."""
+    taken = max(first, second, key=lambda each: each.at_detection_rad)
+    current = max(first.peak_current_A, second.peak_current_A)
+    moment = max(first.peak_moment_Nm, second.peak_moment_Nm)
+    return replace(taken, peak_current_A=current, peak_moment_Nm=moment)
 
 
 def _hold(rig: Rig, start: float, wait: int, most: int) -> None:

@@ -110,7 +110,7 @@ def inertia_share(design: Design, total_kgm2: float, key: str) -> tuple[float, f
         other, unit = INERTIAS[1 - INERTIAS.index(key)], "kg" if design.axis == "linear" else "kg m^2"
         raise InputError(
             f"identified inertia {total_kgm2:.4g} {unit} at the motor in all, but the design's inertias "
-            f"beside {key} alone make {rest:.4g} {unit}: correct them, or write it to {other}",
+            f"beside {key} alone make {rest:.4g} {unit}: correct them, or use --inertia-to {other}",
             where=design.origin or design.name,
         )
     return left, scale

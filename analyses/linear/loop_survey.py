@@ -178,7 +178,6 @@ def operating_points(
     that are not told at a load: it chooses the piece of a spring that bends; ``described``: friction
     described at small speeds as well; ``certify``: margins by exact arithmetic.
     """
-    linear = design.axis == "linear"
 
     def point(
         label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
@@ -186,7 +185,7 @@ def operating_points(
         at = Operating(point=kind, load_Nm=load_Nm if load is None else load, speed_amplitude_rad_s=speed)
         slope, loops = slope_at(design, at), loops_at(design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
-        return OperatingPointFigures(kind, label, load, slope, figures, "N" if linear else "N m")
+        return OperatingPointFigures(kind, label, load, slope, figures, design.load_unit)
 
     points = [point("sliding", None, "sliding")]
     if design.coupling is not None and design.friction.load_coefficient:
@@ -199,7 +198,7 @@ def operating_points(
     for load in dict.fromkeys(design.validation.loads_Nm):
         points.append(point(at_rest(design), load, "rest"))
         for speed in speeds:
-            label = f"speed amplitude {speed:.3g} {'m/s' if linear else 'rad/s'}"
+            label = f"speed amplitude {speed:.3g} {'m/s' if design.axis == 'linear' else 'rad/s'}"
             points.append(point(label, load, "describing-function", speed))
     return tuple(points)
 

@@ -269,6 +269,7 @@ class MonteCarloResult:
     notes: tuple[str, ...] = ()
     # For each figure that a requirement looks at, every tolerance alone, the one that moves it most first
     drivers: tuple[Driver, ...] = ()
+    load_unit: str = "N m"  # of the loads in the names of columns
 
     @property
     def tally(self) -> Tally:

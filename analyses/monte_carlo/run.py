@@ -113,7 +113,8 @@ def monte_carlo(
     tallies = list(zip(judging.judged(design), whole.tallies, strict=True))
     odds = [
         _odds(
-            r.id, judging.label(r), r.unit, tally.passed, whole.count, minimum=r.minimum, maximum=r.maximum,
+            r.id, judging.label(r, design.load_unit), r.unit, tally.passed, whole.count,
+            minimum=r.minimum, maximum=r.maximum,
             nominal=float(judging.judge(r, design, nominal).value[0]), worst=tally.worst[0][2],
             worst_sample=tally.worst[0][1], columns=judging.source_columns(r, design),
             waiver=design.waiver_of(r.id),
@@ -128,7 +129,7 @@ def monte_carlo(
         {name: result.column_statistics(name, unit, whole.columns[name]) for name, unit in units.items()},
         tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
         Path(folder), {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
-        notes=_notes(task, settings.samples), drivers=_drivers(task, odds),
+        notes=_notes(task, settings.samples), drivers=_drivers(task, odds), load_unit=design.load_unit,
     )  # fmt: skip
 
 

@@ -162,9 +162,8 @@ def torque_speed_plane(design: Design, top_speed_rad_s: float) -> TorqueSpeedPla
     if design.controller.velocity is not None and math.isfinite(limits.speed_rad_s):
         high = max((float(curve.torque_Nm.max()) for curve in bounds), default=1.0)
         bounds.append(Curve("speed limit", np.full(2, limits.speed_rad_s), np.array([0.0, high])))
-    unit = "N" if design.axis == "linear" else "N m"
     demands = tuple(
-        Curve(f"steady motion at {load:g} {unit}", speed, steady_torque_Nm(design, load, speed))
+        Curve(f"steady motion at {load:g} {design.load_unit}", speed, steady_torque_Nm(design, load, speed))
         for load in design.validation.loads_Nm
     )
     return TorqueSpeedPlane(tuple(bounds), demands)

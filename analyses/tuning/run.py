@@ -147,7 +147,7 @@ def _binding(
         corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
         binds = relative <= smallest + _BINDS and not enough
         at = {factor.path: float(here) for factor, here in corner}
-        about = (requirement.id, label(requirement), requirement.unit)
+        about = (requirement.id, label(requirement, problem.design.load_unit), requirement.unit)
         yield result.BindingRequirement(*about, value, limit, distance, relative, binds, at)
 
 

@@ -69,11 +69,6 @@ def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: 
     return 0.5 * (near + out)
 
 
-def torque_unit(design: Design) -> str:
-    """Of a torque, or of a force."""
-    return "N" if design.axis == "linear" else "N m"
-
-
 def loads_of(design: Design) -> tuple[float, ...]:
     """No load, and every named one with either sign; where none is, a share of the full torque."""
     named = [abs(load) for load in (*design.validation.loads_Nm, design.load.moment_max_Nm) if load]
@@ -159,7 +154,7 @@ def _at_speed(rows: Rows, design: Design, model: Design, speed: float, load: flo
     rows["load"], rows["speed_start"], rows["load_speed_start"] = load, speed, speed / N_c
     rows["twist_start"], rows["angle_start"] = motion.twist_rad, N_c * motion.twist_rad
     drive = rows.running().begin(wanted.torque_Nm)
-    unit = torque_unit(design)
+    unit = design.load_unit
     condition = f"at {speed:.4g} {'m/s' if unit == 'N' else 'rad/s'} under {load:g} {unit}"
     J = design.motor_side_inertia_kgm2 if elastic else design.inertia_kgm2
     unbalanced = max(1.0, Ts / J)  # the exponential of a tick is scaled by its largest entry
@@ -199,7 +194,7 @@ def _at_rest(model: Design, load: float) -> tuple[float, float, float, float]:
 
 def _breakaways(design: Design, model: Design) -> Iterator[Row]:
     """Torques at which the standing motor starts, under every load, forward and backward."""
-    rows, unit = Rows.of(mechanics(design)), torque_unit(design)
+    rows, unit = Rows.of(mechanics(design)), design.load_unit
     for load in loads_of(design):
         twist, middle, ahead, back = _at_rest(model, load)
         if ahead + back <= 2.0 * _weight_rounding(model):
@@ -261,7 +256,7 @@ def _load_breakaways(design: Design, model: Design) -> Iterator[Row]:
 
         found = edge(moves, wanted, side * BESIDE * N_r * held, wanted + side * 0.5 * N_r * held)
         allowed = N_r * (WITHIN * held + EXACT * abs(behind.offset_torque_Nm)) + EXACT * abs(own)
-        yield judged("load_breakaway_moment", "drive", wanted, found, allowed, unit=torque_unit(design),
+        yield judged("load_breakaway_moment", "drive", wanted, found, allowed, unit=design.load_unit,
                      condition=f"load at rest, {WAYS[side]}")  # fmt: skip
 
 

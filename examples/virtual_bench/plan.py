@@ -10,6 +10,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.design.plant import no_load_speed
 from actuator_lti.drive.facts import resonance_rad_s, steady_torque_Nm
+from actuator_lti.drive.operating import Operating, stiffness_there
 from actuator_lti.drive.steady import circuit_resistance_ohm, motor_torque_Nm
 from actuator_lti.errors import InputError
 from analyses.identification.two_mass import angle_responses
@@ -44,18 +45,18 @@ def plan_for(design: Design) -> TwoMassPlan:
         raise InputError('load.path = "self-locking": no moment keeps the coupling on its flank', design.name)
     if not design.load_side_inertia_kgm2 > 0.0:
         raise InputError("no inertia behind the coupling: there is no resonance", design.name)
-    resonance_hz = float(resonance_rad_s(design)) / (2.0 * pi)
+    current, speed = _continuous(design), SPEED_SHARE * _largest_speed(design)
+    moment = _moment(design, CURRENT_SHARE * current, speed)
+    resonance_hz = float(resonance_rad_s(design, moment)) / (2.0 * pi)
     tick = design.controller.period_s
     log = tick * max(int(1.0 / (LOG_RATE * resonance_hz * tick)), 1)
     period = log * round(SPACING / resonance_hz / log)
-    current = _continuous(design)
-    speed = SPEED_SHARE * _largest_speed(design)
     plan = TwoMassPlan(
         period_s=period,
         settle_s=5.0 * period,
         lowest_hz=1.0 / period,
         highest_hz=min(TOP * resonance_hz, 0.35 / log),
-        moment_Nm=_moment(design, CURRENT_SHARE * current, speed),
+        moment_Nm=moment,
         speed_rad_s=speed,
         log_period_s=log,
     )
@@ -88,11 +89,12 @@ def _line(design: Design, plan: TwoMassPlan) -> float:
     constant = design.effective_motor.torque_constant_Nm_A or 0.0
     coupling, friction = design.coupling, design.load.friction
     assert coupling is not None
+    stiffness = float(stiffness_there(design, Operating(load_Nm=plan.moment_Nm)))
     values = {
         "motor_inertia": design.motor_side_inertia_kgm2,
         "load_inertia": design.load_side_inertia_kgm2,
-        "stiffness": coupling.stiffness_Nm_rad,
-        "damping": max(coupling.damping_Nms_rad, 1e-3 * coupling.stiffness_Nm_rad * plan.log_period_s),
+        "stiffness": stiffness,
+        "damping": max(coupling.damping_Nms_rad, 1e-3 * stiffness * plan.log_period_s),
         "viscous": design.friction.viscous(),
         "load_viscous": 0.0 if friction is None else friction.viscous_Nms_rad,
     }

@@ -4,7 +4,7 @@ from actuator_lti.asked.verdict import Verdict
 from analyses.limit_cycles.run import AS_PREDICTED, CYCLES_WATCHED, LimitCycles
 from analyses.motion import settling
 from reports import document as doc
-from reports.sections.names import Unit, fine_unit, load_unit
+from reports.sections.names import Unit, fine_unit
 
 CAUSES = {
     "play": "play",
@@ -50,7 +50,7 @@ def summary(result: LimitCycles) -> str:
         Verdict.NOT_MET: "does not come to rest",
         Verdict.NOT_PROVEN: "is not known to come to rest",
     }[settling.verdict_of(result.design, swing)]
-    at = f"{swing.load_Nm:g} {load_unit(result.design)}"
+    at = f"{swing.load_Nm:g} {result.design.load_unit}"
     return f"The drive as it is {does}: {settling.words(swing.rest, *fine)} under {at}{tail}."
 
 
@@ -84,7 +84,7 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
 
     size = fine.column()
     columns = [
-        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("load_Nm", "load", "Load", result.design.load_unit, format="short:4"),
         doc.of("amplitude_rad", "step", "Step", **size),
         doc.of(end, "end", "Ends"),
         doc.of(lambda one: one.rest.amplitude or None, "size", "Output, peak", **size, better=-1),

@@ -9,7 +9,7 @@ from analyses.duty.run import Duty
 from reports import document as doc
 from reports.charts import style
 from reports.sections import requirements
-from reports.sections.names import load_unit, output_unit
+from reports.sections.names import output_unit
 
 _SHOWN = 400
 
@@ -28,7 +28,7 @@ def section(result: Duty) -> doc.Section:
     table = doc.table("What the duty asks of the motor", _COLUMNS, _rows(result), note)
     told = doc.severity(result.verdict)
     told = "warn" if told == "info" and result.limited else told
-    own = requirements.table(result.requirements, load_unit(result.design))
+    own = requirements.table(result.requirements, result.design.load_unit)
     blocks, words = [table, *own, _figure(result)], summary(result)
     return doc.section("duty", "Duty cycle", blocks, result=words, intro=intro, status=told, told=told)
 
@@ -50,7 +50,7 @@ _COLUMNS = [
 def asked_words(result: Duty) -> str:
     asked = result.asked
     words = f"±{output_unit(result.design.axis).of(asked.amplitude_rad)} at {asked.frequency_hz:.3g} Hz"
-    words += f" under {asked.load_Nm:.3g} {load_unit(result.design)}"
+    words += f" under {asked.load_Nm:.3g} {result.design.load_unit}"
     if asked.share < 1.0:
         words += f", {100.0 * asked.share:.3g} % of every {asked.cycle_s:.3g} s"
     return words

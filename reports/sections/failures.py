@@ -12,7 +12,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.numbers import seconds, short
 from reports.sections import requirements
-from reports.sections.names import Unit, load_unit, output_unit, push_words
+from reports.sections.names import Unit, output_unit, push_words
 
 NAMES = {
     "hard-over": "Hard-over of the power stage",
@@ -33,12 +33,12 @@ def section(result: Failures) -> doc.Section:
         held = f"does not come to rest, {told(result.design, swing, *out)},"
     intro = (
         f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} "
-        f"{load_unit(result.design)} (positive pushes forward). Deflection counts from where the output was; "
+        f"{result.design.load_unit} (positive pushes forward). Deflection counts from where the output was; "
         f"the stop is {out.of(asked.stop_rad, 4)} away, and detection takes {1e3 * asked.detection_s:.4g} "
         f"ms. The {push} is that in the coupling; in a rigid train the motor's, through the gears."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
-    own = requirements.table(result.requirements, load_unit(result.design))
+    own = requirements.table(result.requirements, result.design.load_unit)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]
     told_as: doc.Severity = "info" if verdict_of(result.design, swing) is Verdict.MET else "warn"
     status = "info" if result.verdict is None else doc.severity(result.verdict)
@@ -68,7 +68,7 @@ def summary(result: Failures) -> str:
 def _table(result: Failures, out: Unit) -> doc.Block:
     time, near = Unit(1e3, "ms").column("ms:3"), out.of(result.asked.deflection_rad, 4)
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
-    push, load = push_words(result.design), load_unit(result.design)
+    push, load = push_words(result.design), result.design.load_unit
     current = "peak_current_A" if result.design.motor.has_electrical_dynamics else lambda _case: None
     columns = [
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
@@ -102,7 +102,7 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
     push = push_words(result.design)
-    top.y.label, bottom.y.label = f"deflection, {out.unit}", f"{push}, {load_unit(result.design)}"
+    top.y.label, bottom.y.label = f"deflection, {out.unit}", f"{push}, {result.design.load_unit}"
     bottom.x.limits(0.0, last * per_s)
     both = f"Deflection of the output and {push}"
     return doc.figure("failures", chart, f"{both} in the train after each failure but the oscillation.")

@@ -15,7 +15,7 @@ from reports.charts.pen import HATCH_PATHS
 from reports.numbers import to_minus
 from reports.sections.loop_charts import both, nyquist_hz
 from reports.sections.margins import MARGIN_COLUMNS, evidence_notes, margin_row, response_row, worst_status
-from reports.sections.names import FORMS, POINTS, figure_column, hertz, load_unit, loop_words
+from reports.sections.names import FORMS, POINTS, figure_column, hertz, loop_words
 
 COLUMNS = [
     doc.column("loop", "Loop"),
@@ -143,7 +143,7 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
     linear = design.axis == "linear"
     columns = [
         doc.column("point", "Operating point"),
-        doc.column("load", "Load", load_unit(design), format="short:3"),
+        doc.column("load", "Load", design.load_unit, format="short:3"),
         doc.column("slope", "Friction slope", "N s/m" if linear else "mN m s/rad", format="sig:3"),
     ]
     columns += [

@@ -11,7 +11,7 @@ from analyses.motion.settling import words as end_words
 from nonlinear.bench.operating_motion import quiet
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit, fine_unit, load_unit
+from reports.sections.names import Unit, fine_unit
 from reports.verdict_summary import tally
 
 ROUNDING = 1e-9  # of the triangle's amplitude: a width that is none
@@ -22,7 +22,7 @@ def section(result: FrictionEffects) -> doc.Section:
     id, title, design = "friction-effects", "Dry friction at small signals", result.design
     if not result.points:
         return doc.section(id, title, [], result=f"Not applicable: {result.reason}.")
-    fine, load = fine_unit(design.axis), load_unit(design)
+    fine, load = fine_unit(design.axis), design.load_unit
     items = [_cycle_verdict(design, point, fine, load) for point in result.points]
     tables = [_threshold_table(result, fine, load), *_figure(result, fine, load)]
     blocks = [doc.verdicts(items, what="checks"), *tables, _settling_table(result, fine, load)]
@@ -208,7 +208,7 @@ def _summary(result: FrictionEffects, fine: Unit) -> str:
         return f"Friction alone keeps the drive from rest after a step: {told(result.design, swing, *fine)}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):
         most = max(settlings, key=lambda one: abs(one.rest.error))
-        under = f", at a load of {most.load_Nm:g} {load_unit(result.design)}" if most.load_Nm else ""
+        under = f", at a load of {most.load_Nm:g} {result.design.load_unit}" if most.load_Nm else ""
         size = fine.of(abs(most.rest.error))
         return f"{_integrates(result)}; an error of up to {size} is left at rest{under}."
     if not result.integrator:

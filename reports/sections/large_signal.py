@@ -21,7 +21,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant
 from reports.sections.limits import map_chart, words_of
-from reports.sections.names import Unit, figure_column, load_unit, output_unit
+from reports.sections.names import Unit, figure_column, output_unit
 from reports.verdict_summary import tally
 
 
@@ -35,7 +35,7 @@ def section(result: LargeSignals) -> doc.Section:
     if result.shift is not None:
         blocks.append(doc.details("The linear limit in numbers", [_shift_table(result.shift, design, out)]))
     blocks.append(_bode_figure(bode, out, design.validation.full_deflection_rad))
-    blocks += [_bode_table(bode, out, design), _sawtooth(result.sawtooth, out, load_unit(design))]
+    blocks += [_bode_table(bode, out, design), _sawtooth(result.sawtooth, out, design.load_unit)]
     intro = (
         "Each point of the map is one sine command, simulated until steady. Below the lines the linear "
         "model holds. Above them the limit that is reached first determines the output."

@@ -16,7 +16,7 @@ from analyses.specification.weakest import Spread, figures_of, spread
 from reports import document as doc
 from reports.numbers import fixed, gain_margin, short, to_minus
 from reports.sections import measured, requirements
-from reports.sections.names import FORMS, LOOPS, figure_column, load_unit, loop_words
+from reports.sections.names import FORMS, LOOPS, figure_column, loop_words
 from reports.terminal import Brief, side_by_side
 
 EVIDENCE: dict[str, doc.State] = {
@@ -97,7 +97,7 @@ CROSSING_COLUMNS = [
 
 def section(result: Margins) -> list[doc.Section]:
     """Make the sections from `analyses.margins.margins`: the loops as asked for, the requirements."""
-    judged, known = requirements.section(result.requirements, load_unit(result.design)), _named(result)
+    judged, known = requirements.section(result.requirements, result.design.load_unit), _named(result)
     how = f"{FORMS[result.asked.form].capitalize()}; {_where(result)}. "
     made = _loops(known, result.operating_points, how)
     made["blocks"] += map(doc.text, _notes(result, known))
@@ -140,7 +140,7 @@ def _below_custom(result: Margins) -> str:
 
 
 def _where(result: Margins) -> str:
-    point, load = result.asked.operating_point, f"load {result.asked.load_Nm:g} {load_unit(result.design)}"
+    point, load = result.asked.operating_point, f"load {result.asked.load_Nm:g} {result.design.load_unit}"
     return f"{at_rest(result.design) if point == 'rest' else point}, {load}"
 
 

@@ -30,7 +30,7 @@ def section(result: MonteCarloResult) -> doc.Section:
     blocks: list[doc.Block] = [doc.verdicts(items, what="odds")] if items else []
     blocks += [_odds_table(result), *_figures(result)] if result.odds else []
     blocks += [_driver_table(result)] if result.drivers else []
-    blocks.append(_figure_table(result.columns.values()))
+    blocks.append(_figure_table(result.columns.values(), result.load_unit))
     blocks += [doc.details("Parameters of the worst cases", [_worst_table(result)])] if result.worst else []
     blocks += map(doc.remark, result.notes)
     blocks.append(doc.facts([doc.fact("Samples", result.samples), doc.fact("Seed", result.seed)]))
@@ -49,7 +49,7 @@ def brief(result: MonteCarloResult) -> Brief:
     tables = [doc.with_columns(_odds_table(result), kept)] if result.odds else []
     if stepped := [one for one in result.columns.values() if one.name.startswith("nonlinear.")]:
         shown = ("figure", "unit", "minimum", "q50", "maximum", "missing")
-        tables.append(doc.with_columns(_figure_table(stepped, "Nonlinear step"), shown))
+        tables.append(doc.with_columns(_figure_table(stepped, result.load_unit, "Nonlinear step"), shown))
     reasons: dict[str, list[str]] = {}
     for one in _verdicts(result):
         if one["verdict"] != Verdict.MET:
@@ -157,7 +157,7 @@ def _odds_table(result: MonteCarloResult) -> doc.Block:
 
 
 def _figure_table(
-    columns: Iterable[ColumnStatistics], title: str = "Distribution of every figure"
+    columns: Iterable[ColumnStatistics], load_unit: str, title: str = "Distribution of every figure"
 ) -> doc.Block:
     def quantile(percent: int, c: ColumnStatistics) -> float | None:
         return in_shown(dict(zip(c.shares, c.quantiles, strict=True)).get(percent / 100), c.unit)
@@ -166,7 +166,7 @@ def _figure_table(
         return in_shown(getattr(c, name), c.unit)
 
     shown = [
-        doc.of(lambda c: _words(c.name), "figure", "Figure"),
+        doc.of(lambda c: _words(c.name, load_unit), "figure", "Figure"),
         doc.of(lambda c: shown_unit(c.unit)[0], "unit", "Unit"),
         doc.of(partial(value, "minimum"), "minimum", "Min", format="sig:4"),
         *(doc.of(partial(quantile, q), f"q{q:02d}", f"{q} %", format="sig:4") for q in _SHOWN),
@@ -181,16 +181,16 @@ def _figure_table(
     return doc.listing(title, columns, shown, note)
 
 
-def _words(name: str) -> str:
+def _words(name: str, load_unit: str) -> str:
     """Name a column for people.
 
-    >>> _words("position.phase_margin"), _words("drive.output_rate@8")
+    >>> _words("position.phase_margin", "N m"), _words("drive.output_rate@8", "N m")
     ('position loop: phase margin', 'drive: output rate at 8 N m')
     """
     where, _, what = name.partition(".")
     figure, _, load = what.replace("_", " ").partition("@")
     place = {"drive": "drive", "nonlinear": "nonlinear step"}.get(where, f"{where} loop")
-    return f"{place}: {figure}" + (f" at {load} N m" if load else "")
+    return f"{place}: {figure}" + (f" at {load} {load_unit}" if load else "")
 
 
 def _figures(result: MonteCarloResult) -> list[doc.Block]:
@@ -201,8 +201,8 @@ def _figures(result: MonteCarloResult) -> list[doc.Block]:
         part = shown[row * len(shown) // rows : (row + 1) * len(shown) // rows]
         chart = style.Chart(width=style.WIDE, height=250.0, legend=True)
         for odds, column in part:
-            _histogram(chart.panel(title=_words(column.name)), result, odds, column)
-        names = ", ".join(_words(column.name) for _, column in part)
+            _histogram(chart.panel(title=_words(column.name, result.load_unit)), result, odds, column)
+        names = ", ".join(_words(column.name, result.load_unit) for _, column in part)
         blocks.append(doc.figure("distribution", chart, f"Distribution within the tolerances: {names}."))
     return blocks
 
@@ -251,7 +251,7 @@ def _driver_table(result: MonteCarloResult) -> doc.Block:
 
     places = enumerate((("first", "Driven most by"), ("second", "then by"), ("third", "then by")))
     columns = [
-        doc.of(lambda item: _words(item[0]), "figure", "Figure"),
+        doc.of(lambda item: _words(item[0], result.load_unit), "figure", "Figure"),
         *(doc.of(partial(driver, k), key, label) for k, (key, label) in places),
         doc.of(lambda item: shown_unit(result.columns[item[0]].unit)[0], "unit", "Unit"),
     ]

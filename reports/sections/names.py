@@ -65,10 +65,6 @@ def speed_unit(axis: str) -> str:
     return "m/s" if axis == "linear" else "rad/s"
 
 
-def load_unit(design: Design) -> str:
-    return "N" if design.axis == "linear" else "N m"
-
-
 def push_words(design: Design) -> str:
     return "force" if design.axis == "linear" else "torque"
 

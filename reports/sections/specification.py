@@ -10,7 +10,7 @@ from reports import document as doc
 from reports.charts import style
 from reports.numbers import short, significant
 from reports.sections.limits import words_of
-from reports.sections.names import Unit, load_unit, output_unit
+from reports.sections.names import Unit, output_unit
 
 ALIKE = 0.05  # relative: closed form and simulation are not told apart in the headline
 BOUND_COLOURS = {
@@ -31,7 +31,7 @@ def section(result: Specification) -> doc.Section:
     words, told = _result(result), list[doc.Finding]()
     for one in result.capabilities:
         if one.duty is not None and one.duty < 0.995:
-            load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
+            load = f"{one.figures.load_Nm:g} {result.design.load_unit}"
             text = f"At {load} load the continuous current allows a duty of {100.0 * one.duty:.0f} %."
             told.append(doc.Finding(severity="warn", text=text, where="specification"))
     return doc.section("specification", "Actuator figures", blocks, result=words, intro=intro, findings=told)
@@ -53,7 +53,7 @@ def _result(result: Specification) -> str:
             unlike = found is not None and abs(found - value) > ALIKE * abs(value)
             also = f" (simulated {significant(scale * found)})" if found is not None and unlike else ""
             parts.append(f"{significant(scale * value)} {per}{also}")
-    load = f"{one.figures.load_Nm:g} {load_unit(result.design)}"
+    load = f"{one.figures.load_Nm:g} {result.design.load_unit}"
     words = f"At {load} load the output reaches {' and '.join(parts)}."
     asked = ((limits.rate_rad_s, rate), (limits.acceleration_rad_s2, push))
     most = [f"{significant(scale * value)} {per}" for value, per in asked if math.isfinite(value)]
@@ -64,7 +64,7 @@ def _capability_table(result: Specification) -> doc.Block:
     out, share = output_unit(result.design.axis), Unit(100.0, "%").column()
     rate, push = out.per("s").column("sig:4"), out.per("s²").column("sig:4")
     columns = [
-        doc.of("figures.load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("figures.load_Nm", "load", "Load", result.design.load_unit, format="short:4"),
         doc.of("figures.output_rate_rad_s", "rate", "Rate", **rate, better=1),
         doc.of("simulated_rate_rad_s", "rate_seen", "Simulated", **rate),
         doc.of("figures.rate_limit", "by", "Set by"),
@@ -91,7 +91,7 @@ def _planes(result: Specification) -> list[doc.Block]:
     linear = result.design.axis == "linear"
     fast, speed_label = (1.0, "speed, m/s") if linear else (60.0 / (2.0 * math.pi), "motor speed, rpm")
     strong, torque_label = (1.0, "force, N") if linear else (1e3, "motor torque, mN m")
-    unit = load_unit(result.design)
+    unit = result.design.load_unit
     blocks = []
     for one in result.capabilities:
         load = one.figures.load_Nm
@@ -172,7 +172,7 @@ def _manoeuvre_table(result: Specification) -> doc.Block:
     ]
     columns = [
         doc.of("name", "name", "Manoeuvre"),
-        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("load_Nm", "load", "Load", result.design.load_unit, format="short:4"),
         *(of_current if result.design.motor.has_electrical_dynamics else of_force),
         doc.of(limits, "limits", "Limits that act"),
     ]
@@ -183,7 +183,7 @@ def _manoeuvre_table(result: Specification) -> doc.Block:
 def _step_table(result: Specification) -> doc.Block:
     scale, unit = output_unit(result.design.axis)
     columns = [
-        doc.of("load_Nm", "load", "Load", load_unit(result.design), format="short:4"),
+        doc.of("load_Nm", "load", "Load", result.design.load_unit, format="short:4"),
         doc.of("amplitude_rad", "step", "Step", unit, scale=scale, format="sig:3"),
         doc.of("fraction", "fraction", "of full", "%", scale=100.0, format="sig:2"),
         doc.of("rise_time_s", "rise", "Rise 10–90 %", "ms", scale=1e3, format="ms:3", better=-1),

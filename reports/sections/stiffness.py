@@ -11,7 +11,7 @@ from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short
-from reports.sections.names import load_unit, output_unit, push_words
+from reports.sections.names import output_unit, push_words
 
 STATES = {
     "powered": "powered, command held",
@@ -25,7 +25,7 @@ def of_design(design: Design) -> doc.Section:
 
 
 def section(result: Stiffness) -> doc.Section:
-    unit = f"{load_unit(result.design)}/{'m' if result.design.axis == 'linear' else 'rad'}"
+    unit = f"{result.design.load_unit}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [
         *(*_figure(result, unit), _table(result, unit)),
         *([_lost_motion(result)] if result.lost_motion else []),
@@ -99,7 +99,7 @@ def _state(result: Stiffness, curve: StiffnessCurve) -> str:
 
 def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
     loaded = any(one.load_Nm for one in result.curves)
-    return f", {curve.load_Nm:g} {load_unit(result.design)}" * loaded
+    return f", {curve.load_Nm:g} {result.design.load_unit}" * loaded
 
 
 def _or_infinite(stiffness: float) -> float | str:
@@ -130,7 +130,7 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
         "Fundamental of the simulated drive as it is, with its dry friction, play and quantisation, the "
         "command held. No value: the output does not move."
     )
-    of_load = load_unit(result.design)
+    of_load = result.design.load_unit
     columns = [
         doc.of("moment_Nm", "moment", f"Load {push_words(result.design)}, peak", of_load, format="sig:3"),
         doc.of("frequency_hz", "frequency_hz", "Frequency", "Hz", format="sig:3"),

@@ -13,16 +13,16 @@ from analyses.tuning.result import BindingRequirement, TuningResult
 from nonlinear.runs.trajectory import COMMAND_UNITS
 from reports import document as doc
 from reports.charts import style
-from reports.sections.names import Unit, load_unit
+from reports.sections.names import Unit
 from reports.sections.requirements import item, label, table
 
 
 def section(result: TuningResult) -> doc.Section:
-    others = (item(one, load_unit(result.before)) for one in result.others)
+    others = (item(one, result.before.load_unit) for one in result.others)
     verdicts = doc.verdicts([*(_verdict(r, result.before) for r in result.requirements), *others])
     blocks: list[doc.Block] = [
         *(verdicts, gains(result)),
-        *table(result.confirmed, load_unit(result.before), "Confirmed by certified margins"),
+        *table(result.confirmed, result.before.load_unit, "Confirmed by certified margins"),
         *([_curve(result)] if result.trade_off else []),
         *([checks(result)] if result.checks else []),
         *(doc.remark(note) for note in result.notes),
@@ -46,7 +46,7 @@ def summary(result: TuningResult) -> str:
         told.append("The tuned design meets every other requirement.")
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
         open_ones = (one for one in result.others if one.verdict == word and not one.passes)
-        names = "; ".join(label(one, load_unit(result.before)) for one in open_ones)
+        names = "; ".join(label(one, result.before.load_unit) for one in open_ones)
         told += [f"{word.capitalize()}, and not searched for: {names}."] if names else []
     return " ".join(told)
 

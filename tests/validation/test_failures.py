@@ -13,7 +13,7 @@ from actuator_lti.design import load_design, with_overrides
 from actuator_lti.design.model import Load, PositionLoop
 from analyses.failures import Asked, failures
 from analyses.failures.cases import Rig, _sines, cases_of
-from analyses.failures.run import MOST_TICKS, _hold, _settling_s
+from analyses.failures.run import MOST_TICKS, _hold, _settling_s, _worse
 from nonlinear import commands, simulate
 from reports.charts.svg import draw_svg
 from reports.sections.failures import section, summary
@@ -220,3 +220,12 @@ def test_the_headline_names_what_reaches_the_stop_first() -> None:
     assert summary(replace(found, cases=late)).startswith("Lost sensor moves the output most")
     told = summary(replace(found, cases=late[:1]))
     assert told.endswith("detected: 4 deg in 100 ms; it reaches the stop after 200 ms.")
+
+
+def test_of_several_sines_each_peak_is_the_largest() -> None:
+    """The one that deflects most need not ask for the largest torque."""
+    case = failures(AMBER, Asked.of(AMBER, watched_s=0.1)).case("hard-over")
+    wide = replace(case, at_detection_rad=2.0, peak_moment_Nm=1.0, peak_current_A=1.0)
+    strong = replace(case, at_detection_rad=1.0, peak_moment_Nm=3.0, peak_current_A=4.0)
+    for one in (_worse(wide, strong), _worse(strong, wide)):
+        assert (one.at_detection_rad, one.peak_moment_Nm, one.peak_current_A) == (2.0, 3.0, 4.0)

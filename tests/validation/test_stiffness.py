@@ -12,6 +12,7 @@ from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design, with_overrides, write_design
 from actuator_lti.design.model import Load
+from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
 from analyses.stiffness import (
@@ -186,6 +187,8 @@ def test_a_load_chooses_the_piece_of_a_spring_that_bends() -> None:
     powered = [curve for curve in stiffness_curves(design) if curve.state == "powered"]
     assert [curve.load_Nm for curve in powered] == [0.0, -8.0]
     assert [curve.static_Nm_rad for curve in powered] == pytest.approx([370.0, 870.0], rel=1e-6)
+    rising = resonance_rad_s(design, -8.0) / resonance_rad_s(design)
+    assert rising == pytest.approx(np.sqrt(900.0 / 400.0), rel=1e-12)
     made = section(stiffness(design, simulated=False))
     assert made["result"].startswith("Powered, 0 N m, the static stiffness is 370")
     for load_Nm, value in ((0.0, 370.0), (8.0, 870.0)):
