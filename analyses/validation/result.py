@@ -30,9 +30,8 @@ class Validation:
     """Everything the nonlinear simulator says of a design's predictions."""
 
     design: Design
-    rows: tuple[
-        Row, ...
-    ]  # every check: small signals by the tangent, the runs in time, numbers of the design
+    # Every check: small signals by the tangent, the runs in time, the numbers of the design
+    rows: tuple[Row, ...]
     figures: Mapping[str, LoopFigures]  # linear loops, as they are tested (the current's with a locked rotor)
     # The same as `analyses.margins` judges them: sliding, of the current with the rotor free
     loops: Mapping[str, LoopFigures] = field(default_factory=dict)
