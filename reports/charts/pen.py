@@ -13,6 +13,7 @@ from reports.charts.labels import LINE_EM
 from reports.visible import escape
 
 FAR = 1e5
+_VARIABLES = {name: f"var(--{name},{colour})" for name, colour in COLOURS.items()}
 DASHES = ("", "9 4", "3 3", "10 4 2.5 4", "1.5 2.5", "14 5", "6 2.5")  # lengths of dash and gap
 MARKER_PATHS = {
     "o": "M-1 0a1 1 0 1 0 2 0a1 1 0 1 0-2 0z",
@@ -74,11 +75,13 @@ class Pen:
 
     def style(self, **wanted: str) -> str:
         """Write colours and widths: as style on a page, where variables count, else as attributes."""
-        said = [(key.replace("_", "-"), value) for key, value in wanted.items() if value != ""]
-        if not self.page:
-            return " ".join(f'{key}="{COLOURS.get(value, value)}"' for key, value in said)
-        variables = {name: f"var(--{name},{colour})" for name, colour in COLOURS.items()}
-        return 'style="' + ";".join(f"{key}:{variables.get(value, value)}" for key, value in said) + '"'
+        colours = _VARIABLES if self.page else COLOURS
+        said = [
+            (key.replace("_", "-"), colours.get(value, value)) for key, value in wanted.items() if value != ""
+        ]
+        if self.page:
+            return 'style="' + ";".join(f"{key}:{value}" for key, value in said) + '"'
+        return " ".join(f'{key}="{value}"' for key, value in said)
 
     def line(self, path: str, look: Look, more: str = "") -> str:
         stroke = self.style(
