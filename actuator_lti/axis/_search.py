@@ -37,9 +37,13 @@ def _far(bounds):
 def _clear(kind, level, listed_to, slack, low, bounds):
     if kind != CIRCLE:
         return one_way(bounds, kind) or bounds[kind] > level or bounds[MOST + kind] < level
-    if not one_way(bounds, 0) and not bounds[0] > slack and not bounds[MOST] < -slack:
+    off_circle = bounds[0] > slack or bounds[MOST] < -slack
+    if not one_way(bounds, 0) and not off_circle:
         return False
-    if one_way(bounds, 1) or _far(bounds) or low >= listed_to:
+    if low >= listed_to:  # only counted, where the gain is above one
+        if off_circle:
+            return True
+    elif one_way(bounds, 1) or _far(bounds):
         return True
     return half_turns(bounds[1] - slack) == half_turns(bounds[MOST + 1] + slack)
 

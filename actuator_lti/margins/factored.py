@@ -67,7 +67,7 @@ def factored(loop: RationalLoop, poles: SortedPoles | None = None) -> Factored:
     roots = np.concatenate((above, below))
     weights = np.concatenate((np.ones(above.size), -np.ones(below.size)))
     with np.errstate(all="ignore"):
-        return _fitted(with_delay(roots, weights, loop), loop, below)
+        return _fitted(with_delay(roots, weights, loop), loop, roots)
 
 
 def with_delay(roots: Complex, weights: Real, loop: RationalLoop) -> Factored:
@@ -78,8 +78,9 @@ def with_delay(roots: Complex, weights: Real, loop: RationalLoop) -> Factored:
     return Factored(roots, weights, delay, slack=_LEAST_SLACK)
 
 
-def _fitted(factors: Factored, loop: RationalLoop, poles: Complex) -> Factored:
-    size = np.abs(poles[poles.imag >= 0.0])
+def _fitted(factors: Factored, loop: RationalLoop, places: Complex) -> Factored:
+    """With gain and phase of the loop, which they have to follow beside each pole and zero and beyond."""
+    size = np.abs(places[places.imag >= 0.0])
     size = size[size > 0.0]
     w = np.array([0.5, 2.0])
     if size.size:

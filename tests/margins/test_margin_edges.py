@@ -3,6 +3,7 @@
 import math
 
 import control
+import mpmath
 import numpy as np
 import pytest
 from margin_truth import difference, towards_the_border, truth_of
@@ -136,6 +137,17 @@ def test_band_limits_the_lists_and_not_the_verdict() -> None:
     assert part.modulus_margin == whole.modulus_margin
 
 
+@pytest.mark.parametrize("kw", [0.5, 2.0, 30.0, 3e4])
+@pytest.mark.parametrize("to", [0.3, 3.0, 300.0])
+def test_a_band_below_the_crossover_of_a_delayed_loop_counts_what_it_does_not_list(kw: float, to: float) -> None:
+    """kw e^-s/s: stable up to kw = pi/2, and crossings of the negative axis at pi/2 + 2 pi k."""
+    m = stability_margins(control.tf([kw], [1.0, 0.0]), delay_s=1.0, band_rad_s=(0.0, to))
+    assert (m.stable, m.evidence) == (kw < math.pi / 2.0, "checked")
+    at = [w for w in math.pi * (0.5 + 2.0 * np.arange(60)) if w < to]
+    assert [g.frequency_rad_s for g in m.gain_margins] == pytest.approx(at, rel=1e-12)
+    assert [g.ratio for g in m.gain_margins] == pytest.approx([w / kw for w in at], rel=1e-12)
+
+
 def test_unspecified_period_counts_as_one_second() -> None:
     m = stability_margins(control.tf([0.5], [1, 0], True))
     assert m.gain_margins[0].frequency_rad_s == pytest.approx(math.pi)
@@ -261,3 +273,25 @@ def test_a_gain_margin_at_rest_has_its_digits_where_states_that_are_0_there_weig
     series = DelaySystem.from_system(control.tf(num, den)) * DelaySystem.delay(1e-3)
     ratios = [g.ratio for g in stability_margins(series).gain_margins if g.frequency_rad_s == 0.0]
     assert ratios == [pytest.approx(2.77795264e12 / 2.94665573e3, rel=1e-12)]
+
+
+def test_zeros_far_slower_than_the_poles_are_those_of_the_loop() -> None:
+    """A slow pair of zeros that matrices place only to some digits: the crossing beside them was lost."""
+    num = [1.49976e20, 3.49879e18, 6.86855e13, 3.83488e11]
+    den = [1.0, 6.88842e5, 5.92257e10, 1.32449e16, 6.79649e15, 5.49615e17]
+    late = 3.74872e-6
+
+    def response(w: mpmath.mpf) -> mpmath.mpc:
+        p = mpmath.mpc(0.0, w)
+        return np.polyval(num, p) / np.polyval(den, p) * mpmath.exp(-late * p)
+
+    with mpmath.workdps(40):
+        at = mpmath.findroot(lambda w: mpmath.im(response(w)), 6.8e-4)
+        ratio = -1.0 / mpmath.re(response(at))
+    system = control.tf(num, den)
+    for m in (
+        stability_margins(system, late, (0.0, 1.0)),
+        stability_margins(DelaySystem.from_system(system) * DelaySystem.delay(late), 0.0, (0.0, 1.0)),
+    ):
+        (margin,) = m.gain_margins
+        assert (margin.frequency_rad_s, margin.ratio) == pytest.approx((float(at), float(ratio)), rel=1e-6)
