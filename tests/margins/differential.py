@@ -185,7 +185,8 @@ def delayed_forms(
             beyond = behind_delay(loop, delay_s, 3.0 * MOST_RAD / delay_s)
             yield "nearest of delay_s", nearest(facts(one)), nearest(beyond), far
     others = {
-        "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s))
+        "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s)),
+        "a band": partial(stability_margins, loop, delay_s, (0.0, one.band_rad_s[1] * rng.random())),
     }
     if rng.random() < CERTIFIED_LATE:
         others["certified"] = partial(stability_margins, loop, delay_s=delay_s, certify=True)

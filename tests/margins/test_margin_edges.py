@@ -139,7 +139,7 @@ def test_band_limits_the_lists_and_not_the_verdict() -> None:
 
 @pytest.mark.parametrize("kw", [0.5, 2.0, 30.0, 3e4])
 @pytest.mark.parametrize("to", [0.3, 3.0, 300.0])
-def test_a_band_below_the_crossover_of_a_delayed_loop_counts_what_it_does_not_list(kw: float, to: float) -> None:
+def test_what_a_band_does_not_list_behind_a_delay_counts(kw: float, to: float) -> None:
     """kw e^-s/s: stable up to kw = pi/2, and crossings of the negative axis at pi/2 + 2 pi k."""
     m = stability_margins(control.tf([kw], [1.0, 0.0]), delay_s=1.0, band_rad_s=(0.0, to))
     assert (m.stable, m.evidence) == (kw < math.pi / 2.0, "checked")
