@@ -186,9 +186,9 @@ def delayed_forms(
             yield "nearest of delay_s", nearest(facts(one)), nearest(beyond), far
     end = top * rng.random()
     if not (part := stability_margins(loop, delay_s, (0.0, end))).withheld:
-        whole = below(facts(one), end)
+        whole, far = below(facts(one), end), 30.0 if leaves_out(one) or leaves_out(part) else FAR
         listed = replace(whole, phases=[p for p in whole.phases if p[0] < end])
-        yield "delay_s within a band", facts(part), listed, 30.0 if leaves_out(one) or leaves_out(part) else FAR
+        yield "delay_s within a band", facts(part), listed, far
     others = {
         "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s)),
     }
