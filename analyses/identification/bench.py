@@ -90,8 +90,8 @@ def identify_bench(
             judged = _judged(plain, by_voltage(plain, used, recipe)[0])
             findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
         if all(stands(plain, record, recipe) for record in used):
-            told = "no motion beyond noise: inertia and friction take a record that moves"
-            raise InputError(f"{told}; of a motor held fast --electrical tells R and L", names_of(used))
+            still = "no motion beyond noise: inertia and friction take a record that moves"
+            raise InputError(f"{still}; of a motor held fast --electrical tells R and L", names_of(used))
     with because(findings):
         found = motor_and_motion(design, plain, used, settings, recipe)
     start, electrical, right = found.start, found.electrical, found.right
