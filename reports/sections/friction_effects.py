@@ -206,7 +206,8 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
 def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if (swing := noticed(result.design, settlings)) is not None:
-        return f"Without counts and noise too a step does not come to rest: {told(result.design, swing, *fine)}."
+        why = told(result.design, swing, *fine)
+        return f"Without counts and noise too a step does not come to rest: {why}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {result.design.load_unit}" if most.load_Nm else ""
