@@ -195,6 +195,17 @@ def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
     assert float(beyond) > int(periods) / float(hertz) > 100.0
 
 
+def test_what_diverges_only_after_the_run_says_so() -> None:
+    """Twice what the back-drivable joint holds carries it off; in the first tick nothing has moved yet."""
+    joint = load_design("joint")
+    most = 2.0 * joint.limits.peak_current_A * joint.motor.torque_constant_Nm_A * joint.total_ratio
+    run = simulate(joint, commands.step(0.01), 1e-3, load_Nm=-most)
+    assert np.abs(run.output_angle_rad).max() < 0.1
+    ended = conduct(run)
+    assert ended.status == "diverging"
+    assert re.fullmatch(r"followed for \S+ s beyond the run", ended.later)
+
+
 SPEED_DRIVE = """[design]
 name = "turning"
 [motor]
