@@ -29,7 +29,7 @@ from analyses.identification.joint_model import JointModel, LawChoice
 from analyses.identification.motor_and_motion import by_voltage, held_values, motor_and_motion, names_of
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.residuals import ResidualTest, residual_tests
-from analyses.identification.rows import is_loaded, recipe_for
+from analyses.identification.rows import is_loaded, recipe_for, stands
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import Record, prepared
@@ -89,6 +89,9 @@ def identify_bench(
         if settings.electrical:
             judged = _judged(plain, by_voltage(plain, used, recipe)[0])
             findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
+        if all(stands(plain, record, recipe) for record in used):
+            still = "no motion beyond noise: inertia and friction take a record that moves"
+            raise InputError(f"{still}; of a motor held fast --electrical tells R and L", names_of(used))
     with because(findings):
         found = motor_and_motion(design, plain, used, settings, recipe)
     start, electrical, right = found.start, found.electrical, found.right

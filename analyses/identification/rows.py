@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.fft import rfft, rfftfreq
 from scipy.ndimage import minimum_filter1d
+from scipy.stats import f as variance_ratio
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
@@ -23,6 +25,7 @@ REST_SHARE = 0.005
 REST_TIME_S = 0.03
 END_SHARE = 0.02
 SHORTEST_S = 0.2
+NO_CHANCE = 1e-3
 
 
 def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
@@ -92,6 +95,24 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     made = recipe.motion(record[rate], period)
     whole = np.concatenate([[0.0], np.cumsum(made.position[:-1] * period)])
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
+
+
+def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
+    """Whether a record shows no motion: nothing but noise, as much above the recipe's cut-off as below it.
+
+    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
+    """
+    place, rate = place_of(design, record), RATES[design.axis]
+    if place is None and rate not in record.signals:
+        return False
+    values = record[rate] if place is None else place[1] - place[1].mean()
+    power = np.abs(rfft(values)) ** 2
+    below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
+    count, rest = np.count_nonzero(below), np.count_nonzero(~below)
+    if not rest:
+        return not np.any(values)
+    most = float(variance_ratio.isf(NO_CHANCE, 2 * count, 2 * rest))
+    return bool(power[below].mean() <= most * power[~below].mean())
 
 
 def moment_of(

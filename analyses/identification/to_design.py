@@ -152,7 +152,11 @@ def _possible(fit: Fit) -> Fit:
 
 
 def with_correlations(design: Design, fit: Fit) -> Design:
-    """The design with the correlations of a fit in the place of those between the same keys."""
+    """The design with the correlations of a fit in the place of those between the same keys.
+
+    A value that the design did not take (`_possible`) has no tolerance, and none of them.
+    """
+    fit = fit.renamed({n: n for n in fit.names if n in design.parameters and design.parameters[n].tolerance})
     kept = [c for c in design.correlations if not {c.first, c.second} <= set(fit.names)]
     return replace(design, correlations=(*kept, *_correlations(fit.names, fit.correlation)))
 
