@@ -149,6 +149,9 @@ def test_it_stays_as_it_is_while_the_rest_moves(stage: str) -> None:
     assert others | {f"control.{stage}.law.gain"} <= free
     assert "control.period" in fixed
     assert f"control.{stage}.gain" not in free | fixed
+    fixed_by = {key["path"]: key["why"] for key in page["fixed"]}  # a step of the speed needs a velocity loop
+    refused = [path for path, why in fixed_by.items() if why == "allowed: 0 without a velocity loop"]
+    assert bool(refused) is (design.controller.velocity is None)
     gains = rule_gains(design).values
     assert others <= set(gains)
     assert not any(path.startswith(f"control.{stage}.") for path in gains)
