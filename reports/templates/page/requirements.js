@@ -34,7 +34,7 @@ export const state = () => {
   const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => (item.loop ? `${item.words} of the ${placed(item).toLowerCase()}` : `${item.words} ${placed(item)}`.trim())), more = fails.length + open.length - named.length;
   if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
-  if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
+  if (data.apart.length) words.push(`${data.apart.length} ${data.apart.length === 1 ? "does" : "do"} not follow the sliders: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
   if (refused) words.push(refused);
   line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
   line.textContent = words.join(" ");
