@@ -195,22 +195,30 @@ def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tu
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:
     """Keys of the design file that differ; names and texts of the head do not count."""
-    before, after = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
+    before, after = keys_of(base), keys_of(other)
     return tuple(
         Changed(key, before.get(key, "–"), after.get(key, "–"))
         for key in {**before, **after}
-        if before.get(key) != after.get(key) and not key.startswith(("design.", "requirement", "fact"))
+        if before.get(key) != after.get(key) and not key.startswith("requirement")
     )
 
 
+def keys_of(design: Design) -> dict[str, str]:
+    """What a design file says as texts, by dotted key; names and texts of the head and facts do not count."""
+    leaves = _flat(design_tree(design))
+    return {key: text for key, text in leaves if not key.startswith(("design.", "fact"))}
+
+
 def _flat(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Leaves of a design tree as texts, by dotted key; an entry with a value is one leaf."""
+    """Leaves of a design tree as texts, by dotted key; of an entry its value and its tolerance."""
     if isinstance(tree, Mapping) and "value" not in tree:
         below = list(tree.items())
     elif isinstance(tree, list) and tree and all(isinstance(item, Mapping) for item in tree):
-        below = [(item.get("name") or item.get("id") or k, item) for k, item in enumerate(tree)]
+        below = [(item.get("name") or item.get("id") or k, item) for k, item in enumerate(tree, 1)]
     else:
         yield path, str(tree["value"] if isinstance(tree, Mapping) else tree)
+        if isinstance(tree, Mapping) and "tolerance" in tree:
+            yield f"{path}.tolerance", str(tree["tolerance"])
         return
     for key, item in below:
         yield from _flat(item, f"{path}.{key}" if path else key)

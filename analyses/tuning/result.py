@@ -19,7 +19,6 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, judged, tally
-from analyses.studies.sampling import as_values
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
 
@@ -154,12 +153,14 @@ def hunting(tuned: Design) -> str:
     return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
-def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> Iterator[NonlinearCheck]:
+def nonlinear_checks(
+    tuned: Design, problem: Problem, gains: Floats, result: Floats
+) -> Iterator[NonlinearCheck]:
     """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
-    values = as_values(tuned, [f.path for f in problem.factors], points)
+    values = problem.values_at(gains[None, :], points, problem.factors)
     population = Population(tuned, values, len(names))
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)

@@ -7,9 +7,10 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
+from actuator_lti.design import with_overrides
 from actuator_lti.design.model import Requirement
 from analyses.comparison.found import LargeSignal, figure_names
-from analyses.comparison.variants import compare
+from analyses.comparison.variants import changes, compare
 from analyses.specification.sensitivity import sensitivities
 from analyses.studies.study import load_study, study_of, study_or_design
 from reports.sections.compare import batches, brief, ledger, section
@@ -140,6 +141,12 @@ def test_variants_differ_by_what_was_changed_and_by_nothing_else(compared):
     best, worst = ends["velocity.sensitivity_peak"]
     assert best < worst
     assert [v.id for v in compared.variants[3].verdicts if v.verdict == "not met"] == ["output-rate"]
+
+
+def test_a_changed_key_is_named_as_an_override_names_it():
+    base = load_design("ilr33-amber").add_filter("velocity", kind="lowpass", frequency="400 Hz")
+    for key, text in {"control.velocity.filter.1.frequency": "500 Hz", "gear.worm.ratio": "50"}.items():
+        assert [(c.path, c.text) for c in changes(base, with_overrides(base, {key: text}))] == [(key, text)]
 
 
 def test_requirements_are_rows_and_designs_are_columns_of_tables_that_fit_a_screen(compared):
