@@ -99,7 +99,7 @@ def residual_item(residual: float, limit: float) -> Item:
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
     """What the records neither confirm nor deny: the design's values, but for those held as asked."""
     for name, kept in fit.fixed.items():
-        if kept.value and name not in held:
+        if (kept.value or name == "gravity_cos") and name not in held:  # 0: the design's offset
             label = parameter(name, axis).label
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
 

@@ -211,6 +211,7 @@ def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any
     settings = job.payload.get("settings") or {}
     inputs = {
         "parameters": dict(job.parameters),
+        "keys": dict(job.keys),
         "settings": {str(key): one_line(str(value), 200) for key, value in settings.items()},
         "design_hash": job.design_hash,
         "revision": job.revision,

@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,11 +12,13 @@ from nightly_fakes import CODE, INLINE, Calendar, job, study
 from site_checks import check_whole
 
 from actuator_lti.bounds import NIGHTLY_JOBS
-from reports.nightly.changes import Columns
+from reports.nightly.changes import Columns, headlines
 from reports.nightly.figures import Figure
+from reports.nightly.history import History
 from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
 from reports.nightly.night import approve, run_night
-from reports.nightly.source import Job
+from reports.nightly.records import Result
+from reports.nightly.source import Job, read_study
 from tests.refusals import refused
 
 
@@ -114,6 +117,29 @@ def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -
     (design,) = nights(changed, code=newer).designs
     assert ("numpy", "2", "3") in design.last_night.cause.libraries
     assert design.last_night.cause.code
+
+
+def test_a_limit_that_moved_is_the_cause_and_the_figure_stays(nights, tmp_path, monkeypatch) -> None:
+    """The margin stays at 10 dB, its limit goes from 6 to 4 dB: 4 dB are left, then 6 dB."""
+    limit = '[study]\nname = "s"\nbase = "ilr33-amber"\n[[requirement]]\nid = "GM"\n'
+    path = tmp_path / "s.toml"
+
+    def asked(least: float) -> Job:
+        path.write_text(f'{limit}quantity = "gain_margin"\nloop = "position"\nminimum = "{least:g} dB"\n')
+        return replace(job("a", 10.0, limit=least), keys=read_study(str(path)).jobs[0].keys)
+
+    nights(asked(6.0))
+    night = nights(asked(4.0))
+    (told,) = headlines(night.designs)
+    assert told.cause == "requirement.GM.minimum 6.0 → 4.0 dB"
+    assert told.effect == "gain margin, distance to its limit 4.000 → 6.000 dB"
+    known = History.inputs
+
+    def earlier(self: History, of: Result) -> dict[str, Any]:  # whose nights kept the numbers alone
+        return {key: one for key, one in known(self, of).items() if of.run > 2 or key != "keys"}
+
+    monkeypatch.setattr(History, "inputs", earlier)
+    assert nights(asked(6.0)).designs[0].last_night.cause.parameters == ()
 
 
 def test_moves_within_the_tolerance_are_none_and_flapping_is_told_apart(nights) -> None:

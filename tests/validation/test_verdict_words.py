@@ -123,15 +123,17 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
 
 
 @pytest.mark.parametrize(
-    ("swing_rad", "said"),
+    ("swing_rad", "motor_rad", "said"),
     [
-        (0.0, "stands still 40 s later; whether it stays is not known"),
-        (1e-5, "still moving 40 s later, by ±0.000573 deg"),
+        (0.0, 0.0, "stands still 40 s later; whether it stays is not known"),
+        (1e-5, 1e-5, "still moving 40 s later, by ±0.000573 deg"),
+        (0.0, 1e-5, "still moving 40 s later, by ±0.000573 deg (motor over the ratio, the output at rest)"),
     ],
 )
-def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, said: str) -> None:
+def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, motor_rad: float, said: str) -> None:
     """1e-5 rad are 5.73e-4 deg; nothing is no motion."""
     rest = replace(hunting(0.1, swing_rad, 3.0).rest, verdict="still moving", frequency_hz=None, after_s=40.0)
+    rest = replace(rest, motor_amplitude=motor_rad)
     assert end_words(rest, degrees(1.0), "deg") == said
 
 
