@@ -515,9 +515,10 @@ def _command(design: Design, record: Record) -> Finding | None:
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-        wrong = factor is not None and not 0.5 < ratio < 1.5
+        followed = 0.5 < ratio < 1.5
+        wrong = factor is not None and not followed
         text = f"{answer} is {ratio:.4g} times {command}" + f": factor {factor}" * wrong
-        return Finding(subject, not wrong, text)
+        return Finding(subject, False if wrong else followed or None, text)
     return None
 
 

@@ -15,6 +15,8 @@ from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
+from nonlinear import commands, simulate
+from tests.changed import changed
 from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of, signals_of, write
 
 DRIVE = load_design("ilr33-amber")
@@ -46,6 +48,19 @@ def test_the_model_of_a_record_tells_its_clock(clock: float, columns: Columns) -
         off = re.search(r"a clock about (\S+) % off", wrong)
         assert off
         assert float(off[1]) == pytest.approx(100.0 * (clock - 1.0), rel=0.05)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_a_drive_limited_to_less_current_than_the_design_says_so(share: float) -> None:
+    """Of the largest current that steps of the command take."""
+    angle = np.where(np.arange(3000) // 500 % 2, 0.02, -0.02)
+    command = commands.sampled(1e-3 * np.arange(3000.0), angle)
+    most = share * float(np.max(np.abs(simulate(DRIVE, command, 3.0).current_A)))
+    run = simulate(changed(DRIVE, limits={"peak_current_A": most}), command, 3.0)
+    seen = signals_of(run, 1)
+    _, wrong = _correlated(_record(seen, "reference", "angle", "current"))
+    assert ("limits.peak_current" in wrong) is (share < 1.0), wrong
+    assert f"the current stays below {np.max(np.abs(seen['current'])):.3g} A" in wrong or share == 1.0
 
 
 def _lines(path: Path, columns: Columns, name: str, line: int, value: float) -> None:
