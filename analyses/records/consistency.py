@@ -529,6 +529,8 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     if passed and len(rows):
         return Finding(subject, False, f"{named_rows(record, rows, what, unit)}, {allowed}: {BAD_ROW}")
     text = f"{subject.partition(' ')[0]} up to {most if passed else usual:.4g} {unit}, {allowed}"
+    if passed and most > limit:
+        text += f", {most / limit:.3g} times; {OVER:g} times are allowed"
     if not passed:
         factor = explaining(usual / limit, unit)
         text += f", {usual / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")
