@@ -78,7 +78,7 @@ def with_structure(design: Design, model: Fit) -> Design:
         friction = replace(friction, points=points, dry_torque_Nm=0.0, viscous_Nms_rad=0.0)
         friction = replace(friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
         gone += [path for path in design.parameters if path in PLAIN_KEYS]
-    elif friction.points and "dry" in model.names:
+    elif friction.points and {"dry", "dry_forward"} & set(model.names):
         friction = replace(friction, points=())
     gravity = _pendulum(design, model)
     if friction is design.friction and gravity is load.gravity:

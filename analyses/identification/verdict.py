@@ -104,6 +104,13 @@ def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterato
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
 
 
+def map_items(before: Design, made: Design) -> Iterator[Item]:
+    """A friction map of the design that what was found takes the place of, and nothing is held against."""
+    if before.friction.points and not made.friction.points:
+        why = "viscous and dry friction take its place; --friction map finds a map"
+        yield Item(id="map", label="Friction map of the design", passed=None, reason=why)
+
+
 def lag_items(late_s: float, period_s: float) -> Iterator[Item]:
     """A current that is, or may be, later than the motion by more than a sample."""
     if late_s > period_s:
