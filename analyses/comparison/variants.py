@@ -27,6 +27,7 @@ from analyses.comparison.found import (
     Found,
     Kept,
     LargeSignal,
+    beside,
     figure_names,
     small_signal,
 )
@@ -151,7 +152,7 @@ def compare(
         for variant, one in zip((study.base, *good), (base, *result), strict=True)
         if one is not None
     )
-    names = figure_names([c.figures for c in (reference, *ends)], origin)
+    names = figure_names((c.figures, _design(c.variant)) for c in (reference, *ends))
     refused = tuple(v for v in study.variants if v.design is None)
     return Comparison(study, names, reference, tuple(ends), slopes, refused)
 
@@ -182,6 +183,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tuple[int, Variant]) -> Found:
     """What is found of a design, how it differs from the base, and what moved it."""
     one, design = _evaluated(at[1], plan, tested), _design(at[1])
+    one = replace(one, figures=beside(origin, design, one.figures))
     changed, differences = changes(origin, design), {}
     for key, value in one.figures.items():
         before = base.figures.get(key)

@@ -105,6 +105,7 @@ def identify_bench(
     items = list(_items(design, settings, findings, right, compared, held))
     made, refined = _made(start, right, both, settings, items, progress)
     again = tuple(resimulate(made, record, model.form) for record in (*right.records, *unseen))
+    items += verdict.map_items(design, made)
     items += _unseen_items(start, model, unseen, limit)
     items += [verdict.simulated_item(one.record, one.beyond_noise, limit, one.how) for one in again]
     return BenchResult(

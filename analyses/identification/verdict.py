@@ -99,9 +99,16 @@ def residual_item(residual: float, limit: float) -> Item:
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
     """What the records neither confirm nor deny: the design's values, but for those held as asked."""
     for name, kept in fit.fixed.items():
-        if kept.value and name not in held:
+        if (kept.value or name == "gravity_cos") and name not in held:  # 0: the design's offset
             label = parameter(name, axis).label
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
+
+
+def map_items(before: Design, made: Design) -> Iterator[Item]:
+    """A friction map of the design that what was found takes the place of, and nothing is held against."""
+    if before.friction.points and not made.friction.points:
+        why = "viscous and dry friction take its place; --friction map finds a map"
+        yield Item(id="map", label="Friction map of the design", passed=None, reason=why)
 
 
 def lag_items(late_s: float, period_s: float) -> Iterator[Item]:

@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
-from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
+from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
 from analyses.records.record import DISORDER, Record
@@ -238,10 +238,13 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
 
 
 def _time(design: Design, record: Record) -> Finding | None:
-    """A unit of the time that the lag behind the command tells."""
+    """A unit of the time that the lag behind the command tells, or what a current accelerates."""
     place = place_of(design, record)
     told = "" if place is None else wrong_time(design, record, place[1])
-    return Finding("time against the lag behind the command", False, told) if told else None
+    if told:
+        return Finding("time against the lag behind the command", False, told)
+    told = wrong_time_of_speed(design, record)
+    return Finding("time against the current", False, told) if told else None
 
 
 def _sign(design: Design, record: Record) -> Finding | None:

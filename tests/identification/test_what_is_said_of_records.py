@@ -93,6 +93,19 @@ def test_a_time_in_another_unit_is_named_by_its_factor(factor: float, columns: C
     assert "factor 1e6 (micro" in told.text if factor == 1e6 else "factor 1000 (milli" in told.text
 
 
+@pytest.mark.parametrize(
+    ("factor", "named"), [(1.0, ""), (30.0, ""), (1e3, "1000 "), (1e-3, "1000 "), (1e6, "1e6 ")]
+)
+def test_a_speed_drive_tells_the_unit_of_its_time_by_its_inertia(factor, named, columns: Columns) -> None:
+    """Of a design with two thirds of the inertia; what is no unit of a time is another inertia."""
+    other = with_values(DRIVE, {"motor.rotor_inertia": DRIVE.motor.rotor_inertia_kgm2 / 1.5})
+    logged = {"speed_reference": columns["speed"], "time": factor * columns["time"]}
+    record = _record({**columns, **logged}, "speed_reference", "speed", "current")
+    told = [one for one in check_record(other, record) if one.subject.startswith("time")]
+    assert bool(told) is bool(named)
+    assert all(one.passed is False and f"factor {named}" in one.text for one in told)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed")])
 def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
