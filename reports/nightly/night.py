@@ -46,7 +46,8 @@ def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     approving = len(asked.words) == 2 and asked.words[0] == "approve"
     if len(asked.words) != 1 + approving or asked.site is None:
         raise InputError(
-            "write 'nightly STUDY --site DIR' or 'nightly approve STUDY --site DIR --by NAME --reason TEXT'"
+            "write 'nightly STUDY --site DIR' or 'nightly approve STUDY --site DIR --by NAME --reason TEXT'; "
+            "several designs are one study, each a [[variant]] with base = its file"
         )
     study = read_study(asked.words[-1], pdf=asked.pdf, validation=False if asked.no_validation else None)
     try:

@@ -122,13 +122,21 @@ def test_a_speed_drive_tells_the_unit_of_its_time_by_its_inertia(factor, named, 
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed")])
+@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed"), ("speed",)])
 def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
     other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 1.5e-3})
     record = _record(columns, *signals, "current", current=sign * columns["current"])
     told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
     assert bool(told) is (sign < 0.0)
     assert not told or "the sign of the current is turned" in told[0]
+
+
+def test_a_signal_whose_squares_are_zero_is_zero(columns: Columns) -> None:
+    """1e-322 V, as a logger leaves it: divided by, and then refused for the whole record."""
+    voltage = np.full_like(columns["time"], 1e-322)
+    result = correlate_record(DRIVE, _record(columns, "reference", "angle", "voltage", voltage=voltage))
+    assert set(result.signals) == {"angle", "speed"}
+    assert "voltage is zero throughout: not compared" in result.notes
 
 
 @pytest.mark.parametrize("times", [1.0, 0.7])

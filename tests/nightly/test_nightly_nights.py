@@ -19,6 +19,7 @@ from reports.nightly.moves import Tolerances, change_points, flaps, missing_nigh
 from reports.nightly.night import approve, run_night
 from reports.nightly.records import Result
 from reports.nightly.source import Job, read_study
+from reports.sections.nightly import section
 from tests.refusals import refused
 
 
@@ -92,7 +93,8 @@ def test_what_passes_says_no_more_than_what_was_asked_and_compared(nights) -> No
     first, second = nights(*jobs), nights(*jobs)
     assert first.said_of_all == "All 2 designs are built and meet their requirements"
     assert second.said_of_all == (
-        "All 2 designs are built, meet their requirements and are no worse than the baseline"
+        "All 2 designs are built, meet their requirements and "
+        "are no worse than the first night, as none is approved"
     )
     bare = [replace(one, result=replace(one.result, total=0)) for one in first.designs]
     words = replace(first, designs=tuple(bare)).said_of_all
@@ -160,6 +162,14 @@ def test_a_regression_counts_until_it_is_approved_by_itself_however_slow_the_dri
     night = nights(job("a", 9.0))
     assert (night.designs[0].state, night.passed) == ("regression", False)
     assert "nobody has approved" in night.designs[0].baseline.note
+    (row,) = section(night)["blocks"][0]["rows"]
+    said = "figures worse than the first night, as none is approved"
+    assert re.fullmatch(rf"\d+ {said}; first gain margin 10.00 → 9.000 dB", row["why"])
+    assert (
+        "worse than the first night, as none is approved"
+        in max(nights.site.glob("nights/*/a-*.html")).read_text()
+    )
+    assert said.replace("figures", "figure(s)") in (nights.site / "junit.xml").read_text()
     again = nights(job("a", 9.0))
     assert not again.passed
     assert not again.designs[0].last_night.changes
@@ -199,7 +209,13 @@ def test_missing_results_and_missing_nights_are_no_changes(nights) -> None:
     back = next(d for d in nights(job("a", 10.0), job("b")).designs if d.name == "a")
     assert not back.last_night.changes
     assert "1 night(s) without a result" in back.last_night.note
-    assert nights(job("a", 10.0)).gone == ("b",)
+    night = nights(job("a", 10.0))
+    assert night.gone == ("b",)
+    told = "In the study last night, not tonight: b."
+    assert f"{section(night)['result']}." == f"night 4: 1 passing (1 unchanged). {told}"
+    assert all(told in (nights.site / file).read_text() for file in ("index.html", "summary.md"))
+    left = ElementTree.parse(nights.site / "junit.xml").find("testsuite[@name='b']/testcase")
+    assert (left.get("name"), left.find("skipped") is not None) == ("is in the study", True)
     for days in (4, 1):  # nights without a run are shown as such
         night = nights(job("a", 10.0), days=days)
     assert night.missing == ((3, 3),)
@@ -226,7 +242,7 @@ def test_machine_files_say_what_the_page_says_also_of_what_is_not_proven_or_waiv
     assert (summary["schema"], summary["exit_status"]) == ("actuator-lti/nightly", 1)
     assert summary["counts"] == {"broken": 1, "fail": 1, "unproven": 0, "regression": 0, "pass": 1}
     root = ElementTree.parse(nights.site / "junit.xml").getroot()
-    assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
+    assert [root.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["8", "1", "1", "1"]
     failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
     assert failed == ["GM gain margin"]
     assert "✗ failing" in (nights.site / "summary.md").read_text()

@@ -124,7 +124,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("report ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),
         ("simulate --amplitude '5 mm'", "--amplitude '5 mm': wrong dimension"),
         ("nightly no-such-study.toml --site s", "no-such-study.toml"),
-        ("nightly a b c --site s", "nightly STUDY --site DIR"),
+        ("nightly a b c --site s", "base = its file"),
         ("nightly approve ilr33-amber --site s", "--by and --reason"),
         ("nightly ilr33-amber", "--site"),
         ("nightly ilr33-amber --site s --time-limit 0", "--time-limit"),
