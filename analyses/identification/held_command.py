@@ -14,6 +14,7 @@ import numpy as np
 
 from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
+from actuator_lti.errors import NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import measured_signals, model_signals
 from analyses.estimation.fit import Fit
@@ -34,7 +35,6 @@ def found_together(
     design: Design,
     records: Sequence[Record],
     names: Sequence[str],
-    inertia_to: str,
     others: Sequence[Sequence[Record]],
     is_nearest: Callable[[Sequence[Record]], bool],
 ) -> Fit | None:
@@ -45,14 +45,20 @@ def found_together(
     records that are simulated behind it are not the nearest.
     """
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
-    keys = {name: parameter(name).key or inertia_to for name in (*names, *motor)}
+    inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
+    keys = {name: parameter(name).key or inertia for name in (*names, *motor)}
     found = _by_simulation(design, records, tuple(keys.values()), others, is_nearest)
     if found is None:
         return None
     made = with_values(design, dict(zip(found.names, found.values.tolist(), strict=True)), check=False)
-    scale = to_design.inertia_share(design, made.inertia_kgm2, inertia_to)[1]
+    scale = to_design.inertia_share(design, made.inertia_kgm2, inertia)[1]
     slopes = {name: {key: 1.0 / scale if name == "inertia" else 1.0} for name, key in keys.items()}
     return found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
+
+
+def _part_of_inertia(design: Design, key: str) -> float:
+    value, scale = to_design.inertia_share(design, design.inertia_kgm2, key)
+    return value / scale
 
 
 def _by_simulation(
@@ -89,7 +95,10 @@ def _by_simulation(
         (_side_by_side(w, z), _side_by_side(e, d))
         for (w, e), (z, d) in zip(told[::2], told[1::2], strict=True)
     ]
-    return Fit(names=keys, values=found.values, covariance=wider_covariance(told, pairs))
+    try:
+        return Fit(names=keys, values=found.values, covariance=wider_covariance(told, pairs))
+    except np.linalg.LinAlgError:
+        raise NumericalError(f"the records do not tell {', '.join(keys)} apart") from None
 
 
 def _one_constant(design: Design, tried: Design) -> Design:

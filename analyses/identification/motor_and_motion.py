@@ -52,17 +52,23 @@ def motor_and_motion(
 
     The own bias of the fits hangs on it, and where it is taken off the wrong way, that way meets the records
     better than the right one does: so each is followed to its end, and what then meets the records best is
-    taken. In the covariances every other counts by the probability that it is nearer.
+    taken; where that is a simulated drive whose command is held, the other ways are simulated as well. In the
+    covariances every other counts by the probability that it is nearer.
     """
     commands = [(command_of(plain, record), record) for record in records]
-    ways = {one.between: None for own, record in commands if own for one in readings(own, record)}
+    read = {one.between: None for own, record in commands if own for one in readings(own, record)}
+    ways = [
+        [replace(one, between=way) for one in records] for way in sorted(read or [SMOOTH], key=HELD.__eq__)
+    ]
     tried: list[Found] = []
-    for way in sorted(ways or [SMOOTH], key=HELD.__eq__):
-        taken = [replace(one, between=way) for one in records]
-        if (found := _followed(design, plain, taken, settings, recipe, tried)) is not None:
-            tried.append(found)
+    for taken in ways:
+        tried += _followed(design, plain, taken, settings, recipe, tried)
         if not tried[0].right.model.simulated:  # no bias is taken off
             return tried[0]
+    if tried[-1].electrical is not None and tried[-1].electrical.with_motion is not None:
+        for taken in ways[:-1]:
+            with suppress(InputError, NumericalError):
+                tried += _together(design, plain, taken, settings, recipe, tried)
     misses = _misses(plain, [_both_ways(one) for one in tried])
     best = int(np.argmin(np.sum(misses, axis=1)))
     best_one = tried[best]
@@ -125,13 +131,12 @@ def _followed(
     settings: Settings,
     recipe: Recipe | None,
     others: Sequence[Found],
-) -> Found | None:
-    """What the records tell where the drive took its command in their way; None where others are nearer."""
+) -> list[Found]:
+    """What the records tell where the drive took its command in their way; empty where others are nearer."""
     held = {one.between for one in records} == {HELD} and settings.electrical
     if held and settings.friction != "map" and not _gravity(plain, settings):
-        with suppress(InputError, NumericalError):
-            return _together(design, plain, records, settings, recipe, others)
-    return _found(design, plain, records, settings, recipe)
+        return _together(design, plain, records, settings, recipe, others)
+    return [_found(design, plain, records, settings, recipe)]
 
 
 def _together(
@@ -141,8 +146,8 @@ def _together(
     settings: Settings,
     recipe: Recipe | None,
     others: Sequence[Found],
-) -> Found | None:
-    """Motor and motion of a command that is held; again where a lag of the current was taken back."""
+) -> list[Found]:
+    """Motor and motion by simulation; again where a lag of the current was taken back."""
     held, (_, raw) = held_values(design, plain, settings), by_voltage(plain, records, recipe)
     names = _raw(plain, settings, held, recipe, records, np.ones(len(records))).names
 
@@ -154,9 +159,12 @@ def _together(
 
     first: Diagnosed | None = None
     while True:
-        both = found_together(plain, records, names, settings.inertia_to, likes, is_nearest)
+        try:
+            both = found_together(plain, records, names, likes, is_nearest)
+        except (InputError, NumericalError):  # they do not tell all of it, or cannot be simulated
+            return [_found(design, plain, records, settings, recipe)]
         if both is None:
-            return None
+            return []
         motor = motor_of(both, raw, plain)
         start = _with_motor(plain, motor, records)
         fit = partial(_fitted, start, settings, held, recipe, both=both)
@@ -165,9 +173,8 @@ def _together(
             break
         first, records = right, right.records
     told = first or right
-    return Found(
-        start=start, electrical=motor, right=replace(right, late_s=told.late_s, findings=told.findings)
-    )
+    right = replace(right, late_s=told.late_s, findings=told.findings)
+    return [Found(start=start, electrical=motor, right=right)]
 
 
 def _found(
