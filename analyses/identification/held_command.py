@@ -44,6 +44,8 @@ def found_together(
     counts by what the best of ``others``, records simulated with other commands, leaves of it. None where the
     records that are simulated behind it are not the nearest.
     """
+    back = design.motor.back_emf_constant_Vs_rad or design.motor.torque_constant_Nm_A
+    design = with_values(design, {BACK: back})
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
     inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
     keys = {name: parameter(name).key or inertia for name in (*names, *motor)}
