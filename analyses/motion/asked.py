@@ -40,7 +40,9 @@ class Asked:
         ),
     ] = 1.0
     frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "Hz")] = 1.0
-    to: Annotated[float | None, Option("Last frequency of a chirp or set; ten times the first.", "Hz")] = None
+    to: Annotated[
+        float | None, Option("Last of a chirp (exponential) or a set; ten times the first.", "Hz")
+    ] = None
     count: Annotated[int, Option("Number of frequencies of a stepped or multisine; 10.")] = 10
     cycles: Annotated[
         int | None, Option("Periods played of a sine or triangle, or of each of a stepped sine (5).")
