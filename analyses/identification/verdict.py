@@ -57,6 +57,7 @@ class Identified:
     design: Design
     items: tuple[Item, ...]
     accepted: bool = False
+    unmade: str = ""  # why no design comes of what was found: ``design`` is then that it was held against
 
     @cached_property
     def text(self) -> str:
@@ -104,8 +105,10 @@ def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterato
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
 
 
-def map_items(before: Design, made: Design) -> Iterator[Item]:
-    """A friction map of the design that what was found takes the place of, and nothing is held against."""
+def made_items(unmade: str, before: Design, made: Design) -> Iterator[Item]:
+    """That no design comes of what was found; a friction map of the design that it takes the place of."""
+    if unmade:
+        yield Item.of("made", "A design comes of what is found", unmade)
     if before.friction.points and not made.friction.points:
         why = "viscous and dry friction take its place; --friction map finds a map"
         yield Item(id="map", label="Friction map of the design", passed=None, reason=why)

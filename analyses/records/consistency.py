@@ -249,11 +249,11 @@ def _time(design: Design, record: Record) -> Finding | None:
 
 def _sign(design: Design, record: Record) -> Finding | None:
     """A current that would drive the other way; with a voltage, that says of which signal the sign is."""
-    place = place_of(design, record)
-    if place is None or "current" not in record.signals or "voltage" in record.signals:
+    place, rate = place_of(design, record), record.signals.get(RATES[design.axis])
+    speed = rate if place is None else np.gradient(place[1], record.time_s)
+    if speed is None or "current" not in record.signals or "voltage" in record.signals:
         return None
-    smooth = (_smooth(record, values) for values in (record["current"], place[1]))
-    told = turned_current(design, record, smooth)
+    told = turned_current(design, record, *(_smooth(record, one) for one in (record["current"], speed)))
     return Finding("current against the motion", False, told) if told else None
 
 
@@ -515,9 +515,10 @@ def _command(design: Design, record: Record) -> Finding | None:
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-        wrong = factor is not None and not 0.5 < ratio < 1.5
+        followed = 0.5 < ratio < 1.5
+        wrong = factor is not None and not followed
         text = f"{answer} is {ratio:.4g} times {command}" + f": factor {factor}" * wrong
-        return Finding(subject, not wrong, text)
+        return Finding(subject, False if wrong else followed or None, text)
     return None
 
 
@@ -532,6 +533,8 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     if passed and len(rows):
         return Finding(subject, False, f"{named_rows(record, rows, what, unit)}, {allowed}: {BAD_ROW}")
     text = f"{subject.partition(' ')[0]} up to {most if passed else usual:.4g} {unit}, {allowed}"
+    if passed and most > limit:
+        text += f", {most / limit:.3g} times; {OVER:g} times are allowed"
     if not passed:
         factor = explaining(usual / limit, unit)
         text += f", {usual / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")

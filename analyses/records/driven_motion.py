@@ -1,7 +1,5 @@
 """The motion of a record beside what its command and its current make of a design, without a simulation."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from actuator_lti.design.control import FEED_FORWARD
@@ -81,18 +79,15 @@ def _own_torques(design: Design, speed: Floats, record: Record) -> tuple[Floats,
     return design.inertia_kgm2 * np.gradient(speed, record.time_s), friction
 
 
-def turned_current(design: Design, record: Record, smooth: Iterator[Floats]) -> str:
+def turned_current(design: Design, record: Record, current: Floats, speed: Floats) -> str:
     """A current against the torque that the design needs for the motion; empty where nothing says so.
 
-    ``smooth`` are the current and the position at the motor through the same filter. A load that acts could
-    need a torque against that of inertia and friction: none is told then.
+    Current and speed, at the motor, are through the same filter. A load that acts could need a torque against
+    that of inertia and friction: none is told then.
     """
     if _is_loaded(design, record) or record.signals.keys() & {"force", "force_reference", "torque_reference"}:
         return ""
-    current, place = smooth
-    speed = np.gradient(place, record.time_s)
-    inertia, friction = _own_torques(design, speed, record)
-    torque = inertia + friction
+    torque = np.add(*_own_torques(design, speed, record))
     _, alike = ratio_of(current - current.mean(), torque - torque.mean())
     if alike > -ALIKE:
         return ""

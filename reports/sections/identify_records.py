@@ -70,11 +70,13 @@ def _result(result: BenchResult, axis: str) -> str:
         ]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
+    words = f"{capital(told)}{identified.constant_words(model, axis)}."
+    if result.unmade:
+        return " ".join([*left_out_of(result.findings), words, "No design comes of it."])
     worst = max(result.resimulated, key=lambda one: one.beyond_noise)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
-    words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
-    words = f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
+    words = f"{words} {written} meets {met} within {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
     return " ".join([*left_out_of(result.findings), words])
 
 

@@ -145,3 +145,18 @@ def test_terminal_page_json_and_status_say_not_proven_alike(tmp_path, cli) -> No
         told = cli.text("identify", tmp_path / "r.csv", "--design", tmp_path / "map.toml", *form)
         assert "Friction map of the design" in told
         assert not re.search(r"(Viscous|Dry) friction.* kept", told)
+
+
+@pytest.mark.parametrize("accept", [(), ("--accept",)])
+def test_a_record_that_no_design_can_come_of_fails_with_its_tables(accept, cli, tmp_path) -> None:
+    """A current a thousandth of what it is: less inertia in all than the gears have alone."""
+    columns = columns_of(motion(2))
+    write(tmp_path / "r.csv", {**columns, "current_A": 1e-3 * columns["current_A"]})
+    words = ("identify", tmp_path / "r.csv", "--design", "ilr33-amber", "--out", tmp_path, *accept)
+    told = " ".join(cli.text(*words, status=1).split())
+    assert "No design comes of it." in told
+    assert "SHA-256" not in told
+    assert "factor 1000" in told
+    assert not [*tmp_path.glob("*.toml")]
+    page = json.loads((tmp_path / "identification.json").read_text())
+    assert {item["id"]: item["verdict"] for item in judged(walk(page["sections"][0]))}["made"] == "not met"
