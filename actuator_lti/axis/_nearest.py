@@ -208,13 +208,13 @@ def _within(m, factors, form, best, parts, bounds):
 @kernel
 def nearest(m, factors, count, known, form, best, parts, bounds):
     """The smallest distance over ``count`` known intervals, if it is less than ``best``; the status."""
-    size = slot(m)
-    value, place = best[0], best[1]
+    size, given = slot(m), best[0]
+    value, place = given, best[1]
     for k in range(count + 1):
         here = _distance(form, known[KNOWN * k + 1], known[KNOWN * k + 2])
         if here < value * (1.0 - FINEST):
             value, place = here, known[KNOWN * k]
-    if value < best[0]:
+    if value < given:
         value, place = _polished(m, factors, form, place, value, parts, 0)
         best[0], best[1] = value, place
     if best[0] < SMALL:
@@ -228,4 +228,6 @@ def nearest(m, factors, count, known, form, best, parts, bounds):
             status = _within(m, factors, form, best, parts, bounds)
             if status != DONE:
                 return status
+    if best[0] < given:  # below 1e-4 the disks of `_below` are not told apart to FINEST
+        best[0], best[1] = _polished(m, factors, form, best[1], best[0], parts, 0)
     return DONE

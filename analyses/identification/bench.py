@@ -29,7 +29,7 @@ from analyses.identification.joint_model import JointModel, LawChoice
 from analyses.identification.motor_and_motion import by_voltage, held_values, motor_and_motion, names_of
 from analyses.identification.output_error import OutputErrorResult, Resimulated, refine_records, resimulate
 from analyses.identification.residuals import ResidualTest, residual_tests
-from analyses.identification.rows import is_loaded, recipe_for
+from analyses.identification.rows import is_loaded, recipe_for, stands
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
 from analyses.records.record import HELD, Record, prepared
@@ -89,6 +89,9 @@ def identify_bench(
         if settings.electrical:
             judged = _judged(plain, by_voltage(plain, used, recipe)[0])
             findings = {record.name: check_record(judged, record) for record in (*used, *unseen)}
+        if all(stands(plain, record, recipe) for record in used):
+            still = "no motion beyond noise: inertia and friction take a record that moves"
+            raise InputError(f"{still}; of a motor held fast --electrical tells R and L", names_of(used))
     with because(findings):
         found = motor_and_motion(design, plain, used, settings, recipe)
     if HELD in {record.between for record in found.right.records}:
@@ -105,8 +108,10 @@ def identify_bench(
     findings = {name: (*each, *told[name]) for name, each in findings.items()}
     right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
     items = list(_items(design, settings, findings, right, compared, held))
-    made, refined = _made(start, right, both, settings, items, progress)
-    again = tuple(resimulate(made, record, model.form) for record in (*right.records, *unseen))
+    made, refined, unmade = _made(start, right, both, settings, items, progress)
+    every = () if unmade else (*right.records, *unseen)
+    again = tuple(resimulate(made, record, model.form) for record in every)
+    items += verdict.made_items(unmade, design, made)
     items += _unseen_items(start, model, unseen, limit)
     items += [verdict.simulated_item(one.record, one.beyond_noise, limit, one.how) for one in again]
     return BenchResult(
@@ -116,6 +121,7 @@ def identify_bench(
         model=model,
         refined=refined,
         design=made,
+        unmade=unmade,
         resimulated=again,
         items=tuple(items),
         settings=settings,
@@ -164,8 +170,11 @@ def _made(
     settings: Settings,
     items: Sequence[verdict.Item],
     progress: Progress,
-) -> tuple[Design, OutputErrorResult | None]:
-    """The design with what was found, as its file gives it, and the refinement where one was asked for."""
+) -> tuple[Design, OutputErrorResult | None, str]:
+    """The design with what was found, as its file gives it, and the refinement where one was asked for.
+
+    Where none comes of a record that fails anyway, that of the start, and why.
+    """
     model, records = right.model, right.records
     source = f"identified from {names_of(records)}{at_constant(model, start)}"
     try:
@@ -179,9 +188,9 @@ def _made(
             both = to_design.joint_values(start, both, inertia_to=settings.inertia_to)
             made = to_design.with_correlations(made, both)
     except InputError as error:
-        reasons = "; ".join(item.reason for item in items if item.passed is False)
-        message = f"{reasons}; so {error.message}" if reasons else error.message
-        raise InputError(message, error.where) from None
+        if all(item.passed is not False for item in items):
+            raise
+        return start, None, error.message
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)
@@ -191,7 +200,7 @@ def _made(
             refined = replace(refined, covariance=own.covariance)
         made = to_design.design_with_fit(made, refined, f"{source}, refined by simulation")
         made = made if both is None else to_design.with_correlations(made, both)
-    return read_design_text(write_design(made)), refined
+    return read_design_text(write_design(made)), refined, ""
 
 
 def _items(

@@ -13,7 +13,7 @@ from analyses.estimation.fit import Fit, Fixed
 from analyses.estimation.least_squares import scaled_lstsq, solve, told_apart, wider_covariance
 from analyses.estimation.parameters import parameter
 from analyses.identification.joint_model import JointModel, Recipe
-from analyses.identification.rows import motion_of, recipe_for
+from analyses.identification.rows import motion_of, recipe_for, stands
 from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
 
@@ -173,15 +173,17 @@ def without_own_bias(
 def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> Floats:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
-        if name not in record.signals:
+        if name not in record.signals or not record[name] @ record[name] > 0.0:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
     recipe, period = recipe or recipe_for(record), period_of(record)
-    motion, _ = motion_of(record.drive(design), record, recipe)
+    speed = motion_of(record.drive(design), record, recipe)[0].velocity
+    if stands(design, record, recipe):  # as a regressor its noise would make kE about 0
+        speed = np.zeros_like(speed)
     b, a = butter(recipe.filter_order, 2.0 * recipe.cutoff_hz * period)
     current, voltage = (np.asarray(filtfilt(b, a, record[name])) for name in ("current", "voltage"))
     voltage = np.interp(record.time_s - late_s, record.time_s, voltage)
     rate = central_difference(current, period)
-    table = np.column_stack([current, motion.velocity, rate, np.ones_like(current), voltage])
+    table = np.column_stack([current, speed, rate, np.ones_like(current), voltage])
     skip = recipe.skip_samples
     return table[skip : len(table) - skip]
 

@@ -5,12 +5,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from scipy.fft import rfft, rfftfreq
 from scipy.ndimage import minimum_filter1d
+from scipy.stats import f as variance_ratio
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.parameters import default_value
+from analyses.estimation.parameters import default_value, pendulum_angle
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
@@ -23,6 +25,7 @@ REST_SHARE = 0.005
 REST_TIME_S = 0.03
 END_SHARE = 0.02
 SHORTEST_S = 0.2
+NO_CHANCE = 1e-3
 
 
 def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
@@ -94,6 +97,24 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
     return Motion(position=whole, velocity=made.position, acceleration=made.velocity), rate
 
 
+def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
+    """Whether a record shows no motion: nothing but noise, as much above the recipe's cut-off as below it.
+
+    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
+    """
+    place, rate = place_of(design, record), RATES[design.axis]
+    if place is None and rate not in record.signals:
+        return False
+    values = record[rate] if place is None else place[1] - place[1].mean()
+    power = np.abs(rfft(values)) ** 2
+    below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
+    count, rest = np.count_nonzero(below), np.count_nonzero(~below)
+    if not rest:
+        return not np.any(values)
+    most = float(variance_ratio.isf(NO_CHANCE, 2 * count, 2 * rest))
+    return bool(power[below].mean() <= most * power[~below].mean())
+
+
 def moment_of(
     design: Design, record: Record, output_angle: Floats, *, gravity: bool = True
 ) -> tuple[Floats, str]:
@@ -122,7 +143,8 @@ def record_rows(
 ) -> Rows:
     """Make the rows of one record, less what its own settings add (an inertia at the output).
 
-    ``gravity`` adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output; ``moment`` is that
+    ``gravity`` adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output, phi from where the
+    design's pendulum stands upright: where b is not told, the design's offset is kept. ``moment`` is that
     moment after decimation as found so far, for the load's share of the friction. Speeds of a friction map
     take the place of the form's dry and viscous friction.
     """
@@ -133,7 +155,8 @@ def record_rows(
     own = _balance(design, record, recipe, gravity=gravity)
     motion, angle = own.motion, own.angle
     names, columns = friction_columns(motion, form, knots_rad_s)
-    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
+    turned = angle + pendulum_angle(shared)
+    others = [np.sin(turned), np.cos(turned), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
     part = _part(motion, recipe)
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
@@ -144,7 +167,7 @@ def record_rows(
         w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
     table = np.column_stack(w)
     if record.settings:  # the values looked for are those of the shared design
-        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
+        y = y - table @ [default_value(design, n, shared) - default_value(shared, n) for n in names]
     keep = _kept(record, motion, part, recipe)
     return Rows(
         name=record.name,

@@ -110,17 +110,14 @@ def _counts(pair: Pair) -> Iterator[Row]:
     if quantum is None or own is None:
         return
     rows, name = pair.rows(), "output_count" if behind else "count"
-    if design.encoder.speed == "tracking":
-        rows["angle_start"] = 1.5 * quantum * scale
-        drive = rows.running().begin()
-        yield pair.judged(name, quantum, drive.value("TRACKED_ANGLE") / scale, unit, "measured speed")
-        return
     rows["angle_start"] = 0.5 * quantum * scale
     drive = rows.running()
     if behind and rows.value("elastic_drive"):
         drive.begin(OUTPUT=1.5 * quantum)
     else:
         drive.begin(ANGLE=1.5 * quantum * scale)
-    span = design.encoder.difference_samples * velocity.every * design.controller.period_s
-    seen = drive.value("FILTERED_SPEED") / rows.value("filter_coefficient") * span / scale
+    rate = 1.0 / (design.encoder.difference_samples * velocity.every * design.controller.period_s)
+    if design.encoder.speed == "tracking":
+        rate = rows.value("tracking_speed")
+    seen = drive.value("FILTERED_SPEED") / rows.value("filter_coefficient") / rate / scale
     yield pair.judged(name, quantum, seen, unit, "measured speed")

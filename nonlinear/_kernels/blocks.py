@@ -142,18 +142,18 @@ def measured_speed(p, s, io, w, th):
     if p[layout.SPEED_SENSOR] > 0.0:
         x = p[layout.RATIO] * io[layout.IN_OUTPUT_SPEED]
         angle = p[layout.RATIO] * io[layout.IN_OUTPUT]
+    at = int(p[layout.AT_ANGLES])  # the last angles, oldest first
     if source == DIFFERENCE:
-        seen = counted(angle, p[layout.COUNTS_PER_RAD])
-        m, at = int(p[layout.DIFFERENCE_SAMPLES]), int(p[layout.AT_ANGLES])  # the last angles, oldest first
+        seen, m = counted(angle, p[layout.COUNTS_PER_RAD]), int(p[layout.DIFFERENCE_SAMPLES])
         x = (seen - s[at]) / (p[layout.DIFFERENCE_SAMPLES] * p[layout.VELOCITY_PERIOD])
         for j in range(m - 1):
             s[at + j] = s[at + j + 1]
         s[at + m - 1] = seen
-    elif source == TRACKING:  # p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r
-        x = s[layout.S_TRACKED_SPEED]
-        foreseen = s[layout.S_TRACKED_ANGLE] + p[layout.VELOCITY_PERIOD] * x
-        r = counted(angle, p[layout.COUNTS_PER_RAD]) - foreseen
-        s[layout.S_TRACKED_ANGLE] = foreseen + p[layout.TRACKING_ANGLE] * r
+    elif source == TRACKING:  # p = th^ + T w^, r = th - p, th^ = p + 2 w0 T r, w^ += w0^2 T r; kept: th^ - th
+        x, seen = s[layout.S_TRACKED_SPEED], counted(angle, p[layout.COUNTS_PER_RAD])
+        r = (seen - s[at]) - (s[layout.S_TRACKED_ERROR] + p[layout.VELOCITY_PERIOD] * x)
+        s[at] = seen
+        s[layout.S_TRACKED_ERROR] = (p[layout.TRACKING_ANGLE] - 1.0) * r
         x += p[layout.TRACKING_SPEED] * r
         s[layout.S_TRACKED_SPEED] = x
     filtered = s[layout.S_FILTERED_SPEED]

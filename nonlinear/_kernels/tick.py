@@ -40,7 +40,7 @@ def init_estimate(p, s):
     for j in range(m):
         s[at + j] = counted(th - (m - j) * T * w, p[layout.COUNTS_PER_RAD])
     if int(p[layout.SPEED_SOURCE]) == TRACKING:
-        s[layout.S_TRACKED_ANGLE] = counted(th, p[layout.COUNTS_PER_RAD]) - T * w
+        s[layout.S_TRACKED_ERROR] = counted(th, p[layout.COUNTS_PER_RAD]) - s[at] - T * w if w != 0.0 else 0.0
         s[layout.S_TRACKED_SPEED] = w
     s[layout.S_FILTERED_SPEED] = w
     settle(p, layout.SPEED_CHAIN, int(p[layout.SPEED_FILTERS]), s, layout.S_SPEED_CHAIN, w)

@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from functools import partial
 
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
@@ -43,7 +44,8 @@ def controller_export(
         "PRECISION": "single" if single_precision else "double",
         "CONSTANTS": _constants(ours, prefix.upper()), "FLAGS": _flags(prefix.upper()),
         "STRUCTS": _structs(ours), "SIZES": _sizes(ours, single_precision),
-        "DECLARATIONS": _declarations(ours.program), "ROUNDINGS": str(roundings(ours)),
+        "DECLARATIONS": _declarations(ours.program), "ANGLES": _angles(ours, prefix.upper()),
+        "ROUNDINGS": str(roundings(ours)),
         "SOURCE_HASH": hashlib.sha256(source.encode()).hexdigest(),
     }  # fmt: skip
     values["LIBRARY"] = f"{called} of the mathematical library" if called else "no function of any library"
@@ -107,12 +109,28 @@ def _constants(ours: Controller, upper: str) -> str:
 def _structs(ours: Controller) -> str:
     names = begins(ours.p)
     state = struct_text(ours.state, lambda each: member_words(names[each.first]))
-    return "\n\n".join([state, *(struct_text(each, _signal_words) for each in (ours.measured, ours.out))])
+    return "\n\n".join(
+        [state, *(struct_text(each, partial(_signal_words, ours)) for each in (ours.measured, ours.out))]
+    )
 
 
-def _signal_words(member: Member) -> str:
-    counts = "count of the encoder; it may go round at 2**32"
-    return member_words(SIGNAL_AT[member.first]) if member.first in SIGNAL_AT else counts
+def _signal_words(ours: Controller, member: Member) -> str:
+    """A count of which only differences are taken may go round; one that is read as an angle may not."""
+    if member.first in SIGNAL_AT:
+        return member_words(SIGNAL_AT[member.first])
+    as_angle = f"(double)in->{member.name}" in ours.program.functions
+    return f"count of the encoder; it may {'not ' if as_angle else ''}go round at 2**32"
+
+
+def _angles(ours: Controller, upper: str) -> str:
+    """What to give for an angle in rad where the encoder is all there is."""
+    named = {each.name: each for each in ours.measured.members}
+    return "".join(
+        f" Where the encoder is all there is, give `{side}_angle_rad` as `{side}_counts / "
+        f"{upper}CONTROLLER_{'OUTPUT_' if side == 'output' else ''}COUNTS_PER_RAD`."
+        for side in ("motor", "output")
+        if {f"{side}_angle_rad", f"{side}_counts"} <= named.keys()
+    )
 
 
 def _sizes(ours: Controller, single_precision: bool) -> str:

@@ -34,9 +34,9 @@ MOST_TICKS = 16  # of a column that are noted
 SPEED, CURRENT_COMMAND, VOLTAGE, BESIDE_CURRENT, BESIDE_VOLTAGE = range(5)
 SEEN = 5
 
-# what the drive remembers, beside chains, delay line and stored angles; the angles first
+# what the drive remembers, beside chains, delay line and stored angles; the angle first
 REMEMBERED = np.array([
-    layout.S_ANGLE, layout.S_TRACKED_ANGLE, layout.S_CURRENT, layout.S_SPEED, layout.S_CURRENT_INTEGRATOR,
+    layout.S_ANGLE, layout.S_TRACKED_ERROR, layout.S_CURRENT, layout.S_SPEED, layout.S_CURRENT_INTEGRATOR,
     layout.S_VELOCITY_INTEGRATOR, layout.S_POSITION_INTEGRATOR, layout.S_SPEED_COMMAND,
     layout.S_SPEED_REFERENCE, layout.S_CURRENT_REFERENCE, layout.S_VOLTAGE, layout.S_MEASURED_SPEED,
     layout.S_FILTERED_SPEED, layout.S_TRACKED_SPEED, layout.S_REFERENCE, layout.S_REFERENCE_BEFORE,
@@ -124,10 +124,10 @@ def added(places, count, first, length):
 @kernel
 def listed(q, places):
     """Where the drive remembers something, angles first; how many there are, and how many are angles."""
-    places[0], places[1] = float(REMEMBERED[0]), float(REMEMBERED[1])
-    angles = added(places, 2, int(q[layout.AT_ANGLES]), int(q[layout.DIFFERENCE_SAMPLES]))
+    places[0] = float(REMEMBERED[0])
+    angles = added(places, 1, int(q[layout.AT_ANGLES]), int(q[layout.DIFFERENCE_SAMPLES]))
     count = angles
-    for k in range(2, REMEMBERED.shape[0]):
+    for k in range(1, REMEMBERED.shape[0]):
         count = added(places, count, int(REMEMBERED[k]), 1)
     count = added(places, count, layout.S_COMMAND_CHAIN, 2 * int(q[layout.COMMAND_FILTERS]))
     count = added(places, count, layout.S_SPEED_CHAIN, 2 * int(q[layout.SPEED_FILTERS]))

@@ -5,6 +5,7 @@ import shutil
 import struct
 import subprocess
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -230,11 +231,13 @@ int main(void)
 """
 
 
-def test_counts_of_the_encoder_go_round(tmp_path: Path) -> None:
+@pytest.mark.parametrize("speed", [{"difference_samples": 3}, {"speed": "tracking", "bandwidth": "300 Hz"}])
+def test_counts_of_the_encoder_go_round(speed: dict[str, Any], tmp_path: Path) -> None:
     """A turning drive from two counts, one of which passes the largest on the way, has the same bits."""
-    encoder = {"counts_per_rev": "4096", "speed": "difference", "difference_samples": 3}
+    encoder = {"counts_per_rev": "4096", "speed": "difference", **speed}
     changes = {f"encoder.{key}": value for key, value in encoder.items()}
     written(tmp_path, load_design("ilr33-amber").with_values(changes), single=True)
+    assert "motor_counts; /* count of the encoder; it may go round" in (tmp_path / "controller.h").read_text()
     (tmp_path / "round.c").write_text(ROUND)
     ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "round.c", "controller.c", "-o", "round")
     ran(tmp_path, "./round")
@@ -265,6 +268,8 @@ int main(void)
 def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: Path) -> None:
     """A count is 12 urad, times gain and ratio 0.01 rad/s; from the motor's zero it would run off."""
     written(tmp_path, load_design("joint"), single=True)
+    assert "`output_counts / DRIVE_CONTROLLER_OUTPUT_COUNTS_PER_RAD`" in (tmp_path / "README.md").read_text()
+    assert "output_counts; /* count of the encoder; it may not" in (tmp_path / "controller.h").read_text()
     (tmp_path / "stay.c").write_text(STAY)
     ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "stay.c", "controller.c", "-lm", "-o", "stay")
     ran(tmp_path, "./stay")

@@ -243,10 +243,18 @@ def test_a_reversed_column_is_not_answered_with_a_longer_motion(ticks: Record) -
     refused(_identified, turned, match=r"current is reversed.*a column has the other sign")
 
 
-def test_a_motor_held_fast_tells_resistance_and_inductance() -> None:
-    """u = R i + L di/dt, by the derivative of the current itself; the voltage acts 0.1 ms later."""
-    time, turn = np.arange(20_000) * TICK_S, 2.0 * pi * 40.0
+@pytest.mark.parametrize("motion", ["angle", "angle between two counts", "speed"])
+def test_a_motor_held_fast_tells_resistance_and_inductance(motion: str) -> None:
+    """u = R i + L di/dt, by the derivative of the current itself; the voltage acts 0.1 ms later.
+
+    An angle that flickers and the noise of a speed are no motion: as regressor it gave kE = 0 +- 0.1 kE.
+    """
+    time, turn, rng = np.arange(20_000) * TICK_S, 2.0 * pi * 40.0, np.random.default_rng(7)
     current = np.sin(turn * time)
     voltage = OHM * np.sin(turn * (time + TICK_S)) + HENRY * turn * np.cos(turn * (time + TICK_S))
-    record = record_of(time, "fast", angle=np.zeros_like(time), current=current, voltage=voltage)
+    noise = {"angle": 0.0 * time, "speed": 0.2 * rng.standard_normal(len(time))}
+    noise["angle between two counts"] = 1.0 + 0.001 * rng.integers(0, 2, len(time))
+    signals = {motion.split()[0]: noise[motion], "current": current, "voltage": voltage}
+    record = record_of(time, "fast", **signals)
     refused(_identified, record, match=r"resistance = 0\.6 ohm .*inductance = 0\.000(3|299\d) H .*moves")
+    refused(identify_bench, _design(), [record], match="fast: no motion beyond noise.*--electrical tells R")

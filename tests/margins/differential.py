@@ -184,9 +184,13 @@ def delayed_forms(
         if top < MOST_RAD / delay_s:
             beyond = behind_delay(loop, delay_s, 3.0 * MOST_RAD / delay_s)
             yield "nearest of delay_s", nearest(facts(one)), nearest(beyond), far
+    end = top * rng.random()
+    if not (part := stability_margins(loop, delay_s, (0.0, end))).withheld:
+        whole, far = below(facts(one), end), 30.0 if leaves_out(one) or leaves_out(part) else FAR
+        listed = replace(whole, phases=[p for p in whole.phases if p[0] < end])
+        yield "delay_s within a band", facts(part), listed, far
     others = {
         "series": partial(stability_margins, DelaySystem.from_system(loop) * DelaySystem.delay(delay_s)),
-        "a band": partial(stability_margins, loop, delay_s, (0.0, one.band_rad_s[1] * rng.random())),
     }
     if rng.random() < CERTIFIED_LATE:
         others["certified"] = partial(stability_margins, loop, delay_s=delay_s, certify=True)

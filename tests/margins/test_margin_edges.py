@@ -255,6 +255,22 @@ def test_the_smallest_distance_is_found_at_a_resonance_that_few_places_show() ->
     assert m.modulus_frequency_rad_s == pytest.approx(nearest.frequency_rad_s, rel=1e-6)
 
 
+@pytest.mark.parametrize("seed", [*range(10), 605, 717, 962, 1135])
+def test_a_distance_next_to_nothing_has_its_digits(seed: int) -> None:
+    """g/(s^2 + a s + b), of x = w^2: |1 + L|^2 has a minimum where a quadratic in x is zero."""
+    rng = np.random.default_rng(seed)
+    b = 10.0 ** rng.uniform(-4.0, 4.0)
+    a, g = 2.0 * 10.0 ** rng.uniform(-7.0, -5.0) * b**0.5, b * 10.0 ** rng.uniform(-1.0, 1.0)
+    m = stability_margins(control.tf([g], [1.0, a, b]))
+    with mpmath.workdps(50):
+        a, b, top = mpmath.mpf(a), mpmath.mpf(b), mpmath.mpf(b) + mpmath.mpf(g)
+        p, q = a * a - 2 * top, a * a - 2 * b
+        half, whole = (b * b - top * top) / (q - p), (p * b * b - q * top * top) / (q - p)
+        x = -half + mpmath.sqrt(half * half - whole)
+        smallest = mpmath.sqrt((x * x + p * x + top * top) / (x * x + q * x + b * b))
+    assert m.modulus_margin == pytest.approx(float(smallest), rel=1e-9)
+
+
 def test_a_loop_of_hundreds_of_states_that_double_precision_does_not_place_is_withheld_at_once() -> None:
     """A pole at z = 1 but for rounding, and 250 states: exact arithmetic would take minutes."""
     n = 250
