@@ -45,7 +45,7 @@ def found_together(
     records that are simulated behind it are not the nearest.
     """
     back = design.motor.back_emf_constant_Vs_rad or design.motor.torque_constant_Nm_A
-    design = with_values(design, {BACK: back})
+    design = with_values(design, {BACK: float(back or 0.0)})
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
     inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
     keys = {name: parameter(name).key or inertia for name in (*names, *motor)}
