@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
-from analyses.correlation.driving import SMOOTH, command_of
+from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq, wider_covariance
 from analyses.estimation.parameters import default_value
@@ -19,7 +19,7 @@ from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
-from analyses.records.record import Record
+from analyses.records.record import SMOOTH, Record
 
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
@@ -46,7 +46,27 @@ def without_bias(
     """
     less = model
     driven: tuple[Record, ...] = ()
-    fit = partial(
+    fit = same_fit(start, model)
+    for _ in range(ROUNDS):
+        try:
+            made = make(less)
+            reason = "" if driven else _cannot(made, records)
+            if reason:
+                return replace(model, bias_told=reason)
+            driven = driven or tuple(_driven(made, record) for record in records)
+            less = replace(less, simulated=tuple(with_model_signals(made, record) for record in driven))
+            again = fit([_as_used(*each) for each in zip(less.simulated, model.records, strict=True)])
+        except (InputError, NumericalError) as error:
+            return replace(less, bias_told=f"not taken off: {error}")
+        before, less = less, replace(_corrected(start, made, model, again), simulated=less.simulated)
+        if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
+            break
+    return less
+
+
+def same_fit(start: Design, model: JointModel) -> Callable[[Sequence[Record]], JointModel]:
+    """The fit of a model, of other records."""
+    return partial(
         fit_records,
         start,
         form=model.form,
@@ -56,21 +76,6 @@ def without_bias(
         knots_rad_s=model.knots_rad_s,
         weights=model.weights,
     )
-    for _ in range(ROUNDS):
-        try:
-            made = make(less)
-            reason = "" if driven else _cannot(made, records)
-            if reason:
-                return replace(model, bias_told=reason)
-            driven = driven or tuple(_driven(made, record) for record in records)
-            less = replace(less, simulated=tuple(_with_model_signals(made, record) for record in driven))
-            again = fit([_as_used(*each) for each in zip(less.simulated, model.records, strict=True)])
-        except (InputError, NumericalError) as error:
-            return replace(less, bias_told=f"not taken off: {error}")
-        before, less = less, replace(_corrected(start, made, model, again), simulated=less.simulated)
-        if not less.bias or np.all(np.abs(less.values - before.values) < SETTLED * less.standard_errors):
-            break
-    return less
 
 
 def _as_used(simulated: Record, measured: RecordFit) -> Record:
@@ -87,7 +92,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
         told += "; the intervals hold it"
         return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
-    parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
+    parts = with_noise(model, again)
     pairs = zip(model.weights, parts, strict=True)
     weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, part in pairs]
     share = sum(len(noise) for _, noise in weighed) / model.rows_used  # of a long record the first part
@@ -103,6 +108,11 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         bias_told="found on records simulated with the result, and taken off",
     )
     return with_scatter(start, less)
+
+
+def with_noise(model: JointModel, again: JointModel) -> tuple[RecordFit, ...]:
+    """The records of a model, with what those simulated leave of their noise."""
+    return tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
 
 
 def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
@@ -163,12 +173,12 @@ def _driven(design: Design, record: Record) -> Record:
     for _ in range(COMMAND_ROUNDS):  # learnt: the loop is about gain/(s + gain), what it lacks is added
         signals = {**record.signals, name: command / design.total_ratio}
         driven = replace(record, signals=signals, between=SMOOTH)
-        off = wanted - place(_with_model_signals(design, driven))
+        off = wanted - place(with_model_signals(design, driven))
         command = command + off + np.gradient(off, record.period_s) / gain
     return driven
 
 
-def _with_model_signals(design: Design, record: Record) -> Record:
+def with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals, _ = model_signals(design, record, {name: record[name] for name in names})

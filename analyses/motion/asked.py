@@ -62,7 +62,7 @@ class Asked:
     ] = None
     record: Annotated[Path | None, Option("Recorded command: s, and the amplitude's unit.", "CSV")] = None
     held: Annotated[bool, Option("The record is a log of changes: each value holds until the next.")] = False
-    csv: Annotated[Path | None, Option("Write every row as CSV.", "FILE")] = None
+    csv: Annotated[Path | None, Option("Write every row as CSV; a folder is made if needed.", "FILE")] = None
     parquet: Annotated[Path | None, Option("Write Parquet.", "FILE")] = None
     plot: Annotated[Path | None, Option("Write a plot as SVG.", "SVG")] = None
     every: Annotated[int, Option("Keep every N-th tick; 1.", "N")] = 1

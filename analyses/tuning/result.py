@@ -74,7 +74,7 @@ class NonlinearCheck:
     overshoot_percent: float
     settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
     final_error_percent: float  # friction may leave one that no gain removes
-    limited: str  # the limiters that acted, with their share of the time
+    limited: str  # the limiters that acted, and for how long
 
 
 @dataclass(frozen=True)
@@ -166,8 +166,9 @@ def nonlinear_checks(
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):
             seen = {name.partition(".")[2]: float(column[k]) for name, column in columns.items()}
-            shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
-            limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
+            percent_ms = 10.0 * plan.duration_s
+            acted = {name: percent_ms * seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+            limited = ", ".join(f"{name} {ms:.3g} ms" for name, ms in acted.items() if ms > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
             overshoot, error = seen["overshoot"], seen["final_error"]
             yield NonlinearCheck(corner, size, rise, overshoot, settling, error, limited)

@@ -83,7 +83,8 @@ def write(comparison: Comparison, folder: Path | None) -> list[str]:
 def result(comparison: Comparison) -> str:
     """Count the requirements of all designs; name the first that is not stable, not met, or not proven."""
     everything = comparison.everything
-    said = f"{comparison.tally.words('requirements')}, over {len(everything.all)} designs."
+    designs = f"{len(everything.all)} design{'s' * bool(everything.variants)}"
+    said = f"{comparison.tally.words('requirements')}, over {designs}."
     unstable = [f"{one.variant.name}, {unstable_words(one)}" for one in everything.all if one.unstable]
     said += _first_of("Not stable", unstable)
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):

@@ -138,6 +138,15 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("export fmu emps --fmi 4 --out out", "4: allowed: 2 or 3"),
         ("export fmu emps --platform vax --out out", "allowed: linux64, win64"),
         ("export controller emps --prefix 4fin --out out", "allowed: letters"),
+        (
+            "export controller emps --prefix int --out out",
+            "--prefix 'int': no _ last; allowed: letters",
+        ),
+        (
+            "export linear emps --to mat --out x.json",
+            "--out 'x.json': --to is mat; allowed: a name that",
+        ),
+        ("export linear emps --out x.mat", "ends in .json"),
         ("export c no-such-design --out out", "no such design; allowed: "),
         (
             "export c fin --single --out out",

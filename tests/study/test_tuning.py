@@ -94,6 +94,13 @@ def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
     assert found["nonlinear.final_error"][0] == pytest.approx(100.0 * (1.0 - y[ticks - 1]), rel=1e-6)
 
 
+def test_the_time_in_a_limit_is_that_of_the_ticks_that_ask_for_more():
+    """At the limit U the speed rises by U T/J a tick; K (r - k U T/J) > U up to k = 700/3 where r = 1."""
+    design = source_drive(0.1, 1.0, PERIOD, 0.3, controller={"velocity": VelocityLoop(gain=1.0)})
+    asked = replace(design, requirements=(need("phase_margin", 1.0),))
+    assert [one.limited for one in tune(asked, TuningSettings(curve=False)).checks] == ["", "voltage 234 ms"]
+
+
 def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():
     """A thousand times its current gain: the radius of the position loop is NaN, which is no reserve."""
     design = load_design("ballscrew")
