@@ -103,8 +103,8 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
     """
     place, rate = place_of(design, record), RATES[design.axis]
-    if place is None and rate not in record.signals:
-        return False
+    if _too_short(record) or (place is None and rate not in record.signals):
+        return False  # it is refused for that
     values = record[rate] if place is None else place[1] - place[1].mean()
     power = np.abs(rfft(values)) ** 2
     below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
@@ -248,9 +248,13 @@ def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
     return apart[(len(apart) - 1) % recipe.decimation :: recipe.decimation]
 
 
+def _too_short(record: Record) -> bool:
+    return len(record) * period_of(record) < SHORTEST_S and not is_benchmark(record)
+
+
 def _check(record: Record, locked: bool) -> None:
-    lasts = len(record) * period_of(record)
-    if lasts < SHORTEST_S and not is_benchmark(record):
+    if _too_short(record):
+        lasts = len(record) * period_of(record)
         told = f"lasts {lasts:.3g} s in {len(record)} rows: {SHORTEST_S:g} s and more are needed"
         raise InputError(f"{told}; is the unit of the time right?", where=record.name)
     if locked:
