@@ -104,6 +104,9 @@ STUDY_VARIANTS = Bound("variants of a study", 10_000, "a night on a cluster; eac
     asked_by="[[variant]], [[sweep]], [[grid]]")
 GRID_AXES = Bound("axes of a grid", 20, "two values each are a million", asked_by="grid.axes")
 AXIS_POINTS = Bound("values of an axis", 1000, "as many as a picture shows", asked_by="points")
+LOOP_STATES = Bound("states of a loop in many designs, over all ticks of its period", 200,
+    "some 100 MB of matrices; margins of one design take more, and long",
+    asked_by="control.velocity.every, encoder.difference_samples, control.computing_delay")
 SAMPLES = Bound("Monte Carlo samples", 1_000_000_000, "three days of one processor", asked_by="--samples")
 NIGHTLY_JOBS = Bound("reports of a night", 20_000, "every variant of the largest study, twice")
 JOB_BYTES = Bound("of one job's description", 256_000_000, "a comparison carries the text of all its designs",

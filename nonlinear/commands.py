@@ -214,7 +214,7 @@ def chirp(
     logarithmic: bool = True,
     start_s: float = 0.0,
 ) -> Command:
-    """Sine whose frequency runs from ``from_hz`` to ``to_hz`` over ``span_s``; it stays there afterwards."""
+    """Sine whose frequency runs over ``span_s``, exponentially where ``logarithmic``; it stays there then."""
     _finite("chirp", amplitude_rad=amplitude_rad, start_s=start_s)
     _positive("chirp", from_hz=from_hz, to_hz=to_hz, span_s=span_s)
     code = at.LOG_CHIRP if logarithmic else at.CHIRP

@@ -145,8 +145,7 @@ def design_report(
         provenance=origin,
         sections=sections,
     )
-    held = [name for name, one in figures.items() if one.held is not None]
-    live = attempt("sliders", lambda: live_model(design, held, source), None)
+    live = attempt("sliders", lambda: live_model(design, source), None)
     if live and figures:
         made["live"] = live
     return made

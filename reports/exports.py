@@ -11,6 +11,7 @@ from pathlib import Path
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import write_design
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes, write_together
 from analyses.linear.code_check import CodeCheck, check_code
 from nonlinear.export import PLATFORMS, c_export, controller_export, fmu_bytes, refuse_unknown
@@ -81,7 +82,10 @@ def export_fmu(design: Design, asked: AskedFmu) -> Exported:
 
 def export_linear(design: Design, asked: AskedLinear) -> Exported:
     """Write what `AskedLinear` says; refused where there is such a file already."""
-    target = asked.target or Path(f"{design.name}-linear{SUFFIXES[asked.to]}")
+    suffix = SUFFIXES[asked.to]
+    target = asked.target or Path(f"{design.name}-linear{suffix}")
+    if target.suffix.lower() in {*SUFFIXES.values()} - {suffix}:
+        raise InputError(f"target = '{target}': --to is {asked.to}; allowed: a name that ends in {suffix}")
     refuse_existing(target, asked.force)
     tree = linear_models(design)
     data = written_models(tree, asked.to)

@@ -11,6 +11,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, LOOPS
 from actuator_lti.batch import _figures as fig
 from actuator_lti.batch.library import many_loops, quoted
 from actuator_lti.batch.parameters import Population
+from actuator_lti.bounds import LOOP_STATES
 from actuator_lti.drive.operating import Operating, OperatingPoint, pushes_away
 from actuator_lti.drive.wiring import Drive, present, wire
 from actuator_lti.errors import InputError
@@ -18,8 +19,7 @@ from actuator_lti.loops.periodic import fundamental, shown
 from actuator_lti.loops.sampled import fundamental_path, stage_blocks
 from actuator_lti.loops.tick import Block, TickProgram
 
-_CHUNK = 1024
-_MOST_ORDER = 80
+_CHUNK = 256
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def linear_figures(
     ``threads``: that share the designs.
     ``progress``: called with (designs done, designs in all).
 
-    Raises `InputError`: for a computing delay of so many ticks that the order passes 80.
+    Raises `InputError`: for loops of more states than `actuator_lti.bounds.LOOP_STATES`.
     """
     at = Operating(
         point=operating_point,
@@ -240,8 +240,7 @@ def _command_path(wired: Drive) -> tuple[Any, Block | None]:
 def _stacked(block: Block, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Arrays of its own for every design, without the direct term, which is 0."""
     n = len(block.states)
-    if n > _MOST_ORDER:
-        raise InputError(f"control.computing_delay: gives loops of order {n}; at most {_MOST_ORDER} here")
+    LOOP_STATES.check(n)
 
     def own(part: np.ndarray, *shape: int) -> np.ndarray:
         return np.array(np.broadcast_to(part, (count, *shape)))

@@ -151,6 +151,11 @@ class Tolerance:
     upper: float = inf
     text: str = ""  # the width as written, so that a relative one ("50 %") follows a changed nominal
 
+    @property
+    def relative(self) -> bool:
+        """Whether the width is a share of the value."""
+        return self.text.strip().endswith("%")
+
 
 @dataclass(frozen=True, kw_only=True)
 class Parameter:

@@ -226,7 +226,8 @@ class Command:
         example="20 deg/s")] = inf
     acceleration_rad_s2: Annotated[float, positive("largest acceleration of the command, output side",
         example="400 deg/s^2")] = inf
-    jerk_rad_s3: Annotated[float, positive("largest jerk of the command, output side",
+    jerk_rad_s3: Annotated[float, positive("largest jerk of the command, output side: its mean over "
+        "2 acceleration/jerk, as the acceleration may reverse at once",
         example="8000 deg/s^3")] = inf
 
     def lowpass(self, period_s: Any, where: str = "") -> Filter:

@@ -20,6 +20,7 @@ LAW_INPUTS = LAW_WORDS[:-1]
 """What a controller measures or is given; the twist it makes of two of them, see `twist_of`."""
 BESIDE_A_LAW = ("every", "sensor", "back_emf_feedforward", "resistance_feedforward")
 """Keys of a stage that its law does not take the place of."""
+GAIN_REPLACED = "not allowed beside {stage}.law, whose own gain is {stage}.law.gain"
 MOST_STATES = 16  # order of a law that the running drive has room for
 SINGULAR = 1e12  # condition of I - A beyond which a law integrates
 Matrix = tuple[tuple[float, ...], ...]

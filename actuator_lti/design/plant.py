@@ -228,10 +228,10 @@ def _most_order(design: "Design", wave: Wave, ratio: float) -> tuple[float, str]
         return 0.0, "held over a tick, it needs a bound of the speed, limits.speed"
     most = MOST_PHASE_rad / (speed * Ts)
     unit, share = unit_on(design.axis, "{angle}/s"), 0.9995 * most / wave.order  # within it in four digits
-    late = f"{0.5 * wave.order * speed * Ts:.3g} rad at {speed:.4g} {unit}, more than {MOST_PHASE_rad / 2}"
+    turn = f"{wave.order * speed * Ts:.3g} rad at {speed:.4g} {unit}, more than {MOST_PHASE_rad}"
     slower = f"limits.speed = {share * speed * ratio:.4g} {unit}"
     takes = f"control.period = {1e6 * share * Ts:.4g} us or {slower} takes {wave.order:.4g}"
-    return most, f"held over a tick, it is late by {late}; {takes}"
+    return most, f"held over a tick, in which it passes {turn}; {takes}"
 
 
 def _largest_damping(design: "Design") -> tuple[float, str]:

@@ -20,6 +20,7 @@ from actuator_lti.design.checks_plant import with_stand_ins
 from actuator_lti.design.data_sheet import DataSheet, sheet_fields
 from actuator_lti.design.field import MANY, Field, Structure
 from actuator_lti.design.hint_numbers import BARE, hint_of, ticks_of, with_numbers
+from actuator_lti.design.law import GAIN_REPLACED
 from actuator_lti.design.law_sources import PARTS, read_law
 from actuator_lti.design.mistakes import UNREAD, Findings, UnreadError, meant_of, nearest
 from actuator_lti.design.plant import torque_per_command
@@ -169,8 +170,11 @@ class Reader:
                 self.stated[f"{path}.{field.key}"] = UNREAD
         values: Tree = {}
         for field in fields:
-            where = f"{path}.{field.key}"
-            if field.key in table:
+            where, replaced = f"{path}.{field.key}", field.key == "gain" and "law" in table
+            if replaced and field.key in table:
+                said = GAIN_REPLACED.format(stage=path)
+                values[field.attribute] = self.refuse(where, table[field.key], said)
+            elif field.key in table:
                 self.written.add(where)
                 values[field.attribute] = self.value(field, table, where)
             elif meant.get(field.key):
@@ -182,7 +186,7 @@ class Reader:
             elif field.key in meant:
                 self.parameters[where] = UNREAD
                 values[field.attribute] = self.ticks.get(where, UNREAD)
-            elif field.required and not (field.key == "gain" and "law" in table):
+            elif field.required and not replaced:
                 values[field.attribute] = self.unread(where, f"missing{_example(field)}")
         return values, meant
 

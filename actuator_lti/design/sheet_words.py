@@ -51,6 +51,7 @@ _WORDS: dict[str, dict[str, str]] = {
         "phase_resistance resistance_phase resistance_per_phase": f"resistance{_OF_PHASE}",
         "phase_inductance inductance_phase inductance_per_phase": f"inductance{_OF_PHASE}",
         "j jm inertia moment_of_inertia": "rotor_inertia",
+        "gd2 gd flywheel_effect": "rotor_inertia, GD2 over 4",
         "brake_inertia": "added to rotor_inertia",
         "mass moving_mass": "rotor_inertia, in kg on a linear axis",
         "moment_of_inertia_output_side output_inertia": "rotor_inertia, at the motor: over ratio^2",
@@ -83,6 +84,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "gear": {
         "teeth i reduction": 'ratio, which takes "60/20" too',
         "inertia": "input_inertia",
+        "gd2 gd flywheel_effect": "input_inertia, GD2 over 4",
         "type model part_number": "name",
         "backlash lost_motion play": "play of [coupling], beside its stiffness; without one left out",
         "stiffness rigidity": "stiffness of [coupling]",
@@ -112,6 +114,7 @@ _WORDS: dict[str, dict[str, str]] = {
     "load": {
         "j jl": "inertia",
         "mass": "inertia, in kg on a linear axis",
+        "gd2 gd flywheel_effect": "inertia, GD2 over 4",
         "inertia_ratio": "inertia, the ratio times rotor_inertia and the gears' ratio squared",
         "force torque moment max_torque force_max torque_max": "moment_max",
         _FRICTION: "dry_torque of [load.friction] behind a coupling, else of [friction]",

@@ -11,8 +11,9 @@ _THOUSANDS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2},[0-9]{3}(?![0-9])")
 _MILLIONS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:(?:,[0-9]{3}){2,}(?![0-9,])|,[0-9]{3}\.)")
 _COMMA = re.compile(r"\s*[+-]?[0-9]*,[0-9]")
 _SIGNS = str.maketrans(
-    {"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"', "−": "-", "–": "-"}
-)
+    {"·": "*", "⋅": "*", "×": "*", "μ": "µ", "\N{OHM SIGN}": "Ω", "′": "'", "″": '"', "−": "-", "–": "-",
+     "\N{MASCULINE ORDINAL INDICATOR}": "°", "\N{RING ABOVE}": "°"}
+)  # fmt: skip
 _POWER = re.compile(r"[-⁻]?[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+")  # min⁻¹
 _GROUPS = re.compile(r"\s*[+-]?[1-9][0-9]{0,2}(?:[ \u00a0\u2009\u202f][0-9]{3})+(?![0-9/])")  # 10 600
 # How data sheets write what is not a product of names: each becomes one, in this order.
@@ -61,6 +62,7 @@ _EXPONENT = re.compile(r"(?<=[0-9.])\s+([eE][+-]?[0-9]+)\b")  # 5.0 E-6
 _TWO = re.compile(r"\s*([0-9.]+)\s*(?:±|\+/-)\s*([0-9]+\.?[0-9]*)\s*([^\s0-9%].*?)\s*\Z")
 _BRACKETED = re.compile(r"\A\s*\(([^()]*(?:±|\+/-)[^()]*)\)")  # (20 ± 1) mm
 _AT = re.compile(r"\s*(@\s*[-+]?[0-9.]+ ?(?:°|deg)?\s*[CK]?)\s*\Z")
+_RANGE = re.compile(r"\s*[+-]?[0-9.]*[0-9] *(?:[-–…]|\.{2,3}|to\b) *[0-9]")
 _SECOND = re.compile(r"(?<![\w^.-])(?!1(?:000)?(?![0-9.]))[0-9]")
 _RAISED = str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")
 _OVER = re.compile(r"\s*([0-9]+\.?[0-9]*)\s*([/:]|to\b)\s*([0-9]+\.?[0-9]*)\s*\Z")
@@ -126,7 +128,7 @@ def split_quantity(text: str) -> tuple[float, str]:
         )
     if _COMMA.match(text):
         raise ValueError(f"a decimal comma; use a decimal point: {shown(text.replace(',', '.', 1))}")
-    if re.match(r"[-–] *[0-9]", match[2]):
+    if _RANGE.match(text):
         raise ValueError("a range; write one number")
     if _SECOND.search(match[2]):
         raise ValueError(f"{shown(match[2])} is not a unit, it has a number in it; write one number")

@@ -77,7 +77,7 @@ def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: F
 
 def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
     """The tolerance of a changed nominal: a relative one follows it, of 0 there is none."""
-    if not tolerance.text.strip().endswith("%"):
+    if not tolerance.relative:
         return tolerance
     if nominal == 0.0:
         return None

@@ -100,6 +100,7 @@ _ASIDE = {
     ),
     **dict.fromkeys(("wb", "mwb", "weber"), _FLUX),
     **dict.fromkeys(("step", "steps", "edges"), 'of an encoder are written "counts"'),
+    **dict.fromkeys(("wr", "wk"), "is no unit; WR2 and WK2 are the inertia J, in kg*m^2 or lb*ft^2"),
     "degf": "is no unit here; F degrees Fahrenheit are (F - 32)/1.8 degC",
     "tpi": "is no lead; write one over it, in inches",
     "ipm": 'is written "in/min"',
@@ -114,6 +115,7 @@ _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of 
 
 _AMPERE = re.compile(r"\bA\b")
 MOST_FACTORS = 40
+_GD2 = re.compile(r"\s*\(?\bGD(?:\^?2|²)\)?\s*=?\s*")
 _INNER = re.compile(r"\(([^()]*)\)")
 _FACTOR = re.compile(r"\s*([*/]?)\s*(_[0-9]+|[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)m?(?=[* ]c?m\b)")
@@ -251,6 +253,7 @@ _KINDS = {
     "kg": "mass", "kg*m^2": "moment of inertia", "N*m": "torque", "N": "force", "m/s": "speed",
     "N*m/A": "torque constant", "V*s/rad": "back-EMF constant", "rad/s^2": "angular acceleration",
     "m/s^2": "acceleration", "N*m*s/rad": "viscous friction", "N*m/rad": "stiffness",
+    "N*m^2": "flywheel effect, GD2 or WR2", "1": "ratio",
     "degC": "temperature", "K": "temperature difference", "pulse": "count or line, by maker",
 }  # fmt: skip
 
@@ -281,6 +284,8 @@ _ADVICE = {
     (_FREQUENCY, "1/s"): "a frequency in Hz becomes a gain in 1/s times 2 pi: {size:.6g} 1/s",
     ("mass", "m/s^2"): "1 g of a fall is 9.80665 m/s^2{fall}",
     ("mass", "N"): "a weight is written kgf",
+    ("moment of inertia", "kg*m^2"): "GD2 is 4 J: J = {quarter:.4g} kg*m^2",
+    ("flywheel effect, GD2 or WR2", "kg*m^2"): "GD2 is 4 g J, WR2 g J: of a GD2 J = {of_weight:.4g} kg*m^2",
     ("moment of inertia", "kg"): "a screw of lead p carries J as the mass J (2 pi/p)^2",
     ("mass", "kg*m^2"): "a mass m on a screw of lead p is the inertia m (p/2 pi)^2",
     ("torque", "N"): "a screw of lead p turns a torque T into the force 2 pi T/p",
@@ -302,7 +307,8 @@ def _advice(value: UnitValue, wanted: UnitValue, number: float) -> str:
         if "{corner" in said and size <= 0.0:
             return ""
         corner = 1.0 / size if size else 0.0
-        here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner}
+        here = {"n": number, "lines": 4.0 * number, "corner": corner, "period": 2.0 * pi * corner,
+                "quarter": 0.25 * size, "of_weight": 0.25 * size / 9.80665}  # fmt: skip
         fall = f", here {9.80665 * number:.6g} m/s^2" if value.factor == 1e-3 else ""
         return f"; {said.format(size=size, fall=fall, **here)}"
     if "[count]" in dict(value.dimension) and wanted.angle:
@@ -350,8 +356,11 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
     """
     wanted = parse_unit(unit)
     example = f"a number with a unit like {unit}" if unit not in ("", "1") else "a number without a unit"
+    flywheel = isinstance(text, str) and _GD2.search(text) is not None
     try:
-        number, written = (float(text), "") if isinstance(text, int | float) else split_quantity(text)
+        number, written = (
+            (float(text), "") if isinstance(text, int | float) else split_quantity(_GD2.sub("", text))
+        )
         if not isfinite(number):
             raise ValueError("must be finite")
         result = _as_meant(written, wanted)
@@ -361,11 +370,12 @@ def parse_quantity(text: str | float | int, unit: str) -> float:
         return 0.0
     if not isfinite(value := scaled(number, result.factor)):
         raise InputError(f"must be finite; allowed: {example}")
-    if not compatible(result, wanted):
-        missing = "has no unit" if not written else _kind_of(written, result)
-        wrong = "wrong dimension, " if written else ""
+    if flywheel or not compatible(result, wanted):
+        wrong = f"wrong dimension, {_kind_of(written, result)}" if written else "has no unit"
         advice = _advice(result, wanted, number)
-        raise (AdvisedError if advice else InputError)(f"{wrong}{missing}; allowed: {example}{advice}")
+        raise (AdvisedError if advice else InputError)(
+            f"{'a GD2' if flywheel else wrong}; allowed: {example}{advice}"
+        )
     return value
 
 

@@ -8,6 +8,7 @@ and taken out.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -87,14 +88,14 @@ class _RoundTrip(NamedTuple):
 
 def _round_trip(As: np.ndarray, at: float, holds: np.ndarray) -> _RoundTrip:
     """``holds``: integrators in every tick: of those only what they sum is a term, not themselves."""
-    one = np.eye(As.shape[1])
-    before, change, sums = [one], np.zeros_like(one), np.zeros_like(one)
-    for A in As:
-        over = before[-1]
+    one, first = np.eye(As.shape[1]), As[0] - at * np.eye(As.shape[1])
+    before, change, sums, whole = [one], first, np.abs(first), np.abs(As[0])  # nothing times one: 1300 states
+    for last, A in pairwise(As):
+        over = last if len(before) == 1 else last @ before[-1]
         change, sums = change + (A - at * one) @ over, sums + np.abs(A - at * one) @ np.abs(over)
-        before.append(A @ over)
-    whole = np.abs(As[-1]) @ np.abs(before[-2]) + abs(at) * one
-    return _RoundTrip(np.array(before[:-1]), change, np.where(holds[:, None], sums, whole))
+        whole = np.abs(A) @ np.abs(over)
+        before.append(over)
+    return _RoundTrip(np.array(before), change, np.where(holds[:, None], sums, whole + abs(at) * one))
 
 
 def _on_its_way(As: np.ndarray, v: np.ndarray) -> np.ndarray:

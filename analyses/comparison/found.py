@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import metadata
@@ -105,13 +105,29 @@ class LargeSignal:
         return figures
 
 
-def figure_names(all_figures: Sequence[Figures], design: Design) -> tuple[FigureName, ...]:
+def beside(base: Design, design: Design, figures: Figures) -> dict[str, float | None]:
+    """Figures by their keys; of another axis, or of another command, by keys of their own ("... linear")."""
+    pairs = [*zip(_kind(design), _kind(base), strict=True)]
+    ends = {group: "".join(f" {own}" for own, _ in told) if any(own != its for own, its in told) else ""
+            for group, told in {"drive": pairs[:1], "large": pairs}.items()}  # fmt: skip
+    return {key + ends.get(key.partition(".")[0], ""): value for key, value in figures.items()}
+
+
+def _kind(design: Design) -> tuple[str, str]:
+    """The axis, which figures of the drive have their units of, and what is commanded."""
+    return design.axis, design.controller.outermost
+
+
+def figure_names(found: Iterable[tuple[Figures, Design]]) -> tuple[FigureName, ...]:
     """Names of all figures that occur, in the order in which they first do."""
-    keys = dict.fromkeys(key for figures in all_figures for key in figures)
-    return tuple(_name(key, design) for key in keys)
+    names: dict[str, FigureName] = {}
+    for figures, design in found:
+        names |= {key: _name(key, design) for key in figures if key not in names}
+    return tuple(names.values())
 
 
-def _name(key: str, design: Design) -> FigureName:
+def _name(whole: str, design: Design) -> FigureName:
+    key, _, kind = whole.partition(" ")
     group, _, rest = key.partition(".")
     quantity, _, at = rest.partition("@")
     known, words = QUANTITIES.get(quantity), quantity.replace("_", " ")
@@ -126,7 +142,8 @@ def _name(key: str, design: Design) -> FigureName:
         at = ""  # no load changes it
     elif at:
         at = f"{at} {design.load_unit}"
-    return FigureName(key, f"{words} at {at}" if at else words, "" if unit == "1" else unit, group, better)
+    words += f" at {at}" * bool(at) + f", {kind} drive" * bool(kind)
+    return FigureName(whole, words, "" if unit == "1" else unit, group, better)
 
 
 LIBRARIES = ("numpy", "scipy")

@@ -27,6 +27,7 @@ from analyses.comparison.found import (
     Found,
     Kept,
     LargeSignal,
+    beside,
     figure_names,
     small_signal,
 )
@@ -151,7 +152,7 @@ def compare(
         for variant, one in zip((study.base, *good), (base, *result), strict=True)
         if one is not None
     )
-    names = figure_names([c.figures for c in (reference, *ends)], origin)
+    names = figure_names((c.figures, _design(c.variant)) for c in (reference, *ends))
     refused = tuple(v for v in study.variants if v.design is None)
     return Comparison(study, names, reference, tuple(ends), slopes, refused)
 
@@ -182,6 +183,7 @@ def _evaluated(variant: Variant, plan: LargeSignal, tested: bool) -> Found:
 def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tuple[int, Variant]) -> Found:
     """What is found of a design, how it differs from the base, and what moved it."""
     one, design = _evaluated(at[1], plan, tested), _design(at[1])
+    one = replace(one, figures=beside(origin, design, one.figures))
     changed, differences = changes(origin, design), {}
     for key, value in one.figures.items():
         before = base.figures.get(key)
@@ -195,22 +197,30 @@ def _beside(base: Found, origin: Design, plan: LargeSignal, tested: bool, at: tu
 
 def changes(base: Design, other: Design) -> tuple[Changed, ...]:
     """Keys of the design file that differ; names and texts of the head do not count."""
-    before, after = dict(_flat(design_tree(base))), dict(_flat(design_tree(other)))
+    before, after = keys_of(base), keys_of(other)
     return tuple(
         Changed(key, before.get(key, "–"), after.get(key, "–"))
         for key in {**before, **after}
-        if before.get(key) != after.get(key) and not key.startswith(("design.", "requirement", "fact"))
+        if before.get(key) != after.get(key) and not key.startswith("requirement")
     )
 
 
+def keys_of(design: Design) -> dict[str, str]:
+    """What a design file says as texts, by dotted key; names and texts of the head and facts do not count."""
+    leaves = _flat(design_tree(design))
+    return {key: text for key, text in leaves if not key.startswith(("design.", "fact"))}
+
+
 def _flat(tree: Any, path: str = "") -> Iterator[tuple[str, str]]:
-    """Leaves of a design tree as texts, by dotted key; an entry with a value is one leaf."""
+    """Leaves of a design tree as texts, by dotted key; of an entry its value and its tolerance."""
     if isinstance(tree, Mapping) and "value" not in tree:
         below = list(tree.items())
     elif isinstance(tree, list) and tree and all(isinstance(item, Mapping) for item in tree):
-        below = [(item.get("name") or item.get("id") or k, item) for k, item in enumerate(tree)]
+        below = [(item.get("name") or item.get("id") or k, item) for k, item in enumerate(tree, 1)]
     else:
         yield path, str(tree["value"] if isinstance(tree, Mapping) else tree)
+        if isinstance(tree, Mapping) and "tolerance" in tree:
+            yield f"{path}.tolerance", str(tree["tolerance"])
         return
     for key, item in below:
         yield from _flat(item, f"{path}.{key}" if path else key)

@@ -123,7 +123,7 @@ def measured_signals(
     """
     notes = [] if notes is None else notes
     there = {name: record[name] for name in AXIS_SIGNALS[design.axis] if name in record.signals}
-    result = {name: values for name, values in there.items() if np.any(values)}
+    result = {name: values for name, values in there.items() if values @ values > 0.0}
     notes += [f"{name} is zero throughout: not compared" for name in there if name not in result]
     gain, place, rate = design.effective_motor.source_gain_Nm_V, "position", "velocity"
     if design.axis == "rotary":
@@ -191,8 +191,8 @@ def model_signals(
 
 def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> float:
     """Sum over the signals of the squared relative difference, over the measured rows."""
-    pairs = [(values, modelled[name][: len(values)]) for name, values in measured.items() if np.any(values)]
-    return sum(float(np.sum((made - own) ** 2) / np.sum(own**2)) for own, made in pairs)
+    pairs = [(values, modelled[name][: len(values)]) for name, values in measured.items()]
+    return sum(float(np.sum((made - own) ** 2) / (own @ own)) for own, made in pairs if own @ own > 0.0)
 
 
 def _with_steps(

@@ -10,7 +10,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
 from analyses.correlation.driving import Driven, command_of
 from analyses.estimation.least_squares import solve, told_apart
-from analyses.records.consistency import ALIKE, RATE_TOLERANCE, SURE, Finding
+from analyses.records.consistency import ALIKE, OVER, RATE_TOLERANCE, SURE, Finding
 from analyses.records.driven_motion import ratio_of
 from analyses.records.record import Record
 
@@ -25,6 +25,7 @@ class Followed:
     alike: float  # correlation of the recorded motion with the simulated one
     clock: float  # of the following error, recorded over simulated
     off: float = 0.0  # of what the position has too much of the motion
+    limit: str = ""  # the largest current, where the loops take far more of it for the same command
 
     @property
     def fails(self) -> bool:
@@ -45,7 +46,7 @@ class Followed:
         elif self.stage == "position":
             what, of = "following error", "of the design's loops at this motion"
             clock = f"a clock about {100.0 * self.clock:+.2g} % off"
-            cause = f"{clock}, a command logged early or late, or another gain"
+            cause = f"{clock}, a command logged early or late, {self.limit or 'or another gain'}"
         return f"the {what} is {ratio:.4g} times that {of}: {cause}"
 
 
@@ -82,7 +83,17 @@ def followed(
     solved = solve(table[:, kept] / size, own - own.mean() - table[:, -1])
     shares, errors = solved.values / size, np.sqrt(np.diag(solved.correlated)) / size
     _, alike = ratio_of(own - own.mean(), model - model.mean())
-    return Followed(driven.stage, alike, *np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist())
+    clock, *off = np.where(np.abs(shares) > SURE * errors, shares, 0.0).tolist()
+    return Followed(driven.stage, alike, clock, sum(off), _limit(record.signals, simulated))
+
+
+def _limit(recorded: Mapping[str, Floats], simulated: Mapping[str, Floats]) -> str:
+    """A limit of the drive that the design does not have; empty where the currents tell of none."""
+    most = [float(np.max(np.abs(one["current"]))) for one in (recorded, simulated) if "current" in one]
+    if len(most) < 2 or most[1] <= OVER * most[0]:
+        return ""
+    told = f"the current stays below {most[0]:.3g} A, the design's loops take up to {most[1]:.3g} A"
+    return f"another gain, or a lower limit of the current (limits.peak_current): {told}"
 
 
 def moved_by_clock(driven: Driven, record: Record, place: str, model: Floats) -> Floats | None:

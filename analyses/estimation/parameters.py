@@ -36,8 +36,8 @@ PARAMETERS = {
     "viscous_reverse": Parameter("Viscous friction, reverse", VISCOUS, "friction.viscous_reverse"),
     "dry_reverse": Parameter("Dry friction, reverse", TORQUE, "friction.dry_torque_reverse"),
     "load_coefficient": Parameter("Load friction", "N m/(N m)", "friction.load_coefficient"),
-    "gravity_sin": Parameter("Gravity, m g l cos(offset)", TORQUE),
-    "gravity_cos": Parameter("Gravity, m g l sin(offset)", TORQUE),
+    "gravity_sin": Parameter("Gravity, m g l cos(offset less the design's)", TORQUE),
+    "gravity_cos": Parameter("Gravity, m g l sin(offset less the design's)", TORQUE),
     "gravity": Parameter("Gravity, m g l", TORQUE),
     "motor_inertia": Parameter("Inertia before the coupling, at the motor", INERTIA, "motor.rotor_inertia"),
     "load_inertia": Parameter("Inertia behind it, at its own shaft", INERTIA, "load.inertia"),
@@ -78,8 +78,16 @@ def parameter(name: str, axis: str = "rotary") -> Parameter:
     return Parameter(one.linear or one.label, ON_A_LINE.get(one.unit, one.unit), one.key, scale=one.scale)
 
 
-def default_value(design: Design, name: str) -> float:
-    """The design's own value of a parameter of an inverse model, at the motor."""
+def pendulum_angle(design: Design) -> float:
+    """The offset of the design's pendulum, rad; 0 without one."""
+    return 0.0 if design.load.gravity is None else design.load.gravity.offset_rad
+
+
+def default_value(design: Design, name: str, start: Design | None = None) -> float:
+    """The design's own value of a parameter of an inverse model, at the motor.
+
+    ``start`` is the design that the model was fitted with, where it is another.
+    """
     friction, gravity = design.friction, design.load.gravity
     if name == "inertia":
         return design.inertia_kgm2
@@ -87,7 +95,7 @@ def default_value(design: Design, name: str) -> float:
         return dict(enumerate(point.torque_Nm for point in friction.map(1))).get(int(name[4:]), 0.0)
     if name.startswith("gravity_") and gravity is not None:
         part = cos if name == "gravity_sin" else sin
-        return gravity.peak_Nm * part(gravity.offset_rad)
+        return gravity.peak_Nm * part(gravity.offset_rad - pendulum_angle(start or design))
     side = -1 if name.endswith("_reverse") else 1
     own = {
         "viscous": friction.viscous(side),

@@ -103,8 +103,10 @@ def identify_bench(
     findings = {name: (*each, *told[name]) for name, each in findings.items()}
     right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
     items = list(_items(design, settings, findings, right, compared, held))
-    made, refined = _made(start, right, both, settings, items, progress)
-    again = tuple(resimulate(made, record, model.form) for record in (*right.records, *unseen))
+    made, refined, unmade = _made(start, right, both, settings, items, progress)
+    every = () if unmade else (*right.records, *unseen)
+    again = tuple(resimulate(made, record, model.form) for record in every)
+    items += verdict.made_items(unmade, design, made)
     items += _unseen_items(start, model, unseen, limit)
     items += [verdict.simulated_item(one.record, one.beyond_noise, limit, one.how) for one in again]
     return BenchResult(
@@ -114,6 +116,7 @@ def identify_bench(
         model=model,
         refined=refined,
         design=made,
+        unmade=unmade,
         resimulated=again,
         items=tuple(items),
         settings=settings,
@@ -152,8 +155,11 @@ def _made(
     settings: Settings,
     items: Sequence[verdict.Item],
     progress: Progress,
-) -> tuple[Design, OutputErrorResult | None]:
-    """The design with what was found, as its file gives it, and the refinement where one was asked for."""
+) -> tuple[Design, OutputErrorResult | None, str]:
+    """The design with what was found, as its file gives it, and the refinement where one was asked for.
+
+    Where none comes of a record that fails anyway, that of the start, and why.
+    """
     model, records = right.model, right.records
     source = f"identified from {names_of(records)}{at_constant(model, start)}"
     try:
@@ -167,9 +173,9 @@ def _made(
             both = to_design.joint_values(start, both, inertia_to=settings.inertia_to)
             made = to_design.with_correlations(made, both)
     except InputError as error:
-        reasons = "; ".join(item.reason for item in items if item.passed is False)
-        message = f"{reasons}; so {error.message}" if reasons else error.message
-        raise InputError(message, error.where) from None
+        if all(item.passed is not False for item in items):
+            raise
+        return start, None, error.message
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)
@@ -179,7 +185,7 @@ def _made(
             refined = replace(refined, covariance=own.covariance)
         made = to_design.design_with_fit(made, refined, f"{source}, refined by simulation")
         made = made if both is None else to_design.with_correlations(made, both)
-    return read_design_text(write_design(made)), refined
+    return read_design_text(write_design(made)), refined, ""
 
 
 def _items(

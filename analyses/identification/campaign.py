@@ -12,13 +12,14 @@ from actuator_lti.types import Floats, Progress
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.identification.design_values import design_value, kept_constant
 from analyses.identification.richer import RicherLaws, compare_laws
-from analyses.identification.steady import CRITERION, SteadyCriterion, SteadyPoint, steady_point
+from analyses.identification.steady import SteadyPoint, steady_point
 from analyses.identification.surface import NAMES, SurfaceFit, fit_surface
 from analyses.identification.verdict import Item, kept_items, residual_item, simulated_item, size_item
 from analyses.records.campaign_import import ImportedCampaign, ImportedRun, SetAside
 from analyses.records.consistency import Finding, check_record, wrong_of
 from analyses.records.factors import named_factor
 from analyses.records.inputs import InputUse
+from analyses.records.steady_window import CRITERION, SteadyCriterion
 from nonlinear import commands, simulate
 
 RUN_UP_S = 0.3

@@ -99,17 +99,12 @@ def design_values(
 
 
 def _gravity_value(design: Design, model: JointModel) -> DesignValue | None:
-    """The pendulum's moment, by what was found of it along the design's own offset; None without either."""
-    gravity, slopes = design.load.gravity, {}
-    if gravity is not None:
-        offset = gravity.offset_rad
-        both = {"gravity_sin": float(np.cos(offset)), "gravity_cos": float(np.sin(offset))}
-        slopes = {name: share for name, share in both.items() if name in model.names}
-    size = sum(share**2 for share in slopes.values())
-    if gravity is None or size < 1e-12:
+    """The pendulum's moment, by what was found of it along the design's own offset; None without."""
+    gravity = design.load.gravity
+    if gravity is None or "gravity_sin" not in model.names:
         return None
-    along = {name: share / size for name, share in slopes.items()}  # of one term alone: that over its share
-    one = design_value(design, model.mapped({"gravity": along}), "gravity", gravity.peak_Nm)
+    along = model.mapped({"gravity": {"gravity_sin": 1.0}})
+    one = design_value(design, along, "gravity", gravity.peak_Nm)
     key = "load.gravity.mass"
     return one and replace(one, allowed=own_share(design, key), assumed=not own_std(design, key))
 

@@ -8,6 +8,7 @@ import numpy as np
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
+from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
@@ -15,7 +16,7 @@ from analyses.estimation.parameters import Parameter, parameter
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
-from analyses.records.consistency import SURE, Finding, clock_doubt, resistance_doubt
+from analyses.records.consistency import ALIKE, SURE, Finding, clock_doubt, resistance_doubt
 from analyses.records.naming import KNOWN_UNITS
 from analyses.records.record import Record, lasting
 
@@ -35,6 +36,11 @@ class Lag:
     @property
     def is_sure(self) -> bool:
         return abs(self.seconds) > SURE * self.standard_error
+
+    @property
+    def within_s(self) -> float:
+        """The lag, or how closely it is told, whichever is more."""
+        return max(abs(self.seconds), self.standard_error)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,8 +73,8 @@ def diagnosed(
         own, other = (lag_of(start, one, like, model) for one in (record, like))
         if own is not None and other is not None:  # the simulation has none, but what is found in it
             lag = Lag(own.seconds - other.seconds, float(np.hypot(own.standard_error, other.standard_error)))
-            found[record.name].append(_of_lag(drive_of(start, record)[1], lag))
-            late = max(late, abs(lag.seconds), lag.standard_error)
+            found[record.name].append(_of_lag(drive_of(start, record)[1], lag, record.period_s))
+            late = max(late, lag.within_s)
             if lag.is_sure:
                 sure.append(lag)
                 used[k] = shifted(start, record, lag.seconds)
@@ -78,7 +84,7 @@ def diagnosed(
             share = np.mean([(lag.standard_error / lag.seconds) ** 2 for lag in sure])
             model = _widened(model, np.sqrt(share) * (model.values - before.values))
     pairs = zip(used, model.simulated, strict=False)  # none where it cannot be simulated
-    seen = {record.name: followed(start, record, like.signals) for record, like in pairs}
+    seen = {record.name: _followed(start, record, like.signals) for record, like in pairs}
     for record, part in zip(used, model.records, strict=True):
         model = _with_doubts(design, start, record, seen.get(record.name), model)
         if not is_benchmark(record):
@@ -92,6 +98,16 @@ def diagnosed(
         followed={name: one for name, one in seen.items() if one is not None},
         findings={name: tuple(each) for name, each in found.items()},
     )
+
+
+def _followed(start: Design, record: Record, simulated: Mapping[str, Floats]) -> Followed | None:
+    """As `followed`; where what was found does not even move as the record, by the design's own motion."""
+    one = followed(start, record, simulated)
+    if one is None or one.alike >= ALIKE:
+        return one
+    names = [name for name in AXIS_SIGNALS[start.axis] if name in record.signals]
+    own, _ = model_signals(start, record, {name: record[name] for name in names})
+    return followed(start, record, own)
 
 
 def _widened(model: JointModel, moved: Floats) -> JointModel:
@@ -112,11 +128,12 @@ def _with_doubts(
     return _widened(model, resistance_doubt(design, record) * model.values)
 
 
-def _of_lag(signal: str, lag: Lag) -> Finding:
+def _of_lag(signal: str, lag: Lag, period_s: float) -> Finding:
     subject = f"{signal.replace('_', ' ')} and motion at one time"
     late, error = 1e3 * lag.seconds, 1e3 * lag.standard_error
     if not lag.is_sure:
-        return Finding(subject=subject, passed=True, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
+        told = lag.within_s <= period_s or None
+        return Finding(subject=subject, passed=told, text=f"within {max(abs(late), 2.0 * error):.2g} ms")
     which = "later" if late > 0.0 else "earlier"
     text = f"the {signal} is {abs(late):.3g} ms (standard error {error:.1g} ms) {which} than the motion"
     return Finding(

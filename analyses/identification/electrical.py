@@ -166,7 +166,7 @@ def without_own_bias(
 def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) -> Floats:
     """Columns i, w, di/dt, 1 and u of one record, filtered alike; u as it acts, ``late_s`` later."""
     for name in ("voltage", "current"):
-        if name not in record.signals:
+        if name not in record.signals or not record[name] @ record[name] > 0.0:
             raise InputError(f"no {name}: voltage, current and motion are needed", record.name)
     recipe, period = recipe or recipe_for(record), period_of(record)
     speed = motion_of(record.drive(design), record, recipe)[0].velocity

@@ -87,7 +87,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     rest = [weight * own.residual[part.compared] for weight, own, part in triples]
     more = scaled_lstsq(np.concatenate([told for told, _ in weighed]), np.concatenate(rest))
     less = replace(model, values=model.values + more, records=parts)
-    found = {name: again[name] - default_value(made, name) for name in model.names if name in again.names}
+    found = {n: again[n] - default_value(made, n, start) for n in model.names if n in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
@@ -100,7 +100,7 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
         less,
         values=less.values - bias,
         covariance=wider_covariance(weighed) + np.outer(moved, moved),
-        alone=tuple(_alone(*each, made, model) for each in singles),
+        alone=tuple(_alone(*each, partial(default_value, made, start=start), model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
         bias_told="found on records simulated with the result, and taken off",
     )
@@ -143,10 +143,12 @@ def _by_direction(model: JointModel, again: JointModel) -> Floats:
     return scaled_lstsq(np.concatenate(tables), np.concatenate(turned))
 
 
-def _alone(own: Fit, simulated: Fit, weighed: tuple[Floats, Floats], made: Design, model: JointModel) -> Fit:
-    """One record fitted alone, less its bias, with the errors of its noise."""
+def _alone(
+    own: Fit, simulated: Fit, weighed: tuple[Floats, Floats], true: Callable[[str], float], model: JointModel
+) -> Fit:
+    """One record fitted alone, less its bias, with the errors of its noise; ``true``: what was simulated."""
     both = tuple(name for name in own.names if name in simulated.names)
-    values = np.array([own[name] - simulated[name] + default_value(made, name) for name in both])
+    values = np.array([own[name] - simulated[name] + true(name) for name in both])
     told = information_of(weighed[0][:, [model.names.index(name) for name in both]], weighed[1])
     return Fit(names=both, values=values, covariance=covariance_of([told]))
 

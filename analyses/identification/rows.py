@@ -12,7 +12,7 @@ from scipy.stats import f as variance_ratio
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
-from analyses.estimation.parameters import default_value
+from analyses.estimation.parameters import default_value, pendulum_angle
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
@@ -143,7 +143,8 @@ def record_rows(
 ) -> Rows:
     """Make the rows of one record, less what its own settings add (an inertia at the output).
 
-    ``gravity`` adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output; ``moment`` is that
+    ``gravity`` adds columns for a moment ``a sin(phi) + b cos(phi)`` at the output, phi from where the
+    design's pendulum stands upright: where b is not told, the design's offset is kept. ``moment`` is that
     moment after decimation as found so far, for the load's share of the friction. Speeds of a friction map
     take the place of the form's dry and viscous friction.
     """
@@ -154,7 +155,8 @@ def record_rows(
     own = _balance(design, record, recipe, gravity=gravity)
     motion, angle = own.motion, own.angle
     names, columns = friction_columns(motion, form, knots_rad_s)
-    others = [np.sin(angle), np.cos(angle), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
+    turned = angle + pendulum_angle(shared)
+    others = [np.sin(turned), np.cos(turned), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
     part = _part(motion, recipe)
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
@@ -165,7 +167,7 @@ def record_rows(
         w += [-1.0 / design.total_ratio * sine, -1.0 / design.total_ratio * cosine]
     table = np.column_stack(w)
     if record.settings:  # the values looked for are those of the shared design
-        y = y - table @ [default_value(design, name) - default_value(shared, name) for name in names]
+        y = y - table @ [default_value(design, n, shared) - default_value(shared, n) for n in names]
     keep = _kept(record, motion, part, recipe)
     return Rows(
         name=record.name,

@@ -71,7 +71,7 @@ def identify(
         records = _opened(asked.files)
         unseen = _opened(asked.validate or (), [record.name for record in records])
         made = identify_bench(design, records, validation=unseen, settings=asked, progress=progress)
-    return replace(made, accepted=asked.accept)
+    return replace(made, accepted=asked.accept and not made.unmade)
 
 
 def _opened(paths: Sequence[Path], taken: Sequence[str] = ()) -> list[Record]:

@@ -3,6 +3,7 @@
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
+from math import pi, remainder
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravit
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.fit import Fit
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.joint_model import JointModel
 from analyses.records.consistency import SURE
 
@@ -21,7 +22,7 @@ LEAST_CORRELATION = 0.005
 TRUNCATION_STD = 6.5  # standard deviations that a normal distribution is sampled to
 REVERSE = ("friction.viscous_reverse", "friction.dry_torque_reverse")
 PLAIN_KEYS = ("friction.viscous", "friction.dry_torque", *REVERSE)
-GRAVITY = ("gravity_sin", "gravity_cos")  # m g l cos(offset) and m g l sin(offset)
+GRAVITY = ("gravity_sin", "gravity_cos")  # m g l times cosine and sine of the offset less the design's
 INERTIAS = ("motor.rotor_inertia", "load.inertia")
 
 
@@ -45,30 +46,24 @@ def joint_values(design: Design, model: Fit, *, inertia_to: str = INERTIAS[0]) -
 
 
 def _pendulum(design: Design, model: Fit) -> Gravity | None:
-    """The design's pendulum, or 1 kg at 1 m where its found terms have it; None where there is neither."""
+    """The design's pendulum, or 1 kg at 1 m where terms of one were found; None where there is neither."""
     if design.load.gravity is not None or not set(GRAVITY) & set(model.names):
         return design.load.gravity
-    a, b = (model.get(name, 0.0) for name in GRAVITY)
-    return Gravity(mass_kg=1.0, arm_m=1.0, offset_rad=float(np.arctan2(b, a)))
+    return Gravity(mass_kg=1.0, arm_m=1.0, offset_rad=0.0)
 
 
 def _pendulum_values(design: Design, model: Fit) -> Iterator[tuple[str, float, dict[str, float]]]:
-    """Mass and offset from both terms of a pendulum, the mass alone from one; each with its slopes."""
-    found = [name for name in GRAVITY if name in model.names]
-    if not found or (gravity := _pendulum(design, model)) is None:
+    """Mass and offset of a pendulum from its terms, each with its slopes; of the first alone the mass."""
+    gravity = _pendulum(design, model)
+    if gravity is None or not set(GRAVITY) & set(model.names):
         return
-    per_mass = gravity.peak_Nm / gravity.mass_kg
-    if len(found) == 2:
-        a, b = (model[name] for name in GRAVITY)
-        peak = float(np.hypot(a, b))
-        size, turn = (dict(zip(GRAVITY, slopes, strict=True)) for slopes in ((a, b), (-b, a)))
-        yield "load.gravity.mass", peak / per_mass, {n: one / peak / per_mass for n, one in size.items()}
-        yield "load.gravity.offset", float(np.arctan2(b, a)), {n: one / peak**2 for n, one in turn.items()}
-        return
-    (name,), offset = found, gravity.offset_rad
-    share = per_mass * float(np.cos(offset) if name == GRAVITY[0] else np.sin(offset))
-    if model[name] * share > 0.0:
-        yield "load.gravity.mass", model[name] / share, {name: 1.0 / share}
+    a, b = (model.get(name, default_value(design, name)) for name in GRAVITY)
+    peak, per_mass = float(np.hypot(a, b)), gravity.peak_Nm / gravity.mass_kg
+    size, turn = (dict(zip(GRAVITY, slopes, strict=True)) for slopes in ((a, b), (-b, a)))
+    yield "load.gravity.mass", peak / per_mass, {n: one / peak / per_mass for n, one in size.items()}
+    if GRAVITY[1] in model.names or a < 0.0:
+        angle = remainder(gravity.offset_rad + float(np.arctan2(b, a)), 2.0 * pi)
+        yield "load.gravity.offset", angle, {n: one / peak**2 for n, one in turn.items()}
 
 
 def with_structure(design: Design, model: Fit) -> Design:
@@ -83,7 +78,7 @@ def with_structure(design: Design, model: Fit) -> Design:
         friction = replace(friction, points=points, dry_torque_Nm=0.0, viscous_Nms_rad=0.0)
         friction = replace(friction, dry_torque_reverse_Nm=None, viscous_reverse_Nms_rad=None)
         gone += [path for path in design.parameters if path in PLAIN_KEYS]
-    elif friction.points and "dry" in model.names:
+    elif friction.points and {"dry", "dry_forward"} & set(model.names):
         friction = replace(friction, points=())
     gravity = _pendulum(design, model)
     if friction is design.friction and gravity is load.gravity:

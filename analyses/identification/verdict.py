@@ -57,6 +57,7 @@ class Identified:
     design: Design
     items: tuple[Item, ...]
     accepted: bool = False
+    unmade: str = ""  # why no design comes of what was found: ``design`` is then that it was held against
 
     @cached_property
     def text(self) -> str:
@@ -99,9 +100,18 @@ def residual_item(residual: float, limit: float) -> Item:
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:
     """What the records neither confirm nor deny: the design's values, but for those held as asked."""
     for name, kept in fit.fixed.items():
-        if kept.value and name not in held:
+        if (kept.value or name == "gravity_cos") and name not in held:  # 0: the design's offset
             label = parameter(name, axis).label
             yield Item(id=f"kept-{name}", label=label, passed=None, reason=kept.reason)
+
+
+def made_items(unmade: str, before: Design, made: Design) -> Iterator[Item]:
+    """That no design comes of what was found; a friction map of the design that it takes the place of."""
+    if unmade:
+        yield Item.of("made", "A design comes of what is found", unmade)
+    if before.friction.points and not made.friction.points:
+        why = "viscous and dry friction take its place; --friction map finds a map"
+        yield Item(id="map", label="Friction map of the design", passed=None, reason=why)
 
 
 def lag_items(late_s: float, period_s: float) -> Iterator[Item]:

@@ -6,8 +6,10 @@ from typing import Literal
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
+from actuator_lti.bounds import BATCH_TICKS
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError, TooManyTicks
+from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
 from analyses.large_signal.tones import ELASTIC, PLACES
 from analyses.limit_cycles import describing
 from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
@@ -92,7 +94,9 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     Of several such sizes the one nearest to the predicted counts.
     """
     tried = _tried(design, cycle)
-    window = round(3.0 / (cycle.frequency_hz * design.controller.period_s))
+    period = 1.0 / (cycle.frequency_hz * design.controller.period_s)  # ticks
+    if CYCLES_WATCHED * period * len(SCALES) > BATCH_TICKS.most:
+        return Confirmation(cycle, None, None, tried=False)
     rows = Rows.of(tried, len(SCALES), friction_on=cycle.with_friction, limits_on=False)
     rows["load"] = cycle.load_Nm
     # Half a count below the edge, as the mean of the sensor is; a speed made of counts has no mean: the motor
@@ -102,15 +106,10 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
         if name in _STARTS and (tried.coupling is not None or name not in ELASTIC):
             rows[_STARTS[name]] = SCALES * value.real
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
-    rows.window(window, 3, 0)
-    rows["ticks"] = CYCLES_WATCHED // 3 * window
-    try:
-        result = rows.run()
-    except TooManyTicks:
-        return Confirmation(cycle, None, None, tried=False)
-    low, high = result.span("output_angle_rad")
-    size = 0.5 * (high - low)
-    grows = ~result.ok | (size > SCALES * cycle.output_rad)
+    size = _sizes(rows, round(period), 2) / cycle.output_rad
+    if size.max() >= SCALES[0] and size.min() <= SCALES[-1]:  # else all have died out, or grown, at once
+        size = _sizes(rows, round(3.0 * period), CYCLES_WATCHED // 3) / cycle.output_rad
+    grows = size > SCALES
     turns = np.flatnonzero((grows[1:] != grows[:-1]) & (grows[:-1] == cycle.stable))
     if not turns.size:
         return Confirmation(cycle, None, None)
@@ -118,7 +117,7 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     nearest = int(np.argmin(np.abs(np.log(ratios))))
     row = rows.take(int(turns[nearest]))
     if not cycle.stable:
-        row["ticks"] = window
+        row["ticks"] = round(3.0 * period)
     run = row.trajectory()
     begin = run.time_s.size // 2 if cycle.stable else 0  # what other motion the start brings is gone by then
     t, w = run.time_s[begin:-1], np.diff(run.output_angle_rad[begin:])
@@ -126,6 +125,15 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
     rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
     hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None
     return Confirmation(cycle, float(ratios[nearest]), hertz)
+
+
+def _sizes(rows: Rows, window: int, count: int) -> Floats:
+    """Half the span of the output in the last of so many windows, so many ticks each; inf: it failed."""
+    rows.window(window, 1, 0)
+    rows["ticks"] = count * window
+    result = rows.run()
+    low, high = result.span("output_angle_rad")
+    return np.where(result.ok, 0.5 * (high - low), np.inf)
 
 
 def _tried(design: Design, cycle: describing.Cycle) -> Design:

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from math import sqrt
 from typing import Any, TypeVar
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
@@ -158,6 +159,7 @@ def _answering(
                 "the response at zero frequency is less than 1e-5 of its largest value: there is nothing to "
                 "measure the fall and the resonance from"
             )
+        notes.extend(_far_from_asked(figures.loop.name, abs(own.dc_gain)))
         return own if mean is None else commanded_bandwidth(response, mean)
 
     def steps() -> StepFigures:
@@ -172,6 +174,16 @@ def _answering(
         notes=tuple(dict.fromkeys(notes)),
         mean=mean,
     )
+
+
+def _far_from_asked(name: str, dc_gain: float) -> list[str]:
+    """A note where a constant command is followed 3 dB or more off, beyond what a bandwidth lets pass."""
+    if sqrt(0.5) < dc_gain < sqrt(2.0):
+        return []
+    return [
+        f"{name} loop: a constant command gives {dc_gain:.4g} of it; -3 dB and overshoot are relative to "
+        "that and do not say how fast the loop is: its gain crossover does"
+    ]
 
 
 def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:

@@ -261,7 +261,8 @@ class MonteCarloResult:
     worst: tuple[WorstCase, ...]
     folder: Path  # every sample as Parquet, up to `KEPT`; the worst designs
     nominal: Mapping[str, float]  # the figures of the nominal design, by column
-    # Requirements that are not judged, not proven, as each takes a computation of one design
+    # Requirements that are not sampled, as each takes a computation of one design: not met where the nominal
+    # design fails, or else not proven
     left_out: tuple[RequirementVerdict, ...] = ()
     # Probability of meeting a requirement, with 95 % confidence, that is enough; without it every sample and
     # the worst case have to (where none was sought, so many samples that they prove `PROVEN_SHARE`)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import QUANTITIES
+from actuator_lti.asked.quantities import QUANTITIES, with_unit
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
@@ -22,15 +22,17 @@ from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
+from actuator_lti.loops import assemble_loops
 from actuator_lti.start.extras import need
 from actuator_lti.types import Progress
 from analyses.finite import finite
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo import judging, result
 from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
 from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug
-from analyses.specification.requirements import RequirementVerdict
+from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
 
@@ -128,7 +130,7 @@ def monte_carlo(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
         {name: result.column_statistics(name, unit, whole.columns[name]) for name, unit in units.items()},
         tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
-        Path(folder), {name: float(values[0]) for name, values in nominal.items()}, _left_out(design),
+        Path(folder), {name: float(values[0]) for name, values in nominal.items()}, tuple(_left_out(task)),
         notes=_notes(task, settings.samples), drivers=_drivers(task, odds), load_unit=design.load_unit,
     )  # fmt: skip
 
@@ -211,13 +213,17 @@ def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
     return tuple(words for words, said in notes.items() if said)
 
 
-def _left_out(design: Design) -> tuple[RequirementVerdict, ...]:
-    """The requirements that figures of many designs do not tell: not proven."""
-    return tuple(
-        RequirementVerdict(
-            id=r.id, requirement=r, loop=r.loop, verdict=Verdict.NOT_PROVEN, waiver=design.waiver_of(r.id),
-            reason="not sampled, it takes a computation of one design",
-        )
-        for r in judging.by_loop(design)
-        if not judging.in_populations(r, design)
-    )  # fmt: skip
+def _left_out(task: SampleTask) -> Iterator[RequirementVerdict]:
+    """The requirements that figures of many designs do not tell: not met nominally, or else not proven."""
+    design = task.design
+    left = tuple(r for r in judging.by_loop(design) if not judging.in_populations(r, design))
+    if not left:
+        return
+    loops = assemble_loops(design, operating_point=task.operating_point, load_Nm=task.load_Nm)
+    for one in evaluate_requirements(replace(design, requirements=left), all_loop_figures(loops)):
+        if one.verdict is Verdict.NOT_MET:
+            found = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".4g")
+            yield replace(one, reason=f"fails in the nominal design: {found}")
+        else:
+            reason, waiver = "not sampled, it takes a computation of one design", design.waiver_of(one.id)
+            yield replace(one, verdict=Verdict.NOT_PROVEN, reason=reason, waiver=waiver)

@@ -40,7 +40,9 @@ class Asked:
         ),
     ] = 1.0
     frequency: Annotated[float, Option("Frequency; the first of a chirp or a set; 1.", "Hz")] = 1.0
-    to: Annotated[float | None, Option("Last frequency of a chirp or set; ten times the first.", "Hz")] = None
+    to: Annotated[
+        float | None, Option("Last of a chirp (exponential) or a set; ten times the first.", "Hz")
+    ] = None
     count: Annotated[int, Option("Number of frequencies of a stepped or multisine; 10.")] = 10
     cycles: Annotated[
         int | None, Option("Periods played of a sine or triangle, or of each of a stepped sine (5).")
@@ -60,7 +62,7 @@ class Asked:
     ] = None
     record: Annotated[Path | None, Option("Recorded command: s, and the amplitude's unit.", "CSV")] = None
     held: Annotated[bool, Option("The record is a log of changes: each value holds until the next.")] = False
-    csv: Annotated[Path | None, Option("Write every row as CSV.", "FILE")] = None
+    csv: Annotated[Path | None, Option("Write every row as CSV; a folder is made if needed.", "FILE")] = None
     parquet: Annotated[Path | None, Option("Write Parquet.", "FILE")] = None
     plot: Annotated[Path | None, Option("Write a plot as SVG.", "SVG")] = None
     every: Annotated[int, Option("Keep every N-th tick; 1.", "N")] = 1

@@ -119,7 +119,8 @@ def settlings_of(
 
 FROM_THE_LARGEST = (
     "The largest step of a load is asked first; where the drive does not come to rest after one, smaller "
-    "ones are not asked, unless a requirement accepts a swing."
+    "ones are not asked, unless a requirement on limit_cycle accepts a swing. One below a millionth of "
+    "validation.full_deflection, at the output and of the motor over the ratio, is too small to count."
 )
 
 
@@ -221,6 +222,8 @@ def faint_words(rest: Rest, factor: float, unit: str) -> str:
 
 
 def _size(rest: Rest, factor: float, unit: str) -> str:
+    if not rest.amplitude and rest.motor_amplitude:
+        return f"±{factor * rest.motor_amplitude:.3g} {unit} (motor over the ratio, the output at rest)"
     size = f"±{factor * rest.amplitude:.3g} {unit}"
     if rest.motor_amplitude > 1.05 * rest.amplitude:
         size += f" (motor ±{factor * rest.motor_amplitude:.3g} {unit})"
@@ -269,7 +272,7 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         rest = counted(rest, full_deflection_rad)
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
-        longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # a period than the run
+        longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0 or rest.verdict == "diverging"
         beyond = f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
         return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]

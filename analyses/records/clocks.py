@@ -18,6 +18,7 @@ RATE_SPREAD = 0.01  # two clocks are taken to differ by less than 1 % in rate; a
 GRID = 4000
 MIN_QUALITY = 0.5
 RATE_STD_MAX = 1e-3
+ROUNDS = 50
 
 
 class Mismatch(InputError):
@@ -43,9 +44,11 @@ class ClockJoin:
         rate = "rate not estimable, taken as 1"
         if self.rate_std is not None:
             rate = f"rate {(self.rate - 1.0) * 1e6:+.1f} ppm (std {self.rate_std * 1e6:.1f})"
+        both = self.first_signal, self.second_signal
+        taken = "" if self.first_signal == "current" else " where the {1} comes with the {0}".format(*both)
         return (
-            f"second clock by {self.method} of {self.first_signal} and {self.second_signal}: offset "
-            f"{self.offset_s:.6f} s (std {self.offset_std_s:.1g}), {rate}, correlation {self.quality:.4f}"
+            f"second clock by {self.method} of {' and '.join(both)}: offset {self.offset_s:.6f} s "
+            f"(std {self.offset_std_s:.1g}{taken}), {rate}, correlation {self.quality:.4f}"
         )
 
 
@@ -90,6 +93,11 @@ def join_records(
         _check_durations(a, b, (first_signal, second_signal), where)
         join = (_by_event if method == "event" else _by_correlation)(a, b, where)
     join = replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
+    return joined_by(first, second, join), join
+
+
+def joined_by(first: Record, second: Record, join: ClockJoin) -> Record:
+    """The first record with the second one's signals, cut to the time both cover."""
     time = join.offset_s + join.rate * second.time_s
     start = int(np.searchsorted(first.time_s, time[0]))
     stop = int(np.searchsorted(first.time_s, time[-1], side="right"))
@@ -100,13 +108,12 @@ def join_records(
         raise InputError(f'both records hold a signal "{min(clash)}"', where=second.name)
     cut = first.slice(start, stop)
     added = {name: np.interp(cut.time_s, time, values) for name, values in second.signals.items()}
-    joined = replace(
+    return replace(
         cut,
         signals=MappingProxyType({**cut.signals, **added}),
         units=MappingProxyType({**first.units, **second.units}),
         notes=(*first.notes, *second.notes, str(join)),
     )
-    return joined, join
 
 
 def motion_events(time_s: Floats, magnitude: Floats) -> tuple[float, float] | None:
@@ -250,7 +257,7 @@ def _gauss_newton(pair: _Pair, parameters: int) -> tuple[Floats, Floats]:
     see the same happening in quite the same shape, and no fit can tell that from a shift.
     """
     p = np.zeros(parameters)
-    for _ in range(5):
+    for _ in range(ROUNDS):
         steps = 0.5 * np.eye(parameters)
         jac = np.column_stack([pair.residual(p + h) - pair.residual(p - h) for h in steps])
         change = np.linalg.lstsq(jac, pair.residual(p), rcond=None)[0]

@@ -14,7 +14,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import own_share
-from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time
+from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
 from analyses.records.record import DISORDER, Record
@@ -238,19 +238,22 @@ def _ticks_a_row(design: Design, record: Record) -> tuple[float, bool]:
 
 
 def _time(design: Design, record: Record) -> Finding | None:
-    """A unit of the time that the lag behind the command tells."""
+    """A unit of the time that the lag behind the command tells, or what a current accelerates."""
     place = place_of(design, record)
     told = "" if place is None else wrong_time(design, record, place[1])
-    return Finding("time against the lag behind the command", False, told) if told else None
+    if told:
+        return Finding("time against the lag behind the command", False, told)
+    told = wrong_time_of_speed(design, record)
+    return Finding("time against the current", False, told) if told else None
 
 
 def _sign(design: Design, record: Record) -> Finding | None:
     """A current that would drive the other way; with a voltage, that says of which signal the sign is."""
-    place = place_of(design, record)
-    if place is None or "current" not in record.signals or "voltage" in record.signals:
+    place, rate = place_of(design, record), record.signals.get(RATES[design.axis])
+    speed = rate if place is None else np.gradient(place[1], record.time_s)
+    if speed is None or "current" not in record.signals or "voltage" in record.signals:
         return None
-    smooth = (_smooth(record, values) for values in (record["current"], place[1]))
-    told = turned_current(design, record, smooth)
+    told = turned_current(design, record, *(_smooth(record, one) for one in (record["current"], speed)))
     return Finding("current against the motion", False, told) if told else None
 
 
@@ -512,9 +515,10 @@ def _command(design: Design, record: Record) -> Finding | None:
         if abs(alike) < 0.7:
             return Finding(subject, None, f"cosine {alike:.2f}: not followed")
         factor = named_factor(ratio, {design.total_ratio: f"the reduction {design.total_ratio:g}"})
-        wrong = factor is not None and not 0.5 < ratio < 1.5
+        followed = 0.5 < ratio < 1.5
+        wrong = factor is not None and not followed
         text = f"{answer} is {ratio:.4g} times {command}" + f": factor {factor}" * wrong
-        return Finding(subject, not wrong, text)
+        return Finding(subject, False if wrong else followed or None, text)
     return None
 
 
@@ -529,6 +533,8 @@ def _within(subject: str, record: Record, what: str, limit: float, unit: str) ->
     if passed and len(rows):
         return Finding(subject, False, f"{named_rows(record, rows, what, unit)}, {allowed}: {BAD_ROW}")
     text = f"{subject.partition(' ')[0]} up to {most if passed else usual:.4g} {unit}, {allowed}"
+    if passed and most > limit:
+        text += f", {most / limit:.3g} times; {OVER:g} times are allowed"
     if not passed:
         factor = explaining(usual / limit, unit)
         text += f", {usual / limit:.3g} times" + (f": factor {factor}" if factor else "; is the unit right?")

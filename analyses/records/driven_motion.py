@@ -1,14 +1,13 @@
 """The motion of a record beside what its command and its current make of a design, without a simulation."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from actuator_lti.design.control import FEED_FORWARD
 from actuator_lti.design.model import Design
 from actuator_lti.types import Floats
+from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.factors import NEAR, named_factor
-from analyses.records.naming import LOADS
+from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record
 
 ALIKE = 0.9  # cosine above which one signal is taken to be a multiple of the other
@@ -45,19 +44,50 @@ def wrong_time(design: Design, record: Record, place: Floats) -> str:
     return f"{told}: factor {named_factor(ratio)}, in the unit of the time"
 
 
-def turned_current(design: Design, record: Record, smooth: Iterator[Floats]) -> str:
+def wrong_time_of_speed(design: Design, record: Record) -> str:
+    """The same of a speed that follows its command: by what the current accelerates beside its friction.
+
+    The unit of the time is in the inertia alone, and no other factor is; that is known to a factor of two.
+    """
+    rate, kM = RATES[design.axis], design.effective_motor.torque_constant_Nm_A
+    if not {rate, f"{rate}_reference", "current"} <= record.signals.keys() or kM is None:
+        return ""
+    speed, torque = record[rate], kM * record["current"]
+    followed, _ = ratio_of(speed, record[f"{rate}_reference"])
+    if _is_loaded(design, record) or not 0.5 < followed < 2.0:
+        return ""
+    parts = np.column_stack(_own_torques(design, speed, record))
+    inertia, friction = shares = scaled_lstsq(parts, torque)
+    _, alike = ratio_of(torque, parts @ shares)
+    size = max(inertia, 1.0 / inertia) if inertia > 0.0 else 1.0
+    factor = next((factor for factor in TIMES[1:] if 0.5 < size / factor < 2.0), None)
+    if alike < ALIKE or not 0.5 < friction < 2.0 or factor is None:
+        return ""
+    told = (
+        f"by the current the inertia is {inertia:.4g} times the design's, the friction {friction:.4g} times"
+    )
+    return f"{told}: factor {named_factor(factor)}, in the unit of the time"
+
+
+def _is_loaded(design: Design, record: Record) -> bool:
+    return bool(design.load.acting() or np.any(record.signals.get(LOADS[design.axis], 0.0)))
+
+
+def _own_torques(design: Design, speed: Floats, record: Record) -> tuple[Floats, Floats]:
+    """What the design's inertia and its friction take at a speed, at the motor, N m (N)."""
+    friction = design.friction.viscous_Nms_rad * speed + design.friction.dry_torque_Nm * np.sign(speed)
+    return design.inertia_kgm2 * np.gradient(speed, record.time_s), friction
+
+
+def turned_current(design: Design, record: Record, current: Floats, speed: Floats) -> str:
     """A current against the torque that the design needs for the motion; empty where nothing says so.
 
-    ``smooth`` are the current and the position at the motor through the same filter. A load that acts could
-    need a torque against that of inertia and friction: none is told then.
+    Current and speed, at the motor, are through the same filter. A load that acts could need a torque against
+    that of inertia and friction: none is told then.
     """
-    loaded = design.load.acting() or np.any(record.signals.get(LOADS[design.axis], 0.0))
-    if loaded or record.signals.keys() & {"force", "force_reference", "torque_reference"}:
+    if _is_loaded(design, record) or record.signals.keys() & {"force", "force_reference", "torque_reference"}:
         return ""
-    current, place = smooth
-    speed = np.gradient(place, record.time_s)
-    friction = design.friction.viscous_Nms_rad * speed + design.friction.dry_torque_Nm * np.sign(speed)
-    torque = design.inertia_kgm2 * np.gradient(speed, record.time_s) + friction
+    torque = np.add(*_own_torques(design, speed, record))
     _, alike = ratio_of(current - current.mean(), torque - torque.mean())
     if alike > -ALIKE:
         return ""

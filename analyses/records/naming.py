@@ -164,5 +164,5 @@ def canonical(name: str, unit: str) -> str:
         raise InputError(f'signals.{name}.unit = "{unit}": must be a unit like {wanted}')
     names = [signal.name for signal in SIGNALS]
     near = get_close_matches(base, [*names, *(a for s in SIGNALS for a in s.also)], 1, 0.6)
-    hint = f'; did you mean "{near[0]}"?' if near else ""
-    raise InputError(f"signals.{name}: no signal that is known{hint} There are: {', '.join(names)}")
+    hint = f'; did you mean "{near[0]}"? There are' if near else "; there are"
+    raise InputError(f"signals.{name}: no signal that is known{hint}: {', '.join(names)}")

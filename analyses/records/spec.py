@@ -1,5 +1,6 @@
 """How a recorder writes its files: separators, columns, units, and what to do with a bad row."""
 
+import json
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -158,9 +159,12 @@ def _position(column: str | int, header: Sequence[str], where: str) -> int:
         return column - 1
     if column not in header:
         near = get_close_matches(column, header, 1)
-        hint = f'; did you mean "{near[0]}"?' if near else ""
+        marks = [mark for mark in ";,\t" if mark in header[0]] if len(header) == 1 else []
+        hint = f'; did you mean "{near[0]}"? There are: ' if near else "; there are: "
+        if marks:
+            hint = f"; is separator = {json.dumps(marks[0])} missing? There is: "
         there = ", ".join(f'"{name}"' for name in header[:20])
-        raise InputError(f'no column "{column}"{hint} There are: {there}', where=where)
+        raise InputError(f'no column "{column}"{hint}{there}', where=where)
     if header.count(column) > 1:
         raise InputError(f'column "{column}" is there {header.count(column)} times; give its number', where)
     return header.index(column)

@@ -119,9 +119,10 @@ class SiRows:
         keep = np.asarray(time > reached[:-1])
         if not keep.all() and self._spec.disorder == "error":
             k = int(keep.argmin())
-            message = (
-                f"time {time[k]:.9g} s does not come after {reached[k]:.9g} s; allowed: rising times: a "
-            )
+            message = f"time {time[k]:.15g} s does not come after {reached[k]:.15g} s"
+            if time[k] == reached[k]:
+                message += ": a row twice, or stamps of too few digits (then give time.period, not a column)"
+            message += "; allowed: rising times: a "
             message += 'file for each run; or disorder = "drop" in a record file, which leaves out this row '
             message += "and all that follow up to the time that was reached"
             raise InputError(message, where=f"{self._origin}:{block.lines[k]}")

@@ -85,6 +85,12 @@ class RequirementVerdict:
     rotor: str = ""  # of a current loop: whether its rotor is ``"free"`` or ``"locked"``
 
     @property
+    def figure(self) -> tuple[object, ...]:
+        """What is judged: verdicts of two designs stand side by side where it is the same."""
+        of = self.requirement
+        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, of.unit
+
+    @property
     def passes(self) -> bool:
         """Whether it is met, or waived."""
         return self.verdict.passes(waived=self.waiver is not None)

@@ -161,7 +161,7 @@ def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> t
         count, turn = (SKIPPED + 2) * ticks, np.exp(-2j * np.pi * np.arange(ticks) / ticks)
         moment = np.tile(-amplitude * turn.imag, SKIPPED + 2)
         run = simulate(design, commands.hold(), count * period, series(np.arange(count) * period, moment))
-        both = (moment, run.output_angle_rad)
+        both = (moment, run.output_angle_rad - run.output_angle_rad[-1])  # at rest: 0 to the last digit
         given, seen = ((signal[SKIPPED * ticks :].reshape(2, ticks) @ turn).sum() for signal in both)
         K = complex(given / seen) if seen != 0.0 else complex(np.inf)
         made.append(AtRest(amplitude, 1.0 / (ticks * period), K))
@@ -260,6 +260,7 @@ def _telling_loads(design: Design) -> tuple[float, ...]:
 def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     """Powered and unpowered stiffness, friction sliding (its share by load as where the motor drives).
 
+    Unpowered nothing samples: slopes of torques over the angle act at every instant.
     A spring that bends has them at each of its pieces that a load of ``validation.loads`` reaches.
 
     >>> from actuator_lti.design import load_design
@@ -270,7 +271,7 @@ def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
     for load, state in product(_telling_loads(design), STATES):
         if state != "shorted" or design.motor.has_electrical_dynamics:
             seen = design if state == "powered" else unpowered(design, state)
-            response = linear.compliance(seen, Operating(load_Nm=load))
+            response = linear.compliance(seen, Operating(load_Nm=load, torques_at_once=state != "powered"))
             hertz = np.union1d(linear.frequencies_hz(response), linear.weakest_hz(response))
             K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
             curves.append(StiffnessCurve(state, hertz, K, static, load))

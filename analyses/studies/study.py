@@ -15,6 +15,7 @@ A study file is TOML and only data::
     name = "more voltage, less resistance"
     override = { "limits.voltage" = "16 V", "motor.resistance" = "50 mohm" }
     # motor = "motor-24V.toml"               # its [motor] table replaces the base's
+    # base = "other.toml"                    # another design in place of the base
 
     [[sweep]]                                # one parameter: a list, or from, to, points, spacing
     parameter = "control.velocity.gain"

@@ -77,8 +77,8 @@ class Problem:
 
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
-        """All toleranced parameters that are no gain."""
-        known = set(variable_paths(self.design)) - set(self.paths)
+        """All toleranced parameters, the gains that have a tolerance among them."""
+        known = set(variable_paths(self.design))
         return tuple(Factor(p, v, t) for p, v, t in drawn(self.design) if p in known)
 
     @cached_property
@@ -152,11 +152,25 @@ class Problem:
 
     def _looked_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> Population:
         """Every candidate at every corner, and the search's account of them."""
-        count, many = len(gains), len(corners)
-        values = {p: np.repeat(gains[:, k], many) for k, p in enumerate(self.paths)}
-        values |= as_values(self.design, [f.path for f in factors], np.tile(corners, (count, 1)))
-        self.evaluations += count * many
-        return Population(self.design, values, count * many)
+        count = len(gains) * len(corners)
+        self.evaluations += count
+        return Population(self.design, self.values_at(gains, corners, factors), count)
+
+    def values_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> dict[str, Floats]:
+        """SI values of every candidate at every corner by dotted key, each of shape (candidates * corners).
+
+        Corners say where a gain lies about what the design has; about a candidate it lies as far away, by the
+        same share where its tolerance is in percent.
+        """
+        chosen = {p: np.repeat(gains[:, k], len(corners)) for k, p in enumerate(self.paths)}
+        moved = as_values(self.design, [f.path for f in factors], np.tile(corners, (len(gains), 1)))
+        values = {**chosen, **moved}
+        for factor in (f for f in factors if f.path in chosen):
+            middle, tolerance = chosen[factor.path], factor.tolerance
+            share = middle / factor.nominal if tolerance.relative else 1.0
+            away = share * (values[factor.path] - factor.nominal)
+            values[factor.path] = np.clip(middle + away, tolerance.lower, tolerance.upper)
+        return values
 
 
 def _linear_figures(population: Population, timed: bool) -> LinearFigures:

@@ -19,7 +19,6 @@ from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.motion.settling import ending_of, noticed, settlings_of, verdict_of
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, judged, tally
-from analyses.studies.sampling import as_values
 from analyses.tuning.asked import Aim
 from analyses.tuning.problem import Problem
 
@@ -75,7 +74,7 @@ class NonlinearCheck:
     overshoot_percent: float
     settling_time_s: float | None  # None where it does not stay within 2 % of the commanded angle
     final_error_percent: float  # friction may leave one that no gain removes
-    limited: str  # the limiters that acted, with their share of the time
+    limited: str  # the limiters that acted, and for how long
 
 
 @dataclass(frozen=True)
@@ -154,19 +153,22 @@ def hunting(tuned: Design) -> str:
     return ending_of(tuned, swing) if swing and verdict_of(tuned, swing) is Verdict.NOT_MET else ""
 
 
-def nonlinear_checks(tuned: Design, problem: Problem, result: Floats) -> Iterator[NonlinearCheck]:
+def nonlinear_checks(
+    tuned: Design, problem: Problem, gains: Floats, result: Floats
+) -> Iterator[NonlinearCheck]:
     """Steps of a twentieth and of all of full deflection (a second), every limit and friction on."""
     worst, plan = int(np.argmin(result.min(axis=1))), LargeSignal.plan(tuned)
     names = ["nominal", "worst corner"][: 2 if worst else 1]
     points = problem.all_corners[[0, worst][: len(names)]]
-    values = as_values(tuned, [f.path for f in problem.factors], points)
+    values = problem.values_at(gains[None, :], points, problem.factors)
     population = Population(tuned, values, len(names))
     for size in (0.05 * plan.deflection_rad, plan.deflection_rad):
         columns = step_columns(StepCheck(size, plan.duration_s), population)
         for k, corner in enumerate(names):
             seen = {name.partition(".")[2]: float(column[k]) for name, column in columns.items()}
-            shares = {name: seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
-            limited = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items() if share > 0.0)
+            percent_ms = 10.0 * plan.duration_s
+            acted = {name: percent_ms * seen[f"{name}_limited"] for name in ("speed", "current", "voltage")}
+            limited = ", ".join(f"{name} {ms:.3g} ms" for name, ms in acted.items() if ms > 0.0)
             rise, settling = finite(seen["rise_time"]), finite(seen["settling_time"])
             overshoot, error = seen["overshoot"], seen["final_error"]
             yield NonlinearCheck(corner, size, rise, overshoot, settling, error, limited)

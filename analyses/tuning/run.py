@@ -71,7 +71,7 @@ def tune(
     verdicts = result.confirm(tuned, wanted, requirements)
     confirmed = tuple(v for v in verdicts if v.requirement in wanted)
     tell(len(choices) + 2, stages)
-    checks = tuple(result.nonlinear_checks(tuned, problem, distances)) if settings.check else ()
+    checks = tuple(result.nonlinear_checks(tuned, problem, gains, distances)) if settings.check else ()
     curve = trade_off(problem, solution.gains, solution.working[:3]) if settings.curve else ()
     tell(stages, stages)
     feasible = bool(distances.min() >= 0.0) and all(v.passes for v in confirmed)
@@ -144,9 +144,9 @@ def _binding(
         distance = relative * requirement.size if -3.0 < relative < np.inf else None
         way = 1.0 if requirement.minimum is not None else -1.0
         value = None if distance is None else limit + way * distance
-        corner = zip(problem.factors, problem.all_corners[worst], strict=True) if worst else ()
+        values = problem.values_at(gains[None, :], problem.all_corners[[worst]], problem.factors)
         binds = relative <= smallest + _BINDS and not enough
-        at = {factor.path: float(here) for factor, here in corner}
+        at = {factor.path: float(values[factor.path][0]) for factor in problem.factors if worst}
         about = (requirement.id, label(requirement, problem.design.load_unit), requirement.unit)
         yield result.BindingRequirement(*about, value, limit, distance, relative, binds, at)
 

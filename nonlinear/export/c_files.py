@@ -63,7 +63,8 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
 def refuse_prefix(prefix: str) -> None:
     """Refuse what no name in C begins with, by an `InputError` that says what is allowed."""
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*_", prefix):
-        raise InputError(f"prefix = {prefix!r}: allowed: letters, digits and _, a letter first, _ last")
+        lacks = "no _ last; " * (not prefix.endswith("_"))
+        raise InputError(f"prefix = {prefix!r}: {lacks}allowed: letters, digits, _; a letter first, _ last")
 
 
 def _refuse_single(design: Design) -> None:

@@ -19,8 +19,16 @@ PLACES = {
     "period": at.PERIOD, "ratio": at.RATIO,
     "stick": at.FLAG_STICK, "dry": at.DRY, "dry_reverse": at.DRY_REVERSE, "load_dry": at.LOAD_DRY,
     "load_coefficient": at.LOAD_COEFFICIENT, "friction_map": at.MAP_COUNT,
-    "mean": at.PROFILE_SAMPLES,
+    "mean": at.PROFILE_SAMPLES, "torque": at.TORQUE_CONSTANT,
 }  # fmt: skip
+# of each torque over the angle the place of its slope, then of its waves peak, order and phase
+SLOPES = tuple(
+    (slope, *((peak + j, order + 2 * j, order + 2 * j + 1) for j in range(waves)))
+    for slope, peak, order, waves in (
+        (at.LOAD_SLOPE, at.MOMENT_PEAK, at.MOMENT_ORDER, at.MOMENT_WAVES),
+        (at.TORQUE_SLOPE, at.TORQUE_PEAK, at.TORQUE_ORDER, at.TORQUE_WAVES),
+    )
+)
 EVERY_POSITION, EVERY_VELOCITY = at.EVERY_POSITION, at.EVERY_VELOCITY
 LIMITERS = tuple(zip(at.LIMITERS, at.LIMITER_BITS, strict=True))  # name, bit in the flags
 

@@ -1,10 +1,12 @@
 """What comes with the package, the keys that a design file may have, and a file to start from."""
 
 import re
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
+from actuator_lti.asked.quantities import QUANTITIES
 from actuator_lti.design import design_hash, load_design, read_design_text, shipped_designs, warnings_of
 from actuator_lti.design.key_reference import Explained, KeyEntry, explained, key_reference, record_reference
 from actuator_lti.design.loader import design_text
@@ -111,13 +113,22 @@ def keys(asked: AskedKeys) -> Keys:
         return Keys(tuple(item for item in rows if text in item.path), design, figures, warnings)
     axis: Axis = "linear" if asked.linear else "rotary"
     listed = (*key_reference(axis), *record_reference(axis))
-    found = tuple(key for key in listed if _is_called(key, text))
+    found = (*(key for key in listed if _is_called(key, text)), *_limited(text, axis))
     if not found:
         raise InputError(
             f"{asked.match!r}: no key has it in its name or meaning; allowed: see actuator-lti keys; "
             "settings of a controller as a file: actuator-lti objects import"
         )
     return Keys(found)
+
+
+def _limited(text: str, axis: Axis) -> Iterator[KeyEntry]:
+    """The figures of which a text is said and that a requirement may limit, a row each."""
+    key = next(key for key in record_reference(axis) if key.path == "requirement.quantity")
+    for name, of in QUANTITIES.items():
+        if text and (text in of.words or text in name):
+            words = f"{of.words}: {of.description}"
+            yield replace(key, unit=of.unit_for(axis), allowed=f'"{name}"', description=words)
 
 
 def _assumed(design: Design) -> tuple[Explained, ...]:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from actuator_lti.design.access import located, parameter_value, paths_of
 from actuator_lti.design.field import Field, Structure
 from actuator_lti.design.model import Design, Parameter, Tolerance
+from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from nonlinear.export.page import changes_figure, changes_row, figure_statements
 from nonlinear.export.statement import Term
@@ -64,8 +65,13 @@ def _reason(design: Design, path: str, figures: Iterable[Figure]) -> str:
     value, own = parameter_value(design, path), design.controller.own_law
     if own is not None and path in ("control.period", f"control.{own[0]}.every"):
         return RESAMPLED
-    if value == 0.0 and not _top(design, path):
-        return ZERO
+    if value == 0.0:
+        if not (top := _top(design, path)):
+            return ZERO
+        try:
+            design.with_values({path: 0.5 * top})
+        except InputError as error:
+            return error.message.partition(": ")[2]
     changes = changes_row(design, path)
     if changes is None:
         return UNFOLLOWED

@@ -1,7 +1,7 @@
 """The data of the live page: plain JSON, made once with the report."""
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 
 from actuator_lti.asked.quantities import (
     DRIVE_QUANTITIES,
@@ -20,6 +20,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree
 from analyses.large_signal.classify import FRICTION_DB, FRICTION_DEG, STICK_FRACTION
 from analyses.large_signal.tones import LEAST_UPDATES
+from analyses.linear.loop_figures import HELD
 from analyses.monte_carlo.judging import in_populations
 from nonlinear.export import linear, page
 from nonlinear.export.c_files import exported_row
@@ -40,12 +41,8 @@ LONGEST_TICKS = 20_000  # before a cell is looked at
 POINTS = {"at w_ref": linear.AT_SPEED, "at i_ref": linear.AT_CURRENT, "at u": linear.AT_VOLTAGE}
 
 
-def live_model(design: Design, held: Collection[str] = (), source: str | None = None) -> Tree:
-    """Give the page's data, or why there is none under ``refused``.
-
-    Requirements on the loops of ``held``, which the report judges held (`analyses.linear.loop_figures`), are
-    named apart: the page has the loops as they are by themselves.
-    """
+def live_model(design: Design, source: str | None = None) -> Tree:
+    """Give the page's data, or why there is none under ``refused``."""
     if not design.controller.stages:
         return {"refused": OPEN}
     try:
@@ -56,7 +53,7 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
     result = followed(design, [(one.quantity, one.load_Nm or 0.0) for one in limited])
     relations = relation_statements(design, {key["path"]: key["value"] for key in result.free})
     text, places = patches(design, result.free, source)
-    requirements, apart = _judged(design, result.figures, held)
+    requirements, apart = _judged(design, result.figures)
     outer = page.EVERY_POSITION if design.controller.position else page.EVERY_VELOCITY
     return {
         "name": design.name,
@@ -69,7 +66,9 @@ def live_model(design: Design, held: Collection[str] = (), source: str | None = 
         "loops": [name for name in LOOPS if name in design.controller.stages],
         "stages": {name: k for k, name in enumerate(LOOPS)},
         "points": POINTS,
-        "point": _point(design, held),
+        "point": _point(design),
+        "slopes": page.SLOPES,
+        "held": HELD,
         "relations": [[statement.data for statement in check] for check in relations],
         "electrical": design.motor.has_electrical_dynamics,
         "limiters": [[name, bit, LIMITERS[name].words, LIMITERS[name].signal] for name, bit in page.LIMITERS],
@@ -93,11 +92,10 @@ def _column(of: Quantity) -> Tree:
     return {"unit": unit, "factor": factor, **about, "response": of.of_response}
 
 
-def _point(design: Design, held: Collection[str]) -> str:
+def _point(design: Design) -> str:
     """Say at which operating point the loops of the page are linear, where there is a choice."""
     words = [CONTACT] * (design.coupling is not None) + [MAP] * bool(design.friction.points)
     words += [MEAN] * (command_mean(design) is not None)
-    words += [f"The load drives the {name} loop away by itself; the report judges it held." for name in held]
     return " ".join(words)
 
 
@@ -115,7 +113,7 @@ def _limit(item: Requirement) -> Tree:
 
 
 def _judged(
-    design: Design, figures: Mapping[Figure, list[list[str | float]]], held: Collection[str]
+    design: Design, figures: Mapping[Figure, list[list[str | float]]]
 ) -> tuple[list[Tree], list[Tree]]:
     """Give the requirements that the page judges, one for each loop, and what the others limit.
 
@@ -136,8 +134,7 @@ def _judged(
             apart.append({"id": item.id, "words": f"{words}, {which}"})
         else:
             of = judged_loops(item.loop, stages)
-            apart += [{"id": item.id, "words": f"{words}, {loop} loop held"} for loop in of if loop in held]
-            followed += [{**_limit(item), "loop": loop} for loop in of if loop in stages and loop not in held]
+            followed += [{**_limit(item), "loop": loop} for loop in of if loop in stages]
     return followed, apart
 
 

@@ -24,9 +24,9 @@ JOB_MEMORY_MB = JOB_MEMORY.most // 1_000_000
 STATE = Option("History and cache; DIR.state beside the site otherwise.", "DIR")
 ANEW = Option("Begin anew where the history knows less than the site.")
 STUDY = (
-    "Study file (compare --example prints one), design file or shipped design; first 'approve' to approve."
+    "One study file (compare --example prints one), design file or shipped design; 'approve STUDY' approves."
 )
-WORDS = Option(STUDY, "[approve] STUDY", argument=True)
+WORDS = Option(STUDY, "STUDY", argument=True)
 ONLY = Option("Approve only this design; may be repeated.", "NAME", flag="design")
 
 
@@ -39,7 +39,7 @@ class Settings(OnMachines):
     time_limit_s: Annotated[float, Option("A design that takes longer is ended; 900.", "s")] = 900.0
     memory_limit: Annotated[int, Option("A design that needs more has no result.", "MB")] = JOB_MEMORY_MB
     wait_s: Annotated[float, Option("Wait for another nightly on the same site; 0.", "s")] = 0.0
-    keep: Annotated[int, Option("Nights whose reports stay on the site; 60.", "NIGHTS")] = 60
+    keep: Annotated[int, Option("Nights whose reports stay on the site (of pages 4); 60.", "NIGHTS")] = 60
     state: Annotated[Path | None, STATE] = None
     accept_lost_history: Annotated[bool, ANEW] = False
 
@@ -55,7 +55,8 @@ class Asked(Settings):
     """Build every design and variant of a study, keep every figure, and publish a site of it.
 
     What has not changed is not computed again. Exit status 1 where a requirement fails, a design has no
-    result, or a figure is worse than the approved baseline.
+    result, or a figure is worse than the approved baseline (until one is approved,
+    than the first night).
 
     Try: actuator-lti nightly study.toml --site site; to make the last night the baseline: actuator-lti
     nightly approve study.toml --site site --by NAME --reason TEXT

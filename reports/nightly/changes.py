@@ -162,8 +162,9 @@ class Between:
         columns = self._columns_of(old, new)
         changes = columns.compare(*self.history.matrix((old, new), columns.names))
         was, now = (self.history.inputs(result) for result in (old, new))
+        both = [kind for kind in ("parameters", "keys") if kind in was and kind in now]  # old nights lack one
         cause = Cause(
-            parameters=_differences(was.get("parameters", {}), now.get("parameters", {})),
+            parameters=tuple(one for kind in both for one in _differences(was[kind], now[kind])),
             settings=_differences(was.get("settings", {}), now.get("settings", {})),
             libraries=_differences(before.libraries, after.libraries),
             commits=self._commits(before, after),
@@ -191,7 +192,7 @@ class Between:
 
 def _differences(old: Mapping[str, Any], new: Mapping[str, Any]) -> Differences:
     pairs = {name: (old.get(name, "(none)"), new.get(name, "(none)")) for name in {**new, **old}}
-    return tuple((name, str(was), str(now)) for name, (was, now) in pairs.items() if was != now)
+    return tuple((name, one_line(str(a)), one_line(str(b))) for name, (a, b) in pairs.items() if a != b)
 
 
 # ---- in words --------------------------------------------------------------------------------------------
@@ -267,10 +268,12 @@ def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Tree
     """Say one change; of a distance to a requirement, the required figure itself."""
     name, moved = change.figure.removesuffix(_DISTANCE), change
     if change.kind == "distance":
-        moved = next((c for c in comparison.changes if c.figure == name + _VALUE), change)
+        value = next((c for c in comparison.changes if c.figure == name + _VALUE), None)
+        moved = value or change
         label = next((v["label"] for v in verdicts if v["id"] == name), name)
         place, colon, what = label.partition(": ")  # of "Position loop: phase margin", say
         label = one_line(f"{what} of the {place[:1].lower()}{place[1:]}" if colon else label, 100)
+        label += ", distance to its limit" * (value is None)  # the figure itself stayed
     else:
         *_, row, column = ["", *name.split(" / ")]
         label = one_line(f"{column[:1].lower()}{column[1:]} of {row}" if row else column, 100)

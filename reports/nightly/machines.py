@@ -78,6 +78,10 @@ def junit(night: Overview) -> str:
         took, began = f"{design.result.seconds:.3f}", night.run.started.rstrip("Z")
         about = {"name": _line(design.name), "time": took, "timestamp": began}
         _cases(Xml.SubElement(top, "testsuite", about), design)
+    for name in night.gone:
+        about = {"classname": _line(name), "name": "is in the study"}
+        case = Xml.SubElement(Xml.SubElement(top, "testsuite", name=_line(name)), "testcase", about)
+        Xml.SubElement(case, "skipped", message="in the study last night, not tonight")
     tags = {"tests": "testcase", "failures": "failure", "errors": "error", "skipped": "skipped"}
     for element in (*top, top):
         for name, tag in tags.items():
@@ -99,7 +103,7 @@ def _cases(suite: Xml.Element, design: DesignView) -> None:
     worse = design.baseline.regressions
     lines = [f"{c.figure}: {_value(c.before)} -> {_value(c.after)} {c.unit}" for c in worse]
     text = "\n".join([*lines, *cause_lines(design.baseline.cause)])
-    message = f"{len(worse)} figure(s) worse than the baseline"
+    message = f"{len(worse)} figure(s) worse than {design.held_against}"
     case("no unapproved regression", "failure" * bool(worse), message, "regression", text)
     for v in design.verdicts:
         name = f"{v['id']} {v['label']}" if v["label"] != v["id"] else v["id"]

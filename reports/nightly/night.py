@@ -46,7 +46,8 @@ def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
     approving = len(asked.words) == 2 and asked.words[0] == "approve"
     if len(asked.words) != 1 + approving or asked.site is None:
         raise InputError(
-            "write 'nightly STUDY --site DIR' or 'nightly approve STUDY --site DIR --by NAME --reason TEXT'"
+            "write 'nightly STUDY --site DIR' or 'nightly approve STUDY --site DIR --by NAME --reason TEXT'; "
+            "several designs are one study, each a [[variant]] with base = its file"
         )
     study = read_study(asked.words[-1], pdf=asked.pdf, validation=False if asked.no_validation else None)
     try:
@@ -211,6 +212,7 @@ def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any
     settings = job.payload.get("settings") or {}
     inputs = {
         "parameters": dict(job.parameters),
+        "keys": dict(job.keys),
         "settings": {str(key): one_line(str(value), 200) for key, value in settings.items()},
         "design_hash": job.design_hash,
         "revision": job.revision,

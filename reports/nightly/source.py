@@ -20,6 +20,7 @@ from actuator_lti.bounds import JOB_BYTES, NIGHTLY_JOBS
 from actuator_lti.design import design_hash, write_design
 from actuator_lti.errors import InputError
 from actuator_lti.files.reading import Tree, shown_path
+from analyses.comparison.variants import keys_of
 from analyses.studies.proof import hash_of
 from analyses.studies.study import Study as StudyFile
 from analyses.studies.study import Variant, study_of, study_or_design
@@ -45,6 +46,7 @@ class Job:
     design_hash: str = ""
     # Dotted keys with texts as written, which are shown when a figure has moved
     parameters: Mapping[str, str] = field(default_factory=dict)
+    keys: Mapping[str, str] = field(default_factory=dict)  # all others, as requirements and matrices
     revision: str = ""
 
     def key(self, code: str) -> str:
@@ -164,8 +166,9 @@ def _design_job(variant: Variant, settings: Mapping[str, Any]) -> Job:
         return Job(name=name, payload={"name": name, "refused": variant.error}, parameters=_texts(variant))
     payload = {"name": name, "design": write_design(design), "settings": dict(settings)}
     parameters = {path: parameter.text for path, parameter in design.parameters.items()}
+    keys = {key: text for key, text in keys_of(design).items() if key not in parameters}
     about = {"design_hash": design_hash(design), "revision": design.revision}
-    return Job(name=name, payload=payload, parameters=parameters, **about)
+    return Job(name=name, payload=payload, parameters=parameters, keys=keys, **about)
 
 
 def _comparison_job(study: StudyFile, jobs: Sequence[Job], settings: Mapping[str, Any]) -> Job:

@@ -18,6 +18,7 @@ from reports.nightly.moves import WINDOW, missing_nights
 from reports.nightly.records import Baseline, Result, Run
 from reports.nightly.source import Study
 from reports.nightly.state import Memory
+from reports.nightly.text import one_line
 
 BROKEN = ("error", "timeout", "crash")  # how a job ends without a result
 STRIP = 30
@@ -80,6 +81,11 @@ class DesignView:
         return "regression" if self.baseline.regressions else "pass"
 
     @property
+    def held_against(self) -> str:
+        """The night whose figures it may not be worse than, in words."""
+        return "the approved baseline" if self.approval else "the first night, as none is approved"
+
+    @property
     def report(self) -> str:
         return report_folder(self.result)
 
@@ -118,6 +124,13 @@ class Overview:
         return sum(d.state == state for d in self.alone)
 
     @property
+    def left_out(self) -> str:
+        """Say which designs of last night are not in the study tonight; empty where all are."""
+        more = len(self.gone) - 20
+        named = ", ".join(one_line(name, 80) for name in self.gone[:20]) + f" and {more} more" * (more > 0)
+        return f"In the study last night, not tonight: {named}" * bool(self.gone)
+
+    @property
     def counts(self) -> str:
         counted = ((self.count(state), words) for state, (_, words) in STATES.items())
         apart = (d for d in self.designs if d not in self.alone and d.state != "pass")
@@ -130,8 +143,9 @@ class Overview:
         parts = [f"All {len(self.alone)} designs are built"]
         stated = any(one.result.total for one in self.alone)
         parts += ["meet their requirements"] * stated
-        compared = (one.baseline.run for one in self.alone)
-        parts += ["are no worse than the baseline"] * any(run and run.id < self.run.id for run in compared)
+        before = [d for d in self.alone if d.baseline.run and d.baseline.run.id < self.run.id]
+        against = " or ".join(sorted({one.held_against for one in before}))
+        parts += [f"are no worse than {against}"] * bool(before)
         words = " and ".join([", ".join(parts[:-1]), parts[-1]] if parts[1:] else parts)
         return words if stated else f"{words}; no requirement is stated"
 

@@ -51,14 +51,21 @@ def brief(comparison: Comparison) -> Brief:
     block = doc.with_columns(compare_best.designs(shown, note=""), kept)
     names = [
         name
+        for loop in LOOPS
         for name in shown.names
-        if name.group in LOOPS and name.key.removeprefix(f"{name.group}.") in _TERMINAL
-        if any(name.key in one.differences or name.group in one.unstable for one in shown.variants)
+        if name.group == loop and name.key.removeprefix(f"{loop}.") in _TERMINAL
+        if any(_is_other(name, one, shown.base) for one in shown.variants)
     ]
     loops = _of_figures("Loops", names, _OF_GROUP, shown, batches(shown), _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
     return Brief(result(comparison), [block, *loops], notes)
+
+
+def _is_other(name: FigureName, one: Compared, base: Compared) -> bool:
+    """Whether a figure of a loop differs from the base's; also where only one of them has the loop."""
+    alone = (name.key in one.figures) != (name.key in base.figures)
+    return alone or name.key in one.differences or name.group in one.unstable
 
 
 def data(comparison: Comparison) -> Tree:
@@ -76,7 +83,8 @@ def write(comparison: Comparison, folder: Path | None) -> list[str]:
 def result(comparison: Comparison) -> str:
     """Count the requirements of all designs; name the first that is not stable, not met, or not proven."""
     everything = comparison.everything
-    said = f"{comparison.tally.words('requirements')}, over {len(everything.all)} designs."
+    designs = f"{len(everything.all)} design{'s' * bool(everything.variants)}"
+    said = f"{comparison.tally.words('requirements')}, over {designs}."
     unstable = [f"{one.variant.name}, {unstable_words(one)}" for one in everything.all if one.unstable]
     said += _first_of("Not stable", unstable)
     for word in (Verdict.NOT_MET, Verdict.NOT_PROVEN):
@@ -135,7 +143,7 @@ def _side_by_side(
 
 
 def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
-    verdict = next((v for v in one.verdicts if v.id == wanted.id), None)
+    verdict = next((v for v in one.verdicts if v.figure == wanted.figure), None)
     if verdict is None or verdict.value is None:
         unstable = verdict is not None and verdict.loop in one.unstable
         words = "not stable" if unstable else "none"

@@ -105,8 +105,8 @@ def _those(one: Compared, word: Verdict) -> str:
 
 def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
     """Say what a variant gains (+1) or loses (-1) of each distance, the most first."""
-    base = {v.id: nearness(v) for v in comparison.base.verdicts}
-    known = [(label(v), nearness(v), base.get(v.id)) for v in one.verdicts]
+    base = {v.figure: nearness(v) for v in comparison.base.verdicts}
+    known = [(label(v), nearness(v), base.get(v.figure)) for v in one.verdicts]
     moved = [(name, now - before) for name, now, before in known if now is not None and before is not None]
     moved = sorted((pair for pair in moved if sign * pair[1] > SEEN), key=lambda pair: -abs(pair[1]))
     words = [f"{name} {_percent(change, signed=True)}" for name, change in moved[:_MOST]]
@@ -139,14 +139,14 @@ def _best(comparison: Comparison) -> doc.Block:
             first, *alike = [name for near, name, _ in ranked if alike_one(near)]  # the base is first
             same = alike_one(low[0])
             best = first + f"; {len(alike)} alike" * bool(alike)
-            row |= {"best": "all alike" if same else best, "value": high[2]}
+            row |= {"best": "all alike" if same and alike else best, "value": high[2]}
             row["worst"] = "" if same else f"{low[1]}: {low[2] or 'not stable'}"
         rows.append(row)
     return doc.table("Best design of each requirement", columns, rows)
 
 
 def _judged(comparison: Comparison, wanted: RequirementVerdict) -> list[tuple[Compared, RequirementVerdict]]:
-    return [(one, v) for one in comparison.all for v in one.verdicts if v.id == wanted.id]
+    return [(one, v) for one in comparison.all for v in one.verdicts if v.figure == wanted.figure]
 
 
 def number(value: float | None) -> str | None:
@@ -175,7 +175,7 @@ def _ends(comparison: Comparison) -> Iterator[int]:
     room = sorted(range(len(variants)), key=lambda k: (failed(variants[k]), -weakest(variants[k])[0]))
     yield room[0]
     for wanted in comparison.base.verdicts:
-        near = {k: nearness(v) for k in room for v in variants[k].verdicts if v.id == wanted.id}
+        near = {k: nearness(v) for k in room for v in variants[k].verdicts if v.figure == wanted.figure}
         yield from _least_and_most(near)
     yield from (*room[:_MOST_ROOM], *room[-_MOST_ROOM:])
     for name in comparison.names:
@@ -226,10 +226,10 @@ def table_text(comparison: Comparison) -> str:
     rows: list[list[object]] = []
     for one in comparison.all:
         (near, verdict), count = weakest(one), tally(one.verdicts)
-        values = {v.id: v.value for v in one.verdicts}
+        values = {v.figure: v.value for v in one.verdicts}
         least = (None, None) if verdict is None or math.isinf(near) else (verdict.id, 100.0 * near)
         figures = [one.figures.get(name.key) for name in comparison.names]
-        asked = [values.get(wanted.id) for wanted in comparison.base.verdicts]
+        asked = [values.get(wanted.figure) for wanted in comparison.base.verdicts]
         counts = (count.met, count.not_met, count.not_proven, " ".join(one.unstable))
         rows.append([one.variant.name, *counts, *least, *figures, *asked])
     return csv_text(header, rows)

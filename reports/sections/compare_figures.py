@@ -28,6 +28,9 @@ def overlays(comparison: Comparison) -> doc.Section:
             blocks += _step(name, title, drawn)
     left_out = len(comparison.everything.all) - len(drawn)
     intro = f"{left_out} more designs are in the tables only." if left_out else ""
+    others = {name.group for name in comparison.names} - set(comparison.base.loops)
+    lacking = " or ".join(title.lower() for name, title in LOOPS.items() if name in others)
+    intro += f" The base has no {lacking}; those of others are in the tables only." * bool(lacking)
     result = f"Open loop, closed loop and step of {len(drawn)} designs; the base is black."
     return doc.section("overlays", "Responses of all designs", blocks, result=result, intro=intro)
 

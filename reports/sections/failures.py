@@ -28,14 +28,15 @@ _SHOWN = 400
 
 def section(result: Failures) -> doc.Section:
     out, asked, push = output_unit(result.design.axis), result.asked, push_words(result.design)
+    swing, load = noticed(result.design, result.before), f"{asked.load_Nm:g} {result.design.load_unit}"
     held = "has come to rest"
-    if (swing := noticed(result.design, result.before)) is not None:
+    if swing is not None:
         held = f"does not come to rest, {told(result.design, swing, *out)},"
     intro = (
-        f"Each failure is simulated from a drive that {held} under {asked.load_Nm:g} "
-        f"{result.design.load_unit} (positive pushes forward). Deflection counts from where the output was; "
-        f"the stop is {out.of(asked.stop_rad, 4)} away, and detection takes {1e3 * asked.detection_s:.4g} "
-        f"ms. The {push} is that in the coupling; in a rigid train the motor's, through the gears."
+        f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
+        f"Deflection counts from where the output was; the stop is {out.of(asked.stop_rad, 4)} away, and "
+        f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling; in a rigid "
+        "train the motor's, through the gears."
     )
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     own = requirements.table(result.requirements, result.design.load_unit)
@@ -60,8 +61,12 @@ def summary(result: Failures) -> str:
         size = f"{short(out.scale * worst.at_detection_rad, 3)} {out.unit}"
         words = f"moves the output most until it is detected: {size} in {when}"
         words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
-    if verdict_of(result.design, noticed(result.design, result.before)) is not Verdict.MET:
-        words += "; the drive does not come to rest before it"
+    swing = noticed(result.design, result.before)
+    if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
+        load = f"{result.asked.load_Nm:g} {result.design.load_unit}"
+        words += (
+            f"; before it the drive does not come to rest under {load}: {told(result.design, swing, *out)}"
+        )
     return f"{NAMES[worst.name]} {words}. {requirements.told(result.requirements)}".rstrip()
 
 

@@ -49,10 +49,11 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     predicted = "; ".join(_predicted(item, fine) for item in cycles.confirmations) or "none"
+    swings = 0.0 if swing is None else swing.swing_rad if swing.rest.verdict != "diverging" else None
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle of friction after steps at {point.load_Nm:g} {load}",
-        value=0.0 if swing is None else fine.scale * swing.swing_rad,
+        value=None if swings is None else fine.scale * swings,
         limit=fine.scale * accepted_rad(design),
         unit=fine.unit,
         passed=verdict_of(design, swing),
@@ -205,7 +206,8 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
 def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if (swing := noticed(result.design, settlings)) is not None:
-        return f"Friction alone keeps the drive from rest after a step: {told(result.design, swing, *fine)}."
+        why = told(result.design, swing, *fine)
+        return f"Without counts and noise too a step does not come to rest: {why}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {result.design.load_unit}" if most.load_Nm else ""

@@ -24,10 +24,12 @@ def judged(
     first = [doc.verdicts(map(_verdict, found.items), BENCH_CHECKS)]
     if open_ones := [item.label for item in found.items if item.passed is None]:
         first.append(doc.remark(f"Not proven, which alone does not fail: {'; '.join(open_ones)}"))
-    first.append(doc.remark(f"Design found, SHA-256 {design_hash(found.design)}"))
+    if not found.unmade:
+        first.append(doc.remark(f"Design found, SHA-256 {design_hash(found.design)}"))
     if not found.passed:
         said = "The design is written as it was accepted, a check failed"
-        otherwise = "No design is written, as a check fails; --accept writes it all the same"
+        otherwise = "No design is written, as a check fails"
+        otherwise += "" if found.unmade else "; --accept writes it all the same"
         first.append(doc.remark(said if found.accepted else otherwise))
     if wrong := [item for item in found.items if item.passed is False]:
         why = f" ({wrong[0].reason})" if wrong[0].reason else ""

@@ -8,6 +8,7 @@ from analyses.estimation.parameters import default_value, parameter
 from analyses.identification.bench import BenchResult
 from analyses.identification.design_values import DesignValue, given_constant
 from analyses.identification.friction_map import LawChoice
+from analyses.identification.inverse import SIGNED
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.residuals import ResidualTest
 from analyses.records.consistency import left_out_of
@@ -69,11 +70,13 @@ def _result(result: BenchResult, axis: str) -> str:
         ]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
+    words = f"{capital(told)}{identified.constant_words(model, axis)}."
+    if result.unmade:
+        return " ".join([*left_out_of(result.findings), words, "No design comes of it."])
     worst = max(result.resimulated, key=lambda one: one.beyond_noise)
     met = "its records" if len(result.resimulated) > 1 else worst.record
     written = "The written design" if result.passed or result.accepted else "A design of what is found"
-    words = f"{told}{identified.constant_words(model, axis)}. {written} meets {met} within"
-    words = f"{capital(words)} {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
+    words = f"{words} {written} meets {met} within {100.0 * worst.beyond_noise:.3g} % ({worst.how})."
     return " ".join([*left_out_of(result.findings), words])
 
 
@@ -134,12 +137,10 @@ def _against_design(result: BenchResult) -> doc.Block:
         status=lambda one: "pass" if one.agrees else "warn",
     )  # fmt: skip
     assert block["kind"] == "table"
-    told = tuple(one.name for one in values)  # gravity: both of its terms
-    own = {name: default_value(result.design, name) for name in model.names if name != "offset"}
+    none = [name for name in model.names if model[name] <= 0.0 and name not in SIGNED]
+    own = {name: default_value(result.design, name) for name in none}
     own |= {name: one.value for name, one in model.fixed.items()}
-    kept = [
-        (parameter(name, axis), value) for name, value in own.items() if value and not name.startswith(told)
-    ]
+    kept = [(parameter(name, axis), value) for name, value in own.items() if value]
     rows: list[doc.Row] = [
         {"name": one.label, "design": value, "unit": one.unit, "agrees": "kept"} for one, value in kept
     ]

@@ -87,7 +87,7 @@ def _verdicts(result: MonteCarloResult) -> list[doc.VerdictItem]:
     items = [_verdict(result, odds) for odds in result.odds if odds.id != "all"]
     for one in result.left_out:  # not sampled
         id, words = f"tolerance/{one.id}", f"{label(one)}{_MET_WITHIN}"
-        items.append(doc.verdict(id, words, passed=None, reason=one.reason, waiver=one.waiver))
+        items.append(doc.verdict(id, words, passed=one.verdict, reason=one.reason, waiver=one.waiver))
     return items
 
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from reports import document as doc
+from reports.nightly.changes import change_words
 from reports.nightly.machines import summary as data
 from reports.nightly.text import one_line
 from reports.nightly.view import STATES, Overview
@@ -16,12 +17,14 @@ def section(night: Overview) -> doc.Section:
         why = design.why or design.result.worst_id or "; ".join(design.meta.get("words", ()))
         if design.state == "regression":
             worst = design.baseline.regressions
-            why = f"{len(worst)} figures worse than the baseline, {worst[0].figure}"
+            first = change_words(worst[0], design.baseline, design.verdicts)
+            why = f"{len(worst)} figures worse than {design.held_against}; first {first}"
         rows.append((STATES[design.state][1], one_line(design.name, 60), one_line(why, 300)))
     columns = [doc.column("state", "State"), doc.column("name", "Design"), doc.column("why", "Why")]
     blocks = [doc.table("Designs that need a look", columns, rows)] if rows else []
     cached = sum(design.result.cached for design in night.designs)
     words = f"night {night.run.id}: {night.counts} ({cached} unchanged)"
+    words += f". {night.left_out}" * bool(night.gone)
     return doc.section("night", "Night", blocks, result=words)
 
 

@@ -537,6 +537,7 @@ CHANGED: list[tuple[str, ...]] = [  # a text, another in its place, and the same
     ('ratio = "43:1"', 'reduction = "43:1"', "(it is ratio, which takes"),
     ("ratio = ", "i = 66 #", 'takes "60/20" too)'),
     ("ratio = ", 'i = "66:1" #', 'takes "60/20" too)'),
+    ("rotor_inertia", "GD2", "(it is rotor_inertia, GD2 over 4)"),
     ("resistance", "terminal_resistance", "(it is resistance)"),
     ("resistance", "resistance_line_to_line", "(it is resistance)"),
     ("resistance", "resistence", '(nearest known: "resistance")'),

@@ -248,6 +248,8 @@ def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> Non
         ("proportional gain", "control.velocity.gain"),
         ("k1", "coupling.stiffness"),
         ("state feedback", "control.position.law.inputs"),
+        ("swing", "requirement.quantity"),
+        ("phase_margin", "requirement.quantity"),
     ],
 )
 def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, key: str) -> None:

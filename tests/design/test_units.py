@@ -45,7 +45,7 @@ READ: list[tuple[str, float, tuple[object, ...]]] = [  # unit asked for, value i
     ("rad/s^2", 60000 * pi, ("30000 rev/s^2", "30000 rev/s2")),
     ("rad/s^2", 6e4, ("60 .10³ rad/s²",)),
     ("rad/s^2", 2000 * pi, ("1000 rps^2",)),
-    ("rad", pi / 18, ("10 °",)),
+    ("rad", pi / 18, ("10 °", "10º", "10 ˚")),
     ("rad", 48 / 60 * pi / 180, ("48'",)),
     ("rad", 30 / 3600 * pi / 180, ('30"',)),
     ("rad", pi / 3600, ("3 arc-min", "3 arc min", "3 arcmin")),
@@ -170,6 +170,23 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
         ("4.1 mWb", "V*s/rad", "back_emf_constant is p psi in V*s/rad"),
         ("2 g", "m/s^2", "here 19.6133 m/s^2"),
         ("5 kg", "N", "a weight is written kgf"),
+        # GD2 of a weight is 4 g J, of a mass 4 J: 0.068 kgf m2 as 0.068 kg m2 are 0.017 kg m2
+        *[
+            (text, "kg*m^2", "J = 0.017 kg*m^2")
+            for text in (
+                "0.068 kgf m2",
+                "680 kgf cm2",
+                "0.6668522 N m2",
+                "GD2 0.068 kgf m2",
+                "GD² = 0.068 kgm²",
+            )
+        ],
+        ("0.068 kg m2 (GD2)", "kg*m^2", "a GD2; allowed"),
+        ("0.01 WR2", "kg*m^2", "WR2 and WK2 are the inertia J"),
+        ("24..28 V", "V", "a range; write one number"),
+        ("24 … 28 V", "V", "a range; write one number"),
+        ("24 to 28 V", "V", "a range; write one number"),
+        ("5 %", "rad", '"%" is the unit of a ratio'),
         ("1,000 rpm", "rad/s", 'write "1000 rpm" or "1.000 rpm"'),
         ("2,621,440 counts", "1", 'write "2621440 counts"'),
         ("100-120 V", "V", "a range; write one number"),

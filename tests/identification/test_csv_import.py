@@ -130,7 +130,10 @@ def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path
         ("", "fewer than two usable rows"),
         ("t,n,n\n0,1,2\n1,2,3\n", "2 times"),
         ("t,n\n0,1\n1,abc\n2,3\n", r'log.csv:3: column "n" = "abc": not a number'),
-        ("t,n\n0,1\n2,1\n1,1\n3,1\n", r"log.csv:4: time 1 s does not come after 2 s"),
+        ("t,n\n0,1\n2,1\n1,1\n3,1\n", r"log.csv:4: time 1 s does not come after 2 s; allowed"),
+        ("t,n\n1700000000.01,1\n1700000000.01,1\n", r"1700000000.01 s does not come after 1.*: a row twice"),
+        ("t;n\n0;1\n1;1\n", r'no column "t"; is separator = ";" missing\? There is: "t;n"$'),
+        ("u,n\n0,1\n1,1\n", r'no column "t"; there are: "u", "n"$'),
     ],
 )
 def test_files_that_are_no_records(tmp_path, content: str | bytes, reason: str) -> None:

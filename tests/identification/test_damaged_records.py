@@ -327,6 +327,9 @@ WRONG: dict[str, tuple[Damage, tuple[str, ...], dict[str, float], str]] = {
     "angle and current swapped": (_swapped("angle", "current"), ALL, {}, "they are not alike"),
     "counts of the encoder": (_scaled(4.0, "angle", "speed"), BARE, TRUTH, "the scale of angle and speed"),
     "counts, 10 % off": (_scaled(1.1, "angle", "speed"), ALL, {}, "1.1 times that which the loops follow"),
+    "the output's angle in the motor's column": (
+        _scaled(1.0 / BASE.total_ratio, "angle"), ("reference", *BARE), {}, "times that which the loops"
+    ),
     "one row in 700 lost, time by rows": (_lost(700), BARE, {}, "rows are missing where the time goes on"),
     "one row in 10 filled with the one before": (_lost(10, filled=True), BARE, {}, "rows repeat the one"),
     "encoder the other way round": (_scaled(-1.0, "angle", "speed"), ALL, TRUTH, "the sign is turned"),

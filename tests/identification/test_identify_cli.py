@@ -1,6 +1,7 @@
 """`identify` and `correlate` from the command line: what they print, what they write, how they refuse."""
 
 import json
+import re
 import shutil
 from collections import Counter
 from pathlib import Path
@@ -8,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_lti.design import design_hash, load_design
+from actuator_lti.design import design_hash, load_design, write_design
+from actuator_lti.design.model import FrictionPoint
 from examples.virtual_bench import BenchPlan
 from examples.virtual_bench.__main__ import main as simulate
 from reports.document import load as load_document
 from reports.verdict_summary import judged, walk
-from tests.identification.bench_records import columns_of, motion, write
+from tests.changed import changed
+from tests.identification.bench_records import bare, columns_of, motion, write
 
 
 @pytest.fixture(scope="module")
@@ -134,3 +137,26 @@ def test_terminal_page_json_and_status_say_not_proven_alike(tmp_path, cli) -> No
     written = design_hash(load_design(tmp_path / "ilr33-amber-identified.toml"))
     assert told["design"]["hash"] == written
     assert f"Design found, SHA-256 {written}" in shown
+    points = tuple(FrictionPoint(speed_rad_s=v, torque_Nm=4e-3) for v in (0.0, 900.0))
+    with_map = {"points": points, "dry_torque_Nm": 0.0, "viscous_Nms_rad": 0.0}
+    text = write_design(changed(bare("ilr33-amber"), friction=with_map))
+    (tmp_path / "map.toml").write_text(text)
+    for form in ((), ("--friction", "per-direction")):  # the design's map is neither found nor kept
+        told = cli.text("identify", tmp_path / "r.csv", "--design", tmp_path / "map.toml", *form)
+        assert "Friction map of the design" in told
+        assert not re.search(r"(Viscous|Dry) friction.* kept", told)
+
+
+@pytest.mark.parametrize("accept", [(), ("--accept",)])
+def test_a_record_that_no_design_can_come_of_fails_with_its_tables(accept, cli, tmp_path) -> None:
+    """A current a thousandth of what it is: less inertia in all than the gears have alone."""
+    columns = columns_of(motion(2))
+    write(tmp_path / "r.csv", {**columns, "current_A": 1e-3 * columns["current_A"]})
+    words = ("identify", tmp_path / "r.csv", "--design", "ilr33-amber", "--out", tmp_path, *accept)
+    told = " ".join(cli.text(*words, status=1).split())
+    assert "No design comes of it." in told
+    assert "SHA-256" not in told
+    assert "factor 1000" in told
+    assert not [*tmp_path.glob("*.toml")]
+    page = json.loads((tmp_path / "identification.json").read_text())
+    assert {item["id"]: item["verdict"] for item in judged(walk(page["sections"][0]))}["made"] == "not met"

@@ -49,10 +49,10 @@ def _joint() -> Design:
     return replace(changed, load=replace(changed.load, path="back-drivable"))
 
 
-def _pendulum_record(noise: float, *, drive: str) -> Record:
+def _pendulum_record(noise: float, *, drive: str, size: float = 1.0) -> Record:
     """Closed form: torque at the motor = J a + Cv w + (C0 + CM |M|) sgn w - M/N, M = m g l sin(phi + off)."""
-    n, phi = 100.0, 1.2 + _waves(0)
-    w, a = n * _waves(1), n * _waves(2)
+    n, phi = 100.0, 1.2 * size + _waves(0, size)
+    w, a = n * _waves(1, size), n * _waves(2, size)
     moment = 1.0 * 9.80665 * 0.3 * np.sin(phi + 0.2)
     torque = 3e-5 * a + 2e-5 * w + (4e-3 + 1.5e-3 * np.abs(moment)) * np.sign(w) - moment / n
     rng = np.random.default_rng(3)
@@ -78,6 +78,16 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
     assert gravity.offset_rad == pytest.approx(0.2, abs=2e-3)
 
 
+def test_a_small_motion_tells_the_mass_at_the_design_s_offset_and_no_load_beside_it() -> None:
+    """The design's pendulum is a tenth too heavy, its offset is right: there is no constant torque."""
+    gravity = Gravity(mass_kg=1.1, arm_m=0.3, offset_rad=0.2)
+    design = replace(_joint(), load=replace(_joint().load, gravity=gravity))
+    model = fit_records(design, [_pendulum_record(0.02, drive="current", size=0.1)], gravity=True)
+    assert tuple(model.fixed) == ("gravity_cos",)
+    assert model["gravity_sin"] == pytest.approx(9.80665 * 0.3, rel=0.01)
+    assert abs(model["offset"]) < 3.0 * model.std("offset") < 1e-4
+
+
 @pytest.mark.parametrize(
     ("term", "found_kg", "given", "mass_kg", "offset_rad"),
     [
@@ -85,9 +95,9 @@ def test_a_pendulum_and_its_load_friction_are_found(drive: str) -> None:
         ("gravity_cos", 2.0, None, 2.0, 0.5 * np.pi),
         ("gravity_sin", -2.0, None, 2.0, np.pi),  # it hangs
         ("gravity_cos", -2.0, None, 2.0, -0.5 * np.pi),
-        ("gravity_sin", 2.0, 1.1, 2.0 / np.cos(1.1), 1.1),
-        ("gravity_cos", 2.0, 1.1, 2.0 / np.sin(1.1), 1.1),
-        ("gravity_sin", 2.0, 3.0, 0.5, 3.0),  # of the other sign than the design's: the design keeps its own
+        ("gravity_sin", 2.0, 1.1, 2.0, 1.1),
+        ("gravity_cos", 2.0, 1.1, np.hypot(0.5, 2.0), 1.1 + np.arctan2(2.0, 0.5)),  # the other term is kept
+        ("gravity_sin", -2.0, 3.0, 2.0, 3.0 - np.pi),
     ],
 )
 def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(

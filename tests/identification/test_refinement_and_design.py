@@ -19,12 +19,13 @@ from analyses.identification.campaign_design import SuggestedRun, suggest_runs
 from analyses.identification.inverse import fit_records
 from analyses.identification.output_error import fit_output
 from analyses.identification.plan import PERIOD_S, Plan, plan_motions
-from analyses.identification.steady import SteadyPoint, SteadyWindow
+from analyses.identification.steady import SteadyPoint
 from analyses.identification.surface import SurfaceFit, fit_surface
 from analyses.identification.to_design import design_with_fit, joint_values
 from analyses.records.campaign_file import Instruments
 from analyses.records.open_record import open_record
 from analyses.records.record import Record
+from analyses.records.steady_window import SteadyWindow
 from nonlinear import commands, simulate
 from tests.identification.bench_records import (
     NOISE_A,

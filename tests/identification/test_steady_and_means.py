@@ -1,6 +1,7 @@
 """Steady parts, means of correlated series, currents between samples, recorders on one clock, residuals."""
 
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,9 +12,12 @@ from analyses.estimation.means import correlated_means, correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.residuals import LEVEL, ResidualTest, residual_tests
 from analyses.identification.sampled_current import HeldVoltage
-from analyses.identification.steady import SteadyCriterion, find_steady_window
+from analyses.records.campaign_file import Campaign, Instruments, Join, RunEntry
+from analyses.records.campaign_import import assemble_run
 from analyses.records.clocks import join_records
 from analyses.records.record import Record
+from analyses.records.steady_window import SteadyCriterion, find_steady_window
+from examples.virtual_bench.files import DRIVE_SPEC, SENSOR_SPEC
 from tests.identification.bench_records import record_of
 from tests.refusals import refused
 
@@ -116,6 +120,33 @@ def test_offset_and_rate_are_found(method: str, offset: float, rate: float) -> N
     assert abs(join.rate - rate) < max(5.0 * join.rate_std, 1e-4)
     assert join.offset_s + join.rate * 9.0 == pytest.approx(offset + rate * 9.0, abs=2e-3)
     assert np.corrcoef(joined["speed"], -joined["torque"])[0, 1] > 0.999
+
+
+@pytest.mark.parametrize("method", ["correlation", "event"])
+@pytest.mark.parametrize("later", [0.0, 0.4, 1.5])
+def test_a_load_that_comes_after_the_motion_tells_its_clock_by_the_current(method: str, later: float) -> None:
+    """By speed and torque the clock was off by what the load comes later, at some ms of standard error."""
+    rng, time, offset = np.random.default_rng(3), np.arange(0.0, 8.0, 1e-3), 0.35
+    sensor_s = np.arange(0.0, 7.5, 2.3e-3)
+
+    def load(at: np.ndarray) -> np.ndarray:
+        return -3.0 * np.clip((at - 1.0 - later) / 0.2, 0.0, 1.0)
+
+    speed = 200.0 * np.clip((time - 1.0) / 0.2, 0.0, 1.0) + 0.1 * rng.standard_normal(len(time))
+    current = 0.2 * np.sign(speed) - 0.05 * load(time) + 0.02 * rng.standard_normal(len(time))
+    torque = load(offset + sensor_s) + 0.01 * rng.standard_normal(len(sensor_s))
+    drive = record_of(time, "d", speed=speed, current=current)
+    sensor = record_of(sensor_s, "s", torque=torque)
+    entry = RunEntry(id="1", drive=Path(), load_Nm=3.0)
+    join = Join(method=method)
+    campaign = Campaign(
+        drive=DRIVE_SPEC, sensor=SENSOR_SPEC, join=join, instruments=Instruments(), runs=(), origin=""
+    )
+    run = assemble_run(campaign, entry, drive, sensor)
+    assert run.join.offset_s == pytest.approx(offset, abs=max(4.0 * run.join.offset_std_s, 2e-3))
+    assert run.join.offset_std_s < 0.01
+    assert np.interp(1.1 + later, run.record.time_s, run.record["torque"]) == pytest.approx(-1.5, abs=0.15)
+    assert run.join.first_signal == ("current" if later else "speed")
 
 
 def test_one_event_tells_no_rate_a_given_offset_is_kept_and_strangers_are_refused() -> None:

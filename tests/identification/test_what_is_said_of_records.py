@@ -15,6 +15,8 @@ from analyses.identification.verdict import sampling_items
 from analyses.records.consistency import check_record
 from analyses.records.open_record import open_record
 from analyses.records.record import Record, prepared
+from nonlinear import commands, simulate
+from tests.changed import changed
 from tests.identification.bench_records import Columns, bare, columns_of, motion, record_of, signals_of, write
 
 DRIVE = load_design("ilr33-amber")
@@ -46,6 +48,19 @@ def test_the_model_of_a_record_tells_its_clock(clock: float, columns: Columns) -
         off = re.search(r"a clock about (\S+) % off", wrong)
         assert off
         assert float(off[1]) == pytest.approx(100.0 * (clock - 1.0), rel=0.05)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.4])
+def test_a_drive_limited_to_less_current_than_the_design_says_so(share: float) -> None:
+    """Of the largest current that steps of the command take."""
+    angle = np.where(np.arange(3000) // 500 % 2, 0.02, -0.02)
+    command = commands.sampled(1e-3 * np.arange(3000.0), angle)
+    most = share * float(np.max(np.abs(simulate(DRIVE, command, 3.0).current_A)))
+    run = simulate(changed(DRIVE, limits={"peak_current_A": most}), command, 3.0)
+    seen = signals_of(run, 1)
+    _, wrong = _correlated(_record(seen, "reference", "angle", "current"))
+    assert ("limits.peak_current" in wrong) is (share < 1.0), wrong
+    assert f"the current stays below {np.max(np.abs(seen['current'])):.3g} A" in wrong or share == 1.0
 
 
 def _lines(path: Path, columns: Columns, name: str, line: int, value: float) -> None:
@@ -93,14 +108,35 @@ def test_a_time_in_another_unit_is_named_by_its_factor(factor: float, columns: C
     assert "factor 1e6 (micro" in told.text if factor == 1e6 else "factor 1000 (milli" in told.text
 
 
+@pytest.mark.parametrize(
+    ("factor", "named"), [(1.0, ""), (30.0, ""), (1e3, "1000 "), (1e-3, "1000 "), (1e6, "1e6 ")]
+)
+def test_a_speed_drive_tells_the_unit_of_its_time_by_its_inertia(factor, named, columns: Columns) -> None:
+    """Of a design with two thirds of the inertia; what is no unit of a time is another inertia."""
+    other = with_values(DRIVE, {"motor.rotor_inertia": DRIVE.motor.rotor_inertia_kgm2 / 1.5})
+    logged = {"speed_reference": columns["speed"], "time": factor * columns["time"]}
+    record = _record({**columns, **logged}, "speed_reference", "speed", "current")
+    told = [one for one in check_record(other, record) if one.subject.startswith("time")]
+    assert bool(told) is bool(named)
+    assert all(one.passed is False and f"factor {named}" in one.text for one in told)
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed")])
+@pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed"), ("speed",)])
 def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
     other = with_values(DRIVE, {"motor.rotor_inertia": 2.5e-6, "friction.dry_torque": 1.5e-3})
     record = _record(columns, *signals, "current", current=sign * columns["current"])
     told = [one.text for one in check_record(other, record) if one.subject == "current against the motion"]
     assert bool(told) is (sign < 0.0)
     assert not told or "the sign of the current is turned" in told[0]
+
+
+def test_a_signal_whose_squares_are_zero_is_zero(columns: Columns) -> None:
+    """1e-322 V, as a logger leaves it: divided by, and then refused for the whole record."""
+    voltage = np.full_like(columns["time"], 1e-322)
+    result = correlate_record(DRIVE, _record(columns, "reference", "angle", "voltage", voltage=voltage))
+    assert set(result.signals) == {"angle", "speed"}
+    assert "voltage is zero throughout: not compared" in result.notes
 
 
 @pytest.mark.parametrize("times", [1.0, 0.7])

@@ -320,10 +320,11 @@ def test_what_is_no_law_is_refused_in_words(tmp_path: Path) -> None:
     assert "each at most once" in made(unit, ["error", "error"])
     twice = base.with_law("velocity", unit, ["error"])
     assert "at one stage" in refused(twice.with_law, "position", unit, ["error"])
-    for key, value in (("gain", "0.1 A*s/rad"), ("integral_time", "1 ms")):
+    for key, value in (("gain", "0.1 A*s/rad"), ("gain", "5 1/s"), ("integral_time", "1 ms")):
         said = refused(twice.with_values, {f"control.velocity.{key}": value})
         assert said.split("control.velocity.", 1)[1].startswith(key)
-        assert "not allowed beside control.velocity.law" in said
+        own = ", whose own gain is control.velocity.law.gain" * (key == "gain")
+        assert said.endswith(f"not allowed beside control.velocity.law{own}")
     notch = {"kind": "notch", "frequency": "120 Hz", "width": "60 Hz"}
     for bad in (nan, inf):
         words = f'.frequency = "{bad} rad/s": must be finite; allowed: a number with a unit like rad/s'

@@ -19,6 +19,7 @@ from actuator_lti.drive.steady import torque_gain_Nm_rad
 from analyses import survey_loops, validate
 from analyses.linear.code_check import check_code
 from analyses.tuning.start import rule_gains
+from reports.live.keys import followed
 from reports.live.model import live_model
 
 
@@ -152,6 +153,17 @@ def test_it_stays_as_it_is_while_the_rest_moves(stage: str) -> None:
     gains = rule_gains(design).values
     assert others <= set(gains)
     assert not any(path.startswith(f"control.{stage}.") for path in gains)
+
+
+def test_a_key_that_a_drive_may_not_have_has_no_slider() -> None:
+    """Without a velocity loop nothing takes the command's rate; with one both can be moved from 0."""
+    base = load_design("ilr33-amber")
+    rates = {"control.position.feedforward", "control.position.acceleration_feedforward"}
+    pid = controlled(base, velocity=None, position=PositionLoop(gain=20.0))
+    for design, part in ((base, "free"), (pid, "fixed")):
+        assert rates <= {key["path"] for key in getattr(followed(design), part)}
+    why = {key["path"]: key["why"] for key in followed(pid).fixed}
+    assert {why[path] for path in rates} == {"allowed: 0 without a velocity loop"}
 
 
 def test_many_designs_have_the_gain_of_the_law() -> None:

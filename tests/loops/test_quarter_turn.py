@@ -78,6 +78,18 @@ def test_a_weak_spring_behind_a_pi(slope: float) -> None:
     assert band.dc_gain == pytest.approx(L0 / (1 + L0), rel=1e-9)
 
 
+@pytest.mark.parametrize(("followed", "told"), [(0.2, True), (0.7, True), (0.72, False), (0.95, False)])
+def test_a_spring_that_holds_3_db_of_a_constant_command_is_told(followed: float, told: bool) -> None:
+    """k = (1/T(0) - 1) Kp/Tn kM N^2; 1/sqrt(2) lies between 0.7 and 0.72."""
+    base = sprung("ilr33-amber", 0.0)
+    law, N = base.controller.velocity, base.total_ratio
+    slope = (1 - 1 / followed) * law.gain / law.integral_time_s * N**2
+    slope *= base.effective_motor.torque_constant_Nm_A
+    notes = all_loop_figures(assemble_loops(sprung("ilr33-amber", slope)))["velocity"].notes
+    assert any(f"a constant command gives {followed:g} of it" in note for note in notes) is told
+    assert any("a constant command" in note for note in notes) is told
+
+
 @pytest.mark.parametrize("slope", SLOPES)
 def test_no_resonance_over_nothing(slope: float) -> None:
     """A P velocity loop against a spring has T(0) = 0: what rounding leaves of it measures nothing."""

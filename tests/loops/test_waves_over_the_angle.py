@@ -158,6 +158,8 @@ def test_keys_of_a_wave(name: str) -> None:
         values |= {f"{name}_periods": f"{factor * most} rad/rad"}
         with pytest.raises(InputError, match=f"{name}_periods{HELD}") as refused:
             fin.with_values(values)
+        assert f"passes {0.5 * factor:.3g} rad at" in str(refused.value)  # in the measure of model.md
+        assert ", more than 0.5;" in str(refused.value)
     takes = dict(re.findall(r"(control\.period|limits\.speed) = (\S+ \S+)", str(refused.value)))
     for key in ("control.period", "limits.speed"):  # either takes it
         fin.with_values({**values, key: takes[key]})

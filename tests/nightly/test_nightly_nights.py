@@ -3,6 +3,7 @@
 import json
 import re
 from dataclasses import replace
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -11,11 +12,14 @@ from nightly_fakes import CODE, INLINE, Calendar, job, study
 from site_checks import check_whole
 
 from actuator_lti.bounds import NIGHTLY_JOBS
-from reports.nightly.changes import Columns
+from reports.nightly.changes import Columns, headlines
 from reports.nightly.figures import Figure
+from reports.nightly.history import History
 from reports.nightly.moves import Tolerances, change_points, flaps, missing_nights, read_tolerances
 from reports.nightly.night import approve, run_night
-from reports.nightly.source import Job
+from reports.nightly.records import Result
+from reports.nightly.source import Job, read_study
+from reports.sections.nightly import section
 from tests.refusals import refused
 
 
@@ -89,7 +93,8 @@ def test_what_passes_says_no_more_than_what_was_asked_and_compared(nights) -> No
     first, second = nights(*jobs), nights(*jobs)
     assert first.said_of_all == "All 2 designs are built and meet their requirements"
     assert second.said_of_all == (
-        "All 2 designs are built, meet their requirements and are no worse than the baseline"
+        "All 2 designs are built, meet their requirements and "
+        "are no worse than the first night, as none is approved"
     )
     bare = [replace(one, result=replace(one.result, total=0)) for one in first.designs]
     words = replace(first, designs=tuple(bare)).said_of_all
@@ -116,6 +121,29 @@ def test_a_change_is_told_with_the_parameter_library_or_code_behind_it(nights) -
     assert design.last_night.cause.code
 
 
+def test_a_limit_that_moved_is_the_cause_and_the_figure_stays(nights, tmp_path, monkeypatch) -> None:
+    """The margin stays at 10 dB, its limit goes from 6 to 4 dB: 4 dB are left, then 6 dB."""
+    limit = '[study]\nname = "s"\nbase = "ilr33-amber"\n[[requirement]]\nid = "GM"\n'
+    path = tmp_path / "s.toml"
+
+    def asked(least: float) -> Job:
+        path.write_text(f'{limit}quantity = "gain_margin"\nloop = "position"\nminimum = "{least:g} dB"\n')
+        return replace(job("a", 10.0, limit=least), keys=read_study(str(path)).jobs[0].keys)
+
+    nights(asked(6.0))
+    night = nights(asked(4.0))
+    (told,) = headlines(night.designs)
+    assert told.cause == "requirement.GM.minimum 6.0 → 4.0 dB"
+    assert told.effect == "gain margin, distance to its limit 4.000 → 6.000 dB"
+    known = History.inputs
+
+    def earlier(self: History, of: Result) -> dict[str, Any]:  # whose nights kept the numbers alone
+        return {key: one for key, one in known(self, of).items() if of.run > 2 or key != "keys"}
+
+    monkeypatch.setattr(History, "inputs", earlier)
+    assert nights(asked(6.0)).designs[0].last_night.cause.parameters == ()
+
+
 def test_moves_within_the_tolerance_are_none_and_flapping_is_told_apart(nights) -> None:
     nights(job("a", 10.0))
     assert not nights(job("a", 10.005)).designs[0].last_night.changes
@@ -134,6 +162,14 @@ def test_a_regression_counts_until_it_is_approved_by_itself_however_slow_the_dri
     night = nights(job("a", 9.0))
     assert (night.designs[0].state, night.passed) == ("regression", False)
     assert "nobody has approved" in night.designs[0].baseline.note
+    (row,) = section(night)["blocks"][0]["rows"]
+    said = "figures worse than the first night, as none is approved"
+    assert re.fullmatch(rf"\d+ {said}; first gain margin 10.00 → 9.000 dB", row["why"])
+    assert (
+        "worse than the first night, as none is approved"
+        in max(nights.site.glob("nights/*/a-*.html")).read_text()
+    )
+    assert said.replace("figures", "figure(s)") in (nights.site / "junit.xml").read_text()
     again = nights(job("a", 9.0))
     assert not again.passed
     assert not again.designs[0].last_night.changes
@@ -173,7 +209,13 @@ def test_missing_results_and_missing_nights_are_no_changes(nights) -> None:
     back = next(d for d in nights(job("a", 10.0), job("b")).designs if d.name == "a")
     assert not back.last_night.changes
     assert "1 night(s) without a result" in back.last_night.note
-    assert nights(job("a", 10.0)).gone == ("b",)
+    night = nights(job("a", 10.0))
+    assert night.gone == ("b",)
+    told = "In the study last night, not tonight: b."
+    assert f"{section(night)['result']}." == f"night 4: 1 passing (1 unchanged). {told}"
+    assert all(told in (nights.site / file).read_text() for file in ("index.html", "summary.md"))
+    left = ElementTree.parse(nights.site / "junit.xml").find("testsuite[@name='b']/testcase")
+    assert (left.get("name"), left.find("skipped") is not None) == ("is in the study", True)
     for days in (4, 1):  # nights without a run are shown as such
         night = nights(job("a", 10.0), days=days)
     assert night.missing == ((3, 3),)
@@ -200,7 +242,7 @@ def test_machine_files_say_what_the_page_says_also_of_what_is_not_proven_or_waiv
     assert (summary["schema"], summary["exit_status"]) == ("actuator-lti/nightly", 1)
     assert summary["counts"] == {"broken": 1, "fail": 1, "unproven": 0, "regression": 0, "pass": 1}
     root = ElementTree.parse(nights.site / "junit.xml").getroot()
-    assert [root.get(k) for k in ("tests", "failures", "errors")] == ["7", "1", "1"]
+    assert [root.get(k) for k in ("tests", "failures", "errors", "skipped")] == ["8", "1", "1", "1"]
     failed = [c.get("name") for c in root.iter("testcase") if c.find("failure") is not None]
     assert failed == ["GM gain margin"]
     assert "✗ failing" in (nights.site / "summary.md").read_text()

@@ -168,8 +168,9 @@ def verdicts_agree(page: Page, verdicts: list[dict[str, Any]]) -> None:
 
 
 def agree(ours: dict[str, dict[str, float]], loops: dict[str, Any], filtered: bool = False) -> None:
-    """Compare every figure; bandwidth and step are behind the mean of a profile, through a filter."""
-    for loop, own in loops.items():
+    """Compare every figure judged; bandwidth and step are behind the mean of a profile, through a filter."""
+    for loop, bare in loops.items():
+        own = bare.get("judged", bare)
         for name, key in FIGURES.items():
             result = own.get("to_reference", own) if name in RESPONSE and not filtered else own
             if result[key] is None:  # there is none: the page must not show one

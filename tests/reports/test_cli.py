@@ -124,7 +124,7 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("report ilr33-amber --averages 8 --out x", "--averages: allowed with --response"),
         ("simulate --amplitude '5 mm'", "--amplitude '5 mm': wrong dimension"),
         ("nightly no-such-study.toml --site s", "no-such-study.toml"),
-        ("nightly a b c --site s", "nightly STUDY --site DIR"),
+        ("nightly a b c --site s", "base = its file"),
         ("nightly approve ilr33-amber --site s", "--by and --reason"),
         ("nightly ilr33-amber", "--site"),
         ("nightly ilr33-amber --site s --time-limit 0", "--time-limit"),
@@ -138,6 +138,15 @@ def test_margins_on_the_terminal_name_every_loop(form: str, cli) -> None:
         ("export fmu emps --fmi 4 --out out", "4: allowed: 2 or 3"),
         ("export fmu emps --platform vax --out out", "allowed: linux64, win64"),
         ("export controller emps --prefix 4fin --out out", "allowed: letters"),
+        (
+            "export controller emps --prefix int --out out",
+            "--prefix 'int': no _ last; allowed: letters",
+        ),
+        (
+            "export linear emps --to mat --out x.json",
+            "--out 'x.json': --to is mat; allowed: a name that",
+        ),
+        ("export linear emps --out x.mat", "ends in .json"),
         ("export c no-such-design --out out", "no such design; allowed: "),
         (
             "export c fin --single --out out",

@@ -11,11 +11,13 @@ from actuator_lti import assemble_loops, stability_margins
 from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import load_design, parameter_value, shipped_designs, with_values
 from actuator_lti.design.access import paths_of
+from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Friction, FrictionPoint, Requirement
 from analyses.large_signal.classify import CAUSES, causes
 from nonlinear import Rows
 from nonlinear.export.trace import Tape, reached
 from reports.live.model import live_model
+from tests.reports import test_held_loops
 from tests.validation.random_drives import full_drive
 
 ASKED = (
@@ -30,12 +32,17 @@ WHOLE_DRIVE = tuple(
                 maximum=9.0 if low is None else None)
     for k, (name, unit, low, load) in enumerate(ASKED)
 )  # fmt: skip
+EVERY = Requirement(id="pm", quantity="phase_margin", unit="deg", loop="every", minimum=10.0)
 CURVE = ((0.0, 3e-3), (40.0, 2e-3), (900.0, 4e-3))
 POINTS = tuple(FrictionPoint(speed_rad_s=speed, torque_Nm=torque) for speed, torque in CURVE)
 DESIGNS = {name: load_design(name) for name in shipped_designs()} | {
     "with a friction map": replace(AMBER, name="mapped", friction=Friction(points=POINTS)),
     "with requirements on the whole drive": replace(load_design("fin"), requirements=WHOLE_DRIVE),
     "with a filter of the command": with_values(AMBER, {"command.filter_time": 2e-3}),
+    # the report judges its current and velocity loops held, the current loop, and none
+    "with a load that pushes": replace(test_held_loops.p_velocity(1.0), requirements=(EVERY,)),
+    "with falling friction": replace(test_held_loops.falling_friction(), requirements=(EVERY,)),
+    "fed too much": replace(test_held_loops.overfed(), parameters=FrozenMap({})),
 }
 CHANGES = {  # in the units of the page
     "ilr33-amber": {"control.position.gain": 140.0, "control.computing_delay": 137.5,
@@ -50,6 +57,9 @@ CHANGES = {  # in the units of the page
     "joint": {"coupling.stiffness": 40000.0, "load.inertia": 2.0, "limits.peak_current": 11.0},
     "with a friction map": {"control.velocity.gain": 0.156},
     "with a filter of the command": {"control.position.gain": 140.0, "command.filter_time": 3e-3},
+    "with a load that pushes": {"control.current.gain": 40.0, "load.moment_slope": 2.0},
+    "with falling friction": {"control.current.gain": 40.0},
+    "fed too much": {"control.current.gain": 40.0, "load.moment_slope": 2.0},
     "with requirements on the whole drive": {
         "motor.resistance": 1.7, "load.inertia": 1.2e-3, "coupling.play": 3.0, "limits.voltage": 22.4,
         "friction.load_coefficient": 5.1},

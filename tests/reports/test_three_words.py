@@ -156,9 +156,6 @@ def test_the_report_of_a_drive_under_a_slope(slope: str, status: int, word: str,
     assert "could not be computed" not in json.dumps(document)
     if slope == "1":
         assert "unstable by itself, outer loops open and rotor free" in json.dumps(document)
-        live = document["live"]  # the page has the loop by itself: what is asked of it is named apart
-        assert {item["loop"] for item in live["requirements"] if item["loop"]} == {"velocity", "position"}
-        assert "phase margin, current loop held" in [item["words"] for item in live["apart"]]
 
 
 def test_a_missing_part_is_in_headline_and_json(tmp_path, monkeypatch, cli) -> None:

@@ -43,7 +43,10 @@ def each(population: Population, figures):
 
 
 LOUD = with_values(load_design("ilr33-amber"), {"control.position.gain": 4800.0})  # its S has no peak
-SURE = (*(scattered(name, 12, seed=5) for name in NAMES), Population(LOUD, {}, 1))
+SLOW = {"control.velocity.every": 20, "control.velocity.gain": "3 mA/(rad/s)", "control.position.every": 20,
+    "control.current.back_emf_feedforward": 1}  # fmt: skip
+LONG = with_overrides(load_design("ilr33-amber-multirate"), SLOW)  # 20 ticks of 5 states
+SURE = (*(scattered(name, 12, seed=5) for name in NAMES), Population(LOUD, {}, 1), Population(LONG, {}, 1))
 # of the random ones rounding decides some; 90010 dips beside a mode that hardly shows, 90107 beside Nyquist
 SEEDS = (90_010, 90_107, *range(90_209, 90_217))
 RANDOM = tuple(Population(one, {}, 1) for seed in SEEDS for one in drives(seed, 1))
@@ -106,6 +109,8 @@ def test_an_unstable_loop_is_called_so_and_what_cannot_vary_refused():
     assert np.isnan(figures.quantity("bandwidth", "current")[1])
     refused(Population, design, {"motor.color": np.ones(2)}, 2, words="motor.color")
     refused(Population, design, {"motor.resistance": np.array([np.nan])}, 1, words="finite")
+    longer = {"control.velocity.every": 50, "control.position.every": 50}
+    refused(linear_figures, Population(with_overrides(LONG, longer), {}, 1), words="control.velocity.every, ")
 
 
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-compliant", "ballscrew"])

@@ -34,7 +34,7 @@ from tests.changed import changed
 from tests.loops.loop_designs import source_drive
 from tests.refusals import refused
 
-PERIOD, DELAY = 1e-3, 3e-3
+PERIOD, DELAY, GAIN = 1e-3, 3e-3, "control.position.gain"
 
 
 def integrator(*requirements):
@@ -59,6 +59,27 @@ def test_an_integrator_with_delay_gets_its_known_gain(margin):
     assert gains[0] == pytest.approx(2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, rel=1e-3)
 
 
+@pytest.mark.parametrize(("text", "width", "most"), [
+    ("10 %", 20.0, lambda bound: bound / 1.1), ("7 1/s", 7.0, lambda bound: bound - 7.0),
+])  # fmt: skip
+@pytest.mark.parametrize("aim", ["least-change", "reserve"])
+def test_a_gain_that_is_searched_for_keeps_its_tolerance(text, width, most, aim):
+    """Its upper end gets the known gain, from 200 1/s: a share of the gain, or as far above it."""
+    design = changed(integrator(need("phase_margin", 60.0, loop="position")), controller={
+        "position": PositionLoop(gain=200.0)
+    })  # fmt: skip
+    wide = model.Tolerance(kind="uniform", half_width=width, text=text)
+    stated = model.Parameter(path=GAIN, text="200 1/s", value=200.0, unit="1/s", tolerance=wide)
+    tuned = tune(replace(design, parameters={GAIN: stated}), TuningSettings(curve=False, aim=aim))
+    omega = math.radians(30.0) / (DELAY + 0.5 * PERIOD)
+    bound, gain = 2.0 * math.sin(0.5 * omega * PERIOD) / PERIOD, tuned.design.controller.position.gain
+    if aim == "least-change":
+        assert gain == pytest.approx(most(bound), rel=1e-4)
+    upper = gain * 1.1 if "%" in text else gain + 7.0
+    assert tuned.requirements[0].corner == {GAIN: pytest.approx(upper)}
+    assert (tuned.feasible, tuned.corners, len(tuned.confirmed), upper <= bound) == (True, 3, 2, True)
+
+
 def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
     """w[k] = r (1 - (1 - a)^k) with a = K T/J: its levels lie on straight lines from tick to tick."""
     K, J, size, ticks = 1.0, 0.1, 0.5, 400
@@ -71,6 +92,13 @@ def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
     assert found["nonlinear.settling_time"][0] == pytest.approx(PERIOD * k[y >= 0.98][0])
     assert found["nonlinear.overshoot"][0] == 0.0
     assert found["nonlinear.final_error"][0] == pytest.approx(100.0 * (1.0 - y[ticks - 1]), rel=1e-6)
+
+
+def test_the_time_in_a_limit_is_that_of_the_ticks_that_ask_for_more():
+    """At the limit U the speed rises by U T/J a tick; K (r - k U T/J) > U up to k = 700/3 where r = 1."""
+    design = source_drive(0.1, 1.0, PERIOD, 0.3, controller={"velocity": VelocityLoop(gain=1.0)})
+    asked = replace(design, requirements=(need("phase_margin", 1.0),))
+    assert [one.limited for one in tune(asked, TuningSettings(curve=False)).checks] == ["", "voltage 234 ms"]
 
 
 def test_an_unstable_drive_whose_outer_poles_are_not_known_is_far_from_every_limit():

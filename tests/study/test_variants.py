@@ -7,11 +7,13 @@ from dataclasses import replace
 import pytest
 
 from actuator_lti import assemble_loops, load_design, onset
-from actuator_lti.design.model import Requirement
+from actuator_lti.design import with_overrides
+from actuator_lti.design.model import Design, Requirement
 from analyses.comparison.found import LargeSignal, figure_names
-from analyses.comparison.variants import compare
+from analyses.comparison.variants import changes, compare
+from analyses.specification.capability import drive_figures
 from analyses.specification.sensitivity import sensitivities
-from analyses.studies.study import load_study, study_of, study_or_design
+from analyses.studies.study import Study, Variant, load_study, study_of, study_or_design
 from reports.sections.compare import batches, brief, ledger, section
 from reports.sections.compare_best import section as best_section
 from reports.sections.compare_figures import tornadoes
@@ -142,6 +144,12 @@ def test_variants_differ_by_what_was_changed_and_by_nothing_else(compared):
     assert [v.id for v in compared.variants[3].verdicts if v.verdict == "not met"] == ["output-rate"]
 
 
+def test_a_changed_key_is_named_as_an_override_names_it():
+    base = load_design("ilr33-amber").add_filter("velocity", kind="lowpass", frequency="400 Hz")
+    for key, text in {"control.velocity.filter.1.frequency": "500 Hz", "gear.worm.ratio": "50"}.items():
+        assert [(c.path, c.text) for c in changes(base, with_overrides(base, {key: text}))] == [(key, text)]
+
+
 def test_requirements_are_rows_and_designs_are_columns_of_tables_that_fit_a_screen(compared):
     made = {part["id"]: part for part in section(compared)}
     table = made["verdicts"]["blocks"][0]
@@ -203,8 +211,37 @@ def test_an_amplitude_is_in_the_unit_of_the_command(changes, unit, per_si):
     loops = assemble_loops(design)
     found = LargeSignal((5.0,), 0.1, 0.1, ()).figures(design, loops)
     assert found["large.onset@5"] == pytest.approx(per_si * onset(loops, [10.0 * math.pi]).amplitude_rad[0])
-    (name,) = figure_names([found], design)
+    (name,) = figure_names([(found, design)])
     assert name.unit == unit
+
+
+def test_designs_of_another_kind_stand_beside_the_base_in_their_own_units_and_on_their_own_loops():
+    """Beside a rotary speed drive: m/s of a linear one, no difference of bandwidths of two loops."""
+
+    def drive(design: str, loop: str, **more) -> Design:
+        asked = {"id": "bw", "quantity": "bandwidth", "loop": loop, "minimum": "1 Hz"}
+        return with_overrides(load_design(design), {"requirement": [asked], **more})
+
+    speed = drive("ilr33-amber", "velocity", **{"control.position": None})
+    turning, sliding = (drive(name, "position") for name in ("ilr33-amber", "ballscrew"))
+    designs = {"speed": speed, "turns": turning, "slides": sliding}
+    base, *others = (Variant(name, name, design, {}) for name, design in designs.items())
+    made = compare(Study("s", "s", "", "s", base, tuple(others)))
+    units, (turns, slides) = {name.key: name.unit for name in made.names}, made.variants
+    rate = drive_figures(sliding).output_rate_rad_s
+    (key,) = [key for key in slides.figures if key.startswith("drive.output_rate@0")]
+    assert (slides.figures[key], units[key]) == (pytest.approx(rate), "m/s")
+    assert units["drive.output_rate@0"] == "deg/s"
+    assert not any(key.startswith(("drive.", "large.")) for key in slides.differences)
+    assert not any(key.startswith("large.") for key in turns.differences)
+    sizes = {units[key] for one in made.all for key in one.figures if key.startswith("large.onset@1")}
+    assert sizes == {"deg/s", "deg", "mm"}
+    each, best = (block["rows"] for block in best_section(made)["blocks"])
+    assert [row["gains"] for row in each] == ["the base", "nothing", "nothing"]
+    assert (best[0]["best"], best[0].get("worst", "")) == ("speed", "")
+    rows = {row["figure"]: [row[f"d{k}"] for k in range(3)] for row in brief(made).blocks[1]["rows"]}
+    assert rows["Position loop: bandwidth"][0] is None
+    assert None not in rows["Position loop: bandwidth"][1:]
 
 
 def test_the_page_escapes_names_and_has_every_figure(cli, tmp_path):

@@ -220,6 +220,13 @@ def test_the_headline_names_what_reaches_the_stop_first() -> None:
     assert summary(replace(found, cases=late)).startswith("Lost sensor moves the output most")
     told = summary(replace(found, cases=late[:1]))
     assert told.endswith("detected: 4 deg in 100 ms; it reaches the stop after 200 ms.")
+    (before, *_) = found.before
+    rest = replace(before.rest, verdict="limit cycle", motor_amplitude=1e-3, frequency_hz=2.0, periods=3)
+    found = replace(found, before=(replace(before, rest=rest),), asked=replace(found.asked, load_Nm=-7.0))
+    assert summary(replace(found, cases=late[:1])).endswith(
+        "before it the drive does not come to rest under -7 N m: limit cycle of ±0.0573 deg (motor over the "
+        "ratio, the output at rest) at 2 Hz (3 periods seen)."
+    )
 
 
 def test_of_several_sines_each_peak_is_the_largest() -> None:

@@ -22,7 +22,7 @@ from analyses.limit_cycles.describing import (
     without_nonlinearities,
 )
 from analyses.limit_cycles.run import Confirmation, confirm
-from nonlinear import commands, simulate
+from nonlinear import Rows, commands, simulate
 from reports.certain import certain
 from reports.sections.beyond import counts as counts_section
 from reports.sections.cycles import section
@@ -220,6 +220,17 @@ def test_a_cycle_of_an_hour_is_told_and_not_tried(cli) -> None:
     said = cli.text("cycles", "joint", "--set", 'coupling.play="0.5 mrad"', status=1)
     assert "not tried" in said
     assert "Not tried: 24 periods take more ticks" in " ".join(said.split())
+
+
+def test_a_cycle_that_is_nowhere_at_once_is_not_watched_for_24_periods(monkeypatch) -> None:
+    """Nothing moves in a drive that is not set in motion: two periods of 20 s show it, at 41 sizes."""
+    watched, run = [], Rows.run
+    monkeypatch.setattr(Rows, "run", lambda rows: watched.append(rows["ticks"].sum()) or run(rows))
+    assert (
+        confirm(FIN, Cycle("play", True, 1e-6, 1e-3, 0.05, False, {"th": 0j, "twist": 0j})).verdict
+        == "refuted"
+    )
+    assert watched == [41 * 2 * 20.0 / FIN.controller.period_s]
 
 
 def test_the_frequency_of_a_cycle_is_that_of_where_the_motion_ends() -> None:

@@ -5,13 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.batch import Population
 from actuator_lti.batch import drive_figures as many
 from actuator_lti.design import load_design, with_overrides, write_design
-from actuator_lti.design.model import Load
+from actuator_lti.design.model import Gravity, Load
 from actuator_lti.drive.facts import resonance_rad_s
 from actuator_lti.loops import assemble_loops
 from actuator_lti.loops.stiffness import compliance, lost_motion_rad, stiffness_at
@@ -107,9 +108,11 @@ def test_at_rest_play_softens_small_moments(moment: float) -> None:
     assert abs(result.seen_Nm_rad) == pytest.approx(by_hand, rel=0.01)
 
 
-def test_at_rest_dry_friction_holds_a_small_moment() -> None:
-    """Less than the load's dry friction, 0.05 N m, does not move it in the gap."""
-    (result,) = stiffness_at_rest(COMPLIANT, [(2.0, 0.04)])
+@pytest.mark.parametrize("mass", [0.0, 1.0])
+def test_at_rest_dry_friction_holds_a_small_moment(mass: float) -> None:
+    """Less than the load's dry friction, 0.05 N m, moves it neither in the gap nor bent by a weight."""
+    weight = Gravity(mass_kg=mass, arm_m=0.3, offset_rad=np.pi / 2) if mass else None
+    (result,) = stiffness_at_rest(changed(COMPLIANT, load={"gravity": weight}), [(2.0, 0.04)])
     assert result.seen_Nm_rad == complex(np.inf)
 
 
@@ -162,18 +165,21 @@ def test_unpowered_cogging_and_the_moment_push_away_or_hold(phase: float, slope:
 
 
 @pytest.mark.parametrize("spring", [30.0, 2000.0])
-def test_the_least_stiffness_of_an_undamped_mass_is_no_number_of_a_grid(spring: float) -> None:
-    """A held moment on J and a spring that is held too: K = S - 4 J/T^2 sin^2(a)/cos(a) e^(ja), a = w T/2."""
+def test_the_least_stiffness_of_a_weakly_damped_mass_is_no_number_of_a_grid(spring: float) -> None:
+    """A held moment on J, B and a spring that acts at every instant: nothing samples where no loop runs."""
     load = Load(inertia_kgm2=1e-3, path="back-drivable", moment_slope_Nm_rad=-spring)
-    design = changed(drive_e(), load=load, coupling=None, friction={"viscous_Nms_rad": 0.0})
+    design = changed(drive_e(), load=load, coupling=None, friction={"viscous_Nms_rad": 2e-6})
     J, T = 1e-3 + 10.0**2 * design.motor.rotor_inertia_kgm2, design.controller.period_s
+    B = 10.0**2 * 2e-6
+    Phi = expm(np.array([[0.0, T, 0.0], [-spring / J * T, -B / J * T, T / J], [0.0, 0.0, 0.0]]))
 
     def size(w: float) -> float:
-        a = 0.5 * w * T
-        return abs(spring - 4.0 * J / T**2 * np.sin(a) ** 2 / np.cos(a) * np.exp(1j * a))
+        z = np.exp(1j * w * T)
+        return float(1.0 / abs(np.linalg.solve(z * np.eye(2) - Phi[:2, :2], Phi[:2, 2])[0]))
 
     w = np.sqrt(spring / J)
     truth = minimize_scalar(size, bounds=(0.95 * w, 1.05 * w), method="bounded", options={"xatol": 1e-9 * w})
+    assert truth.fun == pytest.approx(B * w, rel=(w * T) ** 2)  # of an instant: sqrt(1 - zeta^2) of this
     least, hertz = stiffness_curves(design)[2].least
     assert least == pytest.approx(truth.fun, rel=1e-6)
     assert hertz == pytest.approx(truth.x / (2.0 * np.pi), rel=1e-6)

@@ -123,15 +123,17 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
 
 
 @pytest.mark.parametrize(
-    ("swing_rad", "said"),
+    ("swing_rad", "motor_rad", "said"),
     [
-        (0.0, "stands still 40 s later; whether it stays is not known"),
-        (1e-5, "still moving 40 s later, by ±0.000573 deg"),
+        (0.0, 0.0, "stands still 40 s later; whether it stays is not known"),
+        (1e-5, 1e-5, "still moving 40 s later, by ±0.000573 deg"),
+        (0.0, 1e-5, "still moving 40 s later, by ±0.000573 deg (motor over the ratio, the output at rest)"),
     ],
 )
-def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, said: str) -> None:
+def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, motor_rad: float, said: str) -> None:
     """1e-5 rad are 5.73e-4 deg; nothing is no motion."""
     rest = replace(hunting(0.1, swing_rad, 3.0).rest, verdict="still moving", frequency_hz=None, after_s=40.0)
+    rest = replace(rest, motor_amplitude=motor_rad)
     assert end_words(rest, degrees(1.0), "deg") == said
 
 
@@ -191,6 +193,17 @@ def test_a_period_longer_than_the_run_is_seen_beyond_it(cli) -> None:
         r"followed for (\S+) s beyond the run; ±.* at (\S+) Hz \((\d+) periods seen\)", said
     ).groups()
     assert float(beyond) > int(periods) / float(hertz) > 100.0
+
+
+def test_what_diverges_only_after_the_run_says_so() -> None:
+    """Twice what the back-drivable joint holds carries it off; in the first tick nothing has moved yet."""
+    joint = load_design("joint")
+    most = 2.0 * joint.limits.peak_current_A * joint.motor.torque_constant_Nm_A * joint.total_ratio
+    run = simulate(joint, commands.step(0.01), 1e-3, load_Nm=-most)
+    assert np.abs(run.output_angle_rad).max() < 0.1
+    ended = conduct(run)
+    assert ended.status == "diverging"
+    assert re.fullmatch(r"followed for \S+ s beyond the run", ended.later)
 
 
 SPEED_DRIVE = """[design]

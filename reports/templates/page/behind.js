@@ -2,7 +2,7 @@
 import { border } from "./border.js";
 import { BEHIND, PLACE, STABLE, chart, colourOf, data, desk, find, outer, root, tell } from "./desk.js";
 import { moves } from "./history.js";
-import { figures, stageOf, view, x } from "./module.js";
+import { figures, judged, view, x } from "./module.js";
 import { state } from "./requirements.js";
 import { cell, linearAt, startUp, toneOf } from "./sines.js";
 import { table } from "./table.js";
@@ -65,13 +65,13 @@ const drawMap = (cells) => {
   root.dataset.cells = JSON.stringify(cells.map(({ cause, ticks, tone, amplitude }) => [cause, ticks, tone.hertz, tone.count, amplitude]));
 };
 // figures of the loops, or of the break points, that were left
-const left = (found, of, waits, stage, timed) => Object.keys(found[of]).filter((name) => waits(found[of][name])).map((name) => () => {
+const left = (found, of, waits, answer) => Object.keys(found[of]).filter((name) => waits(found[of][name])).map((name) => () => {
   view(x.p_at(), found.row.length).set(found.row);
-  found[of][name] = figures(stage(name), timed);
-  if (timed) state();
+  found[of][name] = answer(name);
+  if (of === "loops") state();
 });
-const timed = (found) => left(found, "loops", ({ waits }) => waits, stageOf, 1);
-const periodic = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => data.points[name], 0);
+const timed = (found) => left(found, "loops", ({ waits }) => waits, (name) => judged(found, name, 1));
+const periodic = (found) => left(found, "points", ({ n }) => n === BEHIND, (name) => figures(data.points[name], 0));
 // the map is computed only where somebody may see it
 export const watchMap = () => {
   new IntersectionObserver((entries) => { // a busy page is told of several at once: the last is how it is

@@ -1,5 +1,5 @@
 // The module: loops, their figures and responses, limits and runs, all computed in WebAssembly.
-import { BEHIND, DOUBT, STABLE, data, desk } from "./desk.js";
+import { BEHIND, DOUBT, STABLE, data, desk, outer } from "./desk.js";
 import { driveOf, rowOf } from "./row.js";
 
 const TOO_SLOW = 6; // ms
@@ -14,11 +14,10 @@ export const slow = new Set(); // loops whose step takes too long for a moving s
 export const compute = (values, whole) => {
   const row = rowOf(values);
   if (!row) return null;
-  view(x.p_at(), row.length).set(row);
   const found = { row, drive: driveOf(values), loops: {}, points: {} };
-  for (const name of data.loops) {
+  for (const name of [...data.loops].reverse()) {
     const began = performance.now(), timed = whole || !slow.has(name);
-    found.loops[name] = figures(stageOf(name), timed ? 1 : 0);
+    found.loops[name] = judged(found, name, timed ? 1 : 0);
     found.loops[name].waits = !timed;
     if (performance.now() - began > TOO_SLOW) slow.add(name);
   }
@@ -32,6 +31,20 @@ export const figures = (stage, timed) => {
   if (x.doubtful(stage)) return { n: DOUBT };
   const found = Array.from(view(x.figures_at(stage), STABLE + 1));
   return { n, figures: found, period: x.period_of(stage), phases: x.phases_of(stage) };
+};
+
+const sound = (loop) => loop.figures?.[STABLE] === 1;
+// a loop as the report judges it (analyses.linear.loop_figures): one that, inside a stable drive, only torques over the
+// angle or falling friction make unstable is held: without their slopes; the current loop with a rotor that has no torque
+export const judged = ({ row, loops }, name, timed) => {
+  const p = view(x.p_at(), row.length), at = data.places, own = (p.set(row), figures(stageOf(name), timed));
+  if (name === outer || !own.figures || sound(own) || !sound(loops[outer])) return own;
+  for (const [slope, ...waves] of data.slopes) p[slope] = -waves.reduce((sum, [peak, order, phase]) => sum + p[peak] * p[order] * Math.cos(p[phase]), 0);
+  if (name === "current") p[at.friction_map] = Math.min(p[at.friction_map], 1);
+  let held = figures(stageOf(name), timed);
+  if (sound(held) && name === "current") { p[at.torque] = 0; held = figures(stageOf(name), timed); }
+  p.set(row);
+  return sound(held) ? { ...held, held: true } : figures(stageOf(name), timed);
 };
 
 export const respond = (name, hertz) => {

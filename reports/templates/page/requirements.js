@@ -30,14 +30,13 @@ export const state = () => {
   if (unknown.length) words.push(`Stability not known: ${unknown.join(", ")}.`);
   if (unstable.length) words.push(`Unstable: ${unstable.join(", ")}.`);
   const met = all.filter((one) => one.met).length, count = (many, word) => (many ? `, ${many} ${word}` : "");
-  const designed = changes().length ? ` (as designed: ${old.length} not met)` : "";
+  const designed = changes().length && old.length !== fails.length ? ` (as designed: ${old.length} not met)` : "";
   const named = [...fails, ...open].slice(0, NAMED).map(({ item }) => (item.loop ? `${item.words} of the ${placed(item).toLowerCase()}` : `${item.words} ${placed(item)}`.trim())), more = fails.length + open.length - named.length;
   if (total) words.push(`${met} of ${total} requirements met${count(fails.length, "not met")}${count(open.length, "not proven")}${designed}${named.length ? `: ${named.join(", ")}${more ? ` and ${more} more` : ""}` : ""}.`);
   else if (!data.apart.length) words.push("The design states no requirements.");
-  if (data.apart.length) words.push(`${data.apart.length} found by a simulation of its own ${data.apart.length === 1 ? "does" : "do"} not follow: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
-  if (refused) words.push(refused);
+  if (data.apart.length) words.push(`${data.apart.length} ${data.apart.length === 1 ? "does" : "do"} not follow the sliders: ${[...new Set(data.apart.map((item) => item.words))].join(", ")}.`);
   line.className = `state ${refused || unstable.length || fails.length ? "fail" : unknown.length || open.length ? "warn" : total ? "pass" : "info"}`;
-  line.textContent = words.join(" ");
+  line.textContent = refused || words.join(" "); // what is refused has no verdict
   line.dataset.failing = fails.length;
   demands(all, was);
 };

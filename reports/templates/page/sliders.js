@@ -39,7 +39,7 @@ const makeSlider = (key, k) => {
   });
   range.addEventListener("dblclick", () => set(k, key.value));
   field.addEventListener("change", () => {
-    const value = typed(field.value), good = allowed(key, value * key.factor);
+    const value = typed(field.value, key.unit), good = allowed(key, value * key.factor);
     slider.wrong = good ? "" : refused(field.value, `allowed: ${key.whole ? "a whole number, " : ""}${key.allowed}`);
     slider.at = past.values[k];
     if (good) set(k, value === inUnit(key, key.value) ? key.value : value * key.factor);

@@ -13,6 +13,7 @@ const rowOf = (name, bad) => {
   }
   const stable = own.figures[STABLE] === 1;
   if (own.phases > 1) th.append(" ", html("span", "unit", "fundamental"));
+  if (own.held) th.append(" ", html("span", "unit", data.held[name]));
   if (!stable) th.append(" ", html("span", "mark fail", "unstable"));
   Object.assign(th.dataset, { loop: name, stable: own.figures[STABLE] });
   row.append(...data.figures.map(({ name: figure, unit, factor, timed, response }) => {

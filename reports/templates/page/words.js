@@ -21,8 +21,11 @@ export const choice = (words, options, value, change) => {
   list.addEventListener("change", () => change(list.value));
   return labelled(words, list);
 };
-// what is typed as a number; NaN where it is none
-export const typed = (text) => (text.trim() === "" ? NaN : Number(text.replace("−", "-")));
+// what is typed as a number, its unit behind it or not; NaN where it is none
+export const typed = (text, unit = "") => {
+  const words = text.trim().replace("−", "-"), number = unit && words.endsWith(unit) ? words.slice(0, -unit.length).trim() : words;
+  return /^[-+.\d][-+.\de]*$/i.test(number) ? Number(number) : NaN;
+};
 export const refused = (text, allowed) => `"${text}": ${text.includes(",") ? "a decimal comma; use a decimal point" : allowed}`;
 export const heading = (words, side = "left", scope = "col") => html("th", { className: side, scope }, words);
 // fills a table anew: its headings, its rows

@@ -1,0 +1,80 @@
+"""The clock of a load that comes on by itself: in steady motion the current follows it, not the speed."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import correlate
+from scipy.stats import chi2
+
+from actuator_lti.errors import InputError
+from actuator_lti.types import Floats
+from analyses.estimation.means import correlation_time
+from analyses.records.clocks import ClockJoin
+from analyses.records.record import Record
+from analyses.records.steady_window import CRITERION, find_steady_window
+
+NO_CHANCE = 1e-3  # level at which the join is rejected
+SURE = 4.0
+GRID = 40_000  # points over the longer record, at most
+ROUNDING = 1e-9
+
+
+def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> ClockJoin:
+    """The join, by current and load where these contradict it; else as it is.
+
+    Speed and load tell the clock only where the load comes with the motion. While the speed is steady the
+    current is a constant and a share of the load: of all offsets at which the sensor covers half of that
+    time, the one that leaves the least is taken where the likelihood ratio (chi-square, as many tries as
+    offsets, the residual's correlation in time counted) rejects all within four standard deviations of the
+    join's own, whose rate does not hold then either. The standard deviation is the half width where that
+    ratio is 1.
+    """
+    try:
+        window = find_steady_window(drive.time_s, drive["speed"], replace(CRITERION, trim_s=0.0))
+    except InputError:
+        return join
+    own, sensor_s = drive.slice(window.start, window.stop), join.rate * sensor.time_s
+    period = max(drive.period_s, float(max(np.ptp(drive.time_s), np.ptp(sensor_s))) / GRID)
+    half = 0.5 * np.ptp(own.time_s)
+    time = np.arange(own.time_s[0], own.time_s[-1], period)
+    grid = np.arange(sensor_s[0] - half, sensor_s[-1] + half, period)
+    current = np.interp(time, own.time_s, own["current"])
+    load = np.interp(grid, sensor_s, sensor[signal])  # outside its record as at its ends
+    if not np.ptp(current) * np.ptp(load):
+        return join
+    ratio, quality = _against_the_best(current, load)
+    offsets = time[0] - grid[: len(ratio)]
+    apart = np.abs(offsets - join.offset_s)
+    claimed = apart <= max(SURE * join.offset_std_s, float(np.min(apart)))
+    if not len(ratio) * chi2.sf(np.min(ratio[claimed]), 1) < NO_CHANCE:
+        return join
+    if join.rate != 1.0:
+        offset = join.offset_s + (join.rate - 1.0) * float(np.mean(sensor.time_s))
+        return by_current(drive, sensor, replace(join, offset_s=offset, rate=1.0, rate_std=None), signal)
+    width = 0.5 * period * np.count_nonzero(ratio <= 1.0)
+    return replace(
+        join,
+        offset_s=float(offsets[np.argmin(ratio)]),
+        offset_std_s=float(width),
+        quality=quality,
+        method="correlation",
+        first_signal="current",
+    )
+
+
+def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
+    """Minus twice the log likelihood of the current at each place of the load, less the least; correlation.
+
+    Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
+    """
+    n, current, load = len(current), current - current.mean(), load - load.mean()
+    sums, squares = (np.concatenate([[0.0], np.cumsum(part)]) for part in (load, load**2))
+    power = squares[n:] - squares[:-n] - (sums[n:] - sums[:-n]) ** 2 / n
+    shared = correlate(load, current, mode="valid", method="fft") ** 2
+    told = np.divide(shared, power, out=np.zeros_like(power), where=power > ROUNDING * power.max())
+    total = float(current @ current)
+    left = np.maximum(total - told, ROUNDING * total)
+    best = int(np.argmin(left))
+    part = load[best : best + n] - load[best : best + n].mean()
+    rest = current - part * (part @ current) / (part @ part)
+    return n / correlation_time(rest) * np.log(left / left[best]), float(np.sqrt(1.0 - left[best] / total))
