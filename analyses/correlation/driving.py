@@ -16,7 +16,7 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Ints
 from analyses.estimation.least_squares import scaled_lstsq
 from analyses.records.naming import LOADS
-from analyses.records.record import Record
+from analyses.records.record import HELD, SMOOTH, STRAIGHT, Record
 from nonlinear import State, commands, loads
 from nonlinear.loads import LoadMoment
 
@@ -35,9 +35,6 @@ COMMANDS: Mapping[tuple[str, str], tuple[str, ...]] = {
 IN_MOTION = 0.02
 FIRST_ROWS = 5
 LEAST_FOR_A_SPLINE = 9
-SMOOTH, STRAIGHT, HELD = (
-    f"{how} between samples" for how in ("smooth but for its steps", "in straight lines", "held")
-)
 MOST_TOGETHER = 3  # jumps: five rows have four, and the slope that Akima's curve takes at the middle one
 
 

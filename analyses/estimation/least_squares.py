@@ -135,12 +135,16 @@ def events_of(w: Floats, noise: Floats) -> Information:
     return Information(gram=w.T @ w, noise=sums.T @ sums, rows=len(w), order=0)
 
 
-def wider_covariance(records: Sequence[tuple[Floats, Floats]]) -> Floats:
+def wider_covariance(
+    records: Sequence[tuple[Floats, Floats]], events: Sequence[tuple[Floats, Floats]] = ()
+) -> Floats:
     """Covariance from the rows and noise of each record, of a steady noise or of events.
 
     Each value has the larger error of the two: few blocks hold what tells it, and at times little of a noise.
+    ``events``: the same rows with those of signals that one event meets side by side.
     """
-    steady, single = (covariance_of([of(*each) for each in records]) for of in (information_of, events_of))
+    steady = covariance_of([information_of(*each) for each in records])
+    single = covariance_of([events_of(*each) for each in events or records])
     grown = np.sqrt(np.maximum(np.diag(steady) / np.maximum(np.diag(single), 1e-300), 1.0))
     return np.asarray(single * np.outer(grown, grown))
 

@@ -23,7 +23,7 @@ from analyses.identification.design_values import (
     with_given_constant,
 )
 from analyses.identification.diagnosis import Diagnosed, without_flat_tops
-from analyses.identification.electrical import ElectricalFit, electrical_values
+from analyses.identification.electrical import ElectricalFit, electrical_slopes, electrical_values
 from analyses.identification.inverse import held_out_residual
 from analyses.identification.joint_model import JointModel, LawChoice
 from analyses.identification.motor_and_motion import by_voltage, held_values, motor_and_motion, names_of
@@ -32,7 +32,7 @@ from analyses.identification.residuals import ResidualTest, residual_tests
 from analyses.identification.rows import is_loaded, recipe_for, stands
 from analyses.records.consistency import Finding, because, check_record
 from analyses.records.inputs import InputUse, account
-from analyses.records.record import Record, prepared
+from analyses.records.record import HELD, Record, prepared
 
 HELD_OUT_FACTOR = 1.5
 HELD_OUT_EXTRA = 0.02
@@ -94,6 +94,11 @@ def identify_bench(
             raise InputError(f"{still}; of a motor held fast --electrical tells R and L", names_of(used))
     with because(findings):
         found = motor_and_motion(design, plain, used, settings, recipe)
+    if HELD in {record.between for record in found.right.records}:
+        judged = _judged(plain, found.start) if settings.electrical else plain
+        findings = {
+            record.name: check_record(judged, replace(record, between=HELD)) for record in (*used, *unseen)
+        }
     start, electrical, right = found.start, found.electrical, found.right
     held = held_values(design, start, settings)
     compared = design_values(design, right.model, right.records, start)
@@ -145,7 +150,17 @@ def _with_constant(
     """The model with the error of the constant that makes torques, and the fit of both where it was found."""
     if electrical is None:
         return with_given_constant(start, right.model, right.records, compared), None
+    if electrical.with_motion is not None:
+        return right.model, _both(start, right.model, electrical)
     return with_found_constant(start, right.model, right.records, electrical_values(start, electrical))
+
+
+def _both(start: Design, model: JointModel, motor: ElectricalFit) -> Fit:
+    """Motion and motor that were found together, the motor by the keys of a design."""
+    values, beside = np.concatenate([model.values, motor.values]), np.asarray(motor.with_motion)
+    covariance = np.block([[model.covariance, beside], [beside.T, motor.covariance]])
+    both = Fit(names=(*model.names, *motor.names), values=values, covariance=covariance)
+    return both.mapped({name: {name: 1.0} for name in model.names} | electrical_slopes(start, motor))
 
 
 def _made(

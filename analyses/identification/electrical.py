@@ -18,6 +18,7 @@ from analyses.records.differentiation import central_difference
 from analyses.records.record import Record, period_of
 
 NAMES = ("resistance", "back_emf", "inductance", "voltage_offset")
+NOT_SHOWN = "the records do not show it ({:.2g} H with a standard error of {:.2g} H)"
 SHOWN = 5.0  # a value counts as shown where it exceeds its standard error so many times
 LARGEST_BIAS = 0.5
 
@@ -30,6 +31,8 @@ class ElectricalFit(Fit):
     columns: tuple[str, ...]  # of the fit; an inductance that is not shown is not among the names
     at_once: Floats  # what a voltage that acts at once would change of the values
     bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
+    # covariance with the values of the motion, where both were found together: shape (those, these)
+    with_motion: Floats | None = field(default=None, repr=False)
 
 
 def fit_electrical(
@@ -53,10 +56,9 @@ def fit_electrical(
     of_lag = whole["resistance"] * late_s
     if value > SHOWN * np.hypot(std, of_lag):
         return whole
-    told = f"the records do not show it ({value:.2g} H with a standard error of {std:.2g} H)"
+    told = NOT_SHOWN.format(value, std)
     if value > SHOWN * std:
         told = f"a current {1e3 * late_s:.2g} ms late makes {of_lag:.2g} H of the {value:.2g} H found"
-    kept = Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
     rest = [name for name in whole.names if name != "inductance"]
     fit, others = whole.renamed({name: name for name in rest}), [whole.names.index(name) for name in rest]
     return replace(
@@ -65,8 +67,13 @@ def fit_electrical(
         values=fit.values,
         covariance=fit.covariance,
         at_once=whole.at_once[others],
-        fixed={**whole.fixed, "inductance": kept},
+        fixed={**whole.fixed, "inductance": kept_inductance(design, told)},
     )
+
+
+def kept_inductance(design: Design, told: str) -> Fixed:
+    """The design's own, where records do not tell it, for a reason."""
+    return Fixed(value=design.motor.inductance_H or 0.0, reason=f"{told}: the design's value kept")
 
 
 def _fitted(late: Sequence[Floats], early: Sequence[Floats], only: tuple[str, ...]) -> ElectricalFit:
@@ -183,10 +190,15 @@ def _rows(design: Design, record: Record, recipe: Recipe | None, late_s: float) 
 
 def electrical_values(design: Design, fit: ElectricalFit) -> Fit:
     """R, kE, L where it is shown, and kM with kE: one constant of one motor, correlated at 1."""
+    return fit.mapped(electrical_slopes(design, fit))
+
+
+def electrical_slopes(design: Design, fit: ElectricalFit) -> dict[str, dict[str, float]]:
+    """The keys of a design that a fit tells, by their slopes over its values."""
     motor = design.motor
     if motor.constants != "dc" or motor.torque_constant_Nm_A is None:
         raise InputError('the voltage equation is identified for motors with "dc" constants', design.name)
     before = motor.back_emf_constant_Vs_rad or motor.torque_constant_Nm_A
     slopes = {parameter(name).key: {name: 1.0} for name in fit.names if parameter(name).key}
     slopes["motor.torque_constant"] = {"back_emf": motor.torque_constant_Nm_A / before}
-    return fit.mapped(slopes)
+    return slopes

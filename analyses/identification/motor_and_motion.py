@@ -1,6 +1,7 @@
 """The motor by its voltage, the motion by its current, in turn; and how the drive took its command."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -8,9 +9,10 @@ import numpy as np
 from scipy.stats import wilcoxon
 
 from actuator_lti.design.model import Design
+from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS
-from analyses.correlation.driving import SMOOTH, command_of, readings
+from analyses.correlation.driving import command_of, readings
 from analyses.correlation.following import moved_by_clock
 from analyses.estimation.fit import Fit
 from analyses.identification import to_design
@@ -23,11 +25,13 @@ from analyses.identification.electrical import (
     without_own_bias,
 )
 from analyses.identification.friction_map import fit_map
+from analyses.identification.held_command import found_together, motion_of, motor_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
 from analyses.identification.own_bias import without_bias
-from analyses.records.record import Record
+from analyses.records.record import HELD, SMOOTH, Record
 
+Both = tuple[Sequence[Record], Sequence[Record]]  # records as taken, and simulated
 ROUNDS = 4
 SETTLED = 0.1  # standard errors by which the motor may still move
 
@@ -48,33 +52,46 @@ def motor_and_motion(
 
     The own bias of the fits hangs on it, and where it is taken off the wrong way, that way meets the records
     better than the right one does: so each is followed to its end, and what then meets the records best is
-    taken. In the covariances every other counts by the probability that it is nearer.
+    taken; where that is a simulated drive whose command is held, the other ways are simulated as well. In the
+    covariances every other counts by the probability that it is nearer.
     """
     commands = [(command_of(plain, record), record) for record in records]
-    ways = {one.between: None for own, record in commands if own for one in readings(own, record)}
-    tried = []
-    for way in ways or [SMOOTH]:
-        tried.append(_found(design, plain, [replace(one, between=way) for one in records], settings, recipe))
+    read = {one.between: None for own, record in commands if own for one in readings(own, record)}
+    ways = [
+        [replace(one, between=way) for one in records] for way in sorted(read or [SMOOTH], key=HELD.__eq__)
+    ]
+    tried: list[Found] = []
+    for taken in ways:
+        tried += _followed(design, plain, taken, settings, recipe, tried)
         if not tried[0].right.model.simulated:  # no bias is taken off
             return tried[0]
-    misses = _misses(plain, tried)
+    if tried[-1].electrical is not None and tried[-1].electrical.with_motion is not None:
+        for taken in ways[:-1]:
+            with suppress(InputError, NumericalError):
+                tried += _together(design, plain, taken, settings, recipe, tried)
+    misses = _misses(plain, [_both_ways(one) for one in tried])
     best = int(np.argmin(np.sum(misses, axis=1)))
-    taken = tried[best]
+    best_one = tried[best]
     for other, more in zip(tried, misses - misses[best], strict=True):
         if np.any(more):  # by ranks (Wilcoxon 1945), as one event may outweigh all other blocks
-            taken = _widened(plain, taken, other, float(wilcoxon(more, alternative="greater").pvalue))
-    return taken
+            share = float(wilcoxon(more, alternative="greater").pvalue)
+            best_one = _widened(plain, best_one, other, share)
+    return best_one
 
 
-def _misses(design: Design, tried: Sequence[Found]) -> Floats:
-    """What the simulated records miss the signals by, shape (ways, blocks): the less, the likelier.
+def _both_ways(found: Found) -> Both:
+    return found.right.records, found.right.model.simulated
+
+
+def _misses(design: Design, tried: Sequence[Both]) -> Floats:
+    """What simulated records miss those taken by, shape (ways, blocks): the less, the likelier.
 
     Half the squares over the mean square of the way that meets a signal best, summed over the signals and
     over root n blocks of root n rows each. A command that is held is late, which a clock that is off feigns:
     what that would explain of a motion is no miss.
     """
     sums = []
-    pairs = [zip(one.right.records, one.right.model.simulated, strict=False) for one in tried]
+    pairs = [zip(*both, strict=False) for both in tried]
     for ways in zip(*pairs, strict=False):
         names = [name for name in AXIS_SIGNALS[design.axis] if name in ways[0][0].signals]
         off = np.array([[_missed(design, own, like, name) for name in names] for own, like in ways])
@@ -105,6 +122,59 @@ def _widened(plain: Design, taken: Found, other: Found, share: float) -> Found:
         motor = replace(motor, covariance=wider(motor, other.electrical))
         start = _with_motor(plain, motor, right.records)
     return Found(start=start, electrical=motor, right=right)
+
+
+def _followed(
+    design: Design,
+    plain: Design,
+    records: Sequence[Record],
+    settings: Settings,
+    recipe: Recipe | None,
+    others: Sequence[Found],
+) -> list[Found]:
+    """What the records tell where the drive took its command in their way; empty where others are nearer."""
+    held = {one.between for one in records} == {HELD} and settings.electrical
+    if held and settings.friction != "map" and not _gravity(plain, settings):
+        return _together(design, plain, records, settings, recipe, others)
+    return [_found(design, plain, records, settings, recipe)]
+
+
+def _together(
+    design: Design,
+    plain: Design,
+    records: Sequence[Record],
+    settings: Settings,
+    recipe: Recipe | None,
+    others: Sequence[Found],
+) -> list[Found]:
+    """Motor and motion by simulation; again where a lag of the current was taken back."""
+    held, (_, raw) = held_values(design, plain, settings), by_voltage(plain, records, recipe)
+    names = _raw(plain, settings, held, recipe, records, np.ones(len(records))).names
+
+    likes = [one.right.model.simulated for one in others]
+
+    def is_nearest(simulated: Sequence[Record]) -> bool:
+        misses = _misses(plain, [*map(_both_ways, others), (records, simulated)])
+        return int(np.argmin(np.sum(misses, axis=1))) == len(others)
+
+    first: Diagnosed | None = None
+    while True:
+        try:
+            both = found_together(plain, records, names, likes, is_nearest)
+        except (InputError, NumericalError):  # they do not tell all of it, or cannot be simulated
+            return [_found(design, plain, records, settings, recipe)]
+        if both is None:
+            return []
+        motor = motor_of(both, raw, plain)
+        start = _with_motor(plain, motor, records)
+        fit = partial(_fitted, start, settings, held, recipe, both=both)
+        right = diagnosed(design, start, records, fit, recipe)
+        if first or all(one is own for one, own in zip(right.records, records, strict=True)):
+            break
+        first, records = right, right.records
+    told = first or right
+    right = replace(right, late_s=told.late_s, findings=told.findings)
+    return [Found(start=start, electrical=motor, right=right)]
 
 
 def _found(
@@ -175,17 +245,38 @@ def held_values(design: Design, start: Design, settings: Settings) -> dict[str, 
     return held | {"inertia": start.inertia_kgm2} if "inertia" in held else held
 
 
+def _gravity(start: Design, settings: Settings) -> bool:
+    return settings.gravity or start.load.gravity is not None
+
+
+def _raw(
+    start: Design,
+    settings: Settings,
+    held: Mapping[str, float],
+    recipe: Recipe | None,
+    records: Sequence[Record],
+    weights: Floats | None = None,
+) -> JointModel:
+    """The joint model as the settings ask; with weights of the records, see `fit_records`."""
+    fit = fit_map
+    if settings.friction != "map":
+        fit = partial(
+            fit_records, form=settings.friction, weights=None if weights is None else weights.tolist()
+        )
+    return fit(start, records, recipe=recipe, fixed=held, gravity=_gravity(start, settings))
+
+
 def _fitted(
     start: Design,
     settings: Settings,
     held: Mapping[str, float],
     recipe: Recipe | None,
     records: Sequence[Record],
+    both: Fit | None = None,
 ) -> JointModel:
-    """The joint model as the settings ask, less its own bias."""
-    gravity = settings.gravity or start.load.gravity is not None
-    fit = fit_map if settings.friction == "map" else partial(fit_records, form=settings.friction)
-    model = fit(start, records, recipe=recipe, fixed=held, gravity=gravity)
+    """The joint model as the settings ask, less its own bias, or with what was found with the motor."""
+    weights = None if both is None else np.ones(len(records))
+    model = _raw(start, settings, held, recipe, records, weights)
     parts = []
     for part, record in zip(model.records, records, strict=True):
         command = command_of(start, record)
@@ -197,4 +288,7 @@ def _fitted(
         values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
         return to_design.design_with_fit(to_design.with_structure(start, model), values, "")
 
-    return without_bias(start, made, replace(model, records=tuple(parts)), records)
+    model = replace(model, records=tuple(parts))
+    if both is not None:
+        return motion_of(both, start, made, model, records)
+    return without_bias(start, made, model, records)

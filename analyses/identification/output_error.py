@@ -23,6 +23,7 @@ from analyses.records.record import Record
 
 STEP = 1e-3
 TOLERANCE = 1e-6
+LEAST_GAIN = 1e-8
 ITERATIONS = 24
 AT_END = 1e-9  # part of the start within which a value is at the end of what its key allows
 LEAST_STEPPED = 0.1  # of the start: below, a value, which may go to zero, is no measure of its step
@@ -73,11 +74,13 @@ def fit_output(
     output_of: Callable[[Design], Floats],
     measured: Floats,
     progress: Progress = None,
+    least_gain: float = LEAST_GAIN,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
     Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
-    differences of a share `STEP` of each value.
+    differences of a share `STEP` of each value. The search ends
+    where a step takes less than ``least_gain`` of the squares.
     """
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
@@ -106,7 +109,7 @@ def fit_output(
         change = np.array([residual(up) - residual(down) for up, down in pairs])
         return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
 
-    options = {"method": "dogbox", "xtol": TOLERANCE, "max_nfev": ITERATIONS}
+    options = {"method": "dogbox", "xtol": TOLERANCE, "ftol": least_gain, "max_nfev": ITERATIONS}
     found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
     values = values_at(found.x)
     return Moved(

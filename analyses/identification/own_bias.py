@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
-from analyses.correlation.driving import SMOOTH, command_of
+from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import covariance_of, information_of, scaled_lstsq, wider_covariance
 from analyses.estimation.parameters import default_value
@@ -19,7 +19,7 @@ from analyses.identification.inverse import fit_records, with_scatter
 from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.identification.output_error import simulated_part
 from analyses.identification.rows import is_benchmark, motion_of, recipe_for
-from analyses.records.record import Record
+from analyses.records.record import SMOOTH, Record
 
 LARGEST_BIAS = 0.2
 COMMAND_ROUNDS = 6
@@ -47,16 +47,7 @@ def without_bias(
     """
     less = model
     driven: tuple[Record, ...] = ()
-    fit = partial(
-        fit_records,
-        start,
-        form=model.form,
-        recipe=model.asked,
-        fixed={name: one.value for name, one in model.fixed.items()},
-        gravity="gravity_sin" in model,
-        knots_rad_s=model.knots_rad_s,
-        weights=model.weights,
-    )
+    fit = same_fit(start, model)
     for _ in range(ROUNDS):
         try:
             made = make(less)
@@ -64,7 +55,7 @@ def without_bias(
             if reason:
                 return replace(model, bias_told=reason)
             driven = driven or tuple(_driven(made, record) for record in records)
-            less = replace(less, simulated=tuple(_with_model_signals(made, record) for record in driven))
+            less = replace(less, simulated=tuple(with_model_signals(made, record) for record in driven))
             again = fit([_as_used(*each) for each in zip(less.simulated, model.records, strict=True)])
         except (InputError, NumericalError) as error:
             return replace(less, bias_told=f"not taken off: {error}")
@@ -74,6 +65,20 @@ def without_bias(
     return less
 
 
+def same_fit(start: Design, model: JointModel) -> Callable[[Sequence[Record]], JointModel]:
+    """The fit of a model, of other records."""
+    return partial(
+        fit_records,
+        start,
+        form=model.form,
+        recipe=model.asked,
+        fixed={name: one.value for name, one in model.fixed.items()},
+        gravity="gravity_sin" in model,
+        knots_rad_s=model.knots_rad_s,
+        weights=model.weights,
+    )
+
+
 def _as_used(simulated: Record, measured: RecordFit) -> Record:
     """The simulated record without an output's encoder (free of noise) that the measured one left out."""
     unused = {"output_angle"} - measured.used.keys()
@@ -81,7 +86,7 @@ def _as_used(simulated: Record, measured: RecordFit) -> Record:
 
 
 def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:
-    parts = tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
+    parts = with_noise(model, again)
     triples = list(zip(model.weights, model.records, parts, strict=True))
     weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, _, part in triples]
     rest = [weight * own.residual[part.compared] for weight, own, part in triples]
@@ -107,6 +112,11 @@ def _corrected(start: Design, made: Design, model: JointModel, again: JointModel
     return with_scatter(start, less)
 
 
+def with_noise(model: JointModel, again: JointModel) -> tuple[RecordFit, ...]:
+    """The records of a model, with what those simulated leave of their noise."""
+    return tuple(_with_noise(*pair) for pair in zip(model.records, again.records, strict=True))
+
+
 def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
     """The record's part, its noise what is left where the simulated residual is taken off: rows of both.
 
@@ -118,10 +128,10 @@ def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
         return measured
     own, model = (part.at(both, part.own_residual) for part in (measured, simulated))
     table, seen = (measured.at(both, each) for each in (measured.w, measured.inputs))
-    told, inputs = (_projected(simulated.at(both, simulated.w), each) for each in (table, seen))
+    told, free = (_projected(simulated.at(both, simulated.w), each) for each in (table, seen))
     compared = np.pad(both, (0, more))[measured.keep]
-    w = measured.w.copy()
-    w[compared] = told
+    w, inputs = measured.w.copy(), measured.inputs.copy()
+    w[compared], inputs[compared] = told, free
     noise = own - table @ scaled_lstsq(told, own) - model
     return replace(measured, w=w, inputs=inputs, noise=noise, compared=compared)
 
@@ -181,12 +191,12 @@ def _driven(design: Design, record: Record) -> Record:
     for _ in range(COMMAND_ROUNDS):  # learnt: the loop is about gain/(s + gain), what it lacks is added
         signals = {**record.signals, name: command / design.total_ratio}
         driven = replace(record, signals=signals, between=SMOOTH)
-        off = wanted - place(_with_model_signals(design, driven))
+        off = wanted - place(with_model_signals(design, driven))
         command = command + off + np.gradient(off, record.period_s) / gain
     return driven
 
 
-def _with_model_signals(design: Design, record: Record) -> Record:
+def with_model_signals(design: Design, record: Record) -> Record:
     """The record as the design would have made it: every signal that the model has is the model's."""
     names = [name for name in AXIS_SIGNALS[design.axis] if name in record.signals]
     signals, _ = model_signals(design, record, {name: record[name] for name in names})

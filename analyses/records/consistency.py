@@ -17,15 +17,16 @@ from analyses.estimation.parameters import own_share
 from analyses.records.driven_motion import ALIKE, ratio_of, turned_current, wrong_time, wrong_time_of_speed
 from analyses.records.factors import explaining, named_factor, with_factor
 from analyses.records.naming import RATES
-from analyses.records.record import DISORDER, Record
+from analyses.records.record import DISORDER, HELD, Record
 from analyses.records.single_rows import NORMAL, impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (
-    "not told: every sample is at the same tick of a loop that runs every so many, where the voltage kicks; "
-    "between them it is not known, nor whether R or the scale of the current is off"
+    "not told: every sample is at the same tick of a loop that runs every so many, or of a command held from "
+    "row to row, where the voltage kicks; between them it is not known, nor whether R or the scale of the "
+    "current is off"
 )
 OVER = 1.2
 ROWS = "rows of the file"
@@ -440,12 +441,14 @@ def _voltage_told(design: Design, record: Record) -> tuple[bool | None, str] | N
 def one_phase(design: Design, record: Record) -> bool:
     """Whether all samples are at one phase of a loop that runs every so many ticks, where the voltage kicks.
 
-    What the winding had between two samples is then not the voltage at them.
+    Or of a command that is held from row to row. What the winding had between two samples is then not the
+    voltage at them.
     """
     ticks, whole = _ticks_a_row(design, record)
     loops = design.controller.velocity, design.controller.position
     rates = [loop.every for loop in loops if loop is not None and loop.every > 1]
-    return whole and record.averaged <= 1 and any(round(ticks) % n == 0 for n in rates)
+    held = record.between == HELD or any(round(ticks) % n == 0 for n in rates)
+    return whole and ticks > 1.5 and record.averaged <= 1 and held
 
 
 def _standing_current(design: Design, record: Record) -> str:

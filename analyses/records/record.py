@@ -16,6 +16,9 @@ from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Floats, Mask
 
 DISORDER = "whose time does not increase"
+SMOOTH, STRAIGHT, HELD = (
+    f"{how} between samples" for how in ("smooth but for its steps", "in straight lines", "held")
+)
 RESAMPLE_TOLERANCE = 0.05  # of a signal's range: largest error of resampling accepted without being told to
 
 
@@ -75,7 +78,7 @@ class Record:
     as_read: Record | None = field(default=None, repr=False)  # before it was put on a grid; None: it is that
     # Keys of a design, with values that were other than the design's while this record was taken
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
-    # How the drive took its command between the rows (`driving.readings`; empty: as it meets the record best)
+    # How the drive took its command between the rows: SMOOTH, STRAIGHT, HELD; empty: as it meets them best
     between: str = ""
 
     def drive(self, design: Design) -> Design:
