@@ -177,6 +177,7 @@ def _model(design: Design, problem: _Problem, solution: Solution, weights: Float
         other = block.explained(found, [name for name in block.names if not name.startswith(FRICTION)])
         rows = vars(replace(block, names=free, w=block.columns(free)))
         left: dict[str, Any] = {"residual": rest, "own_residual": own, "noise": own}
+        left["inputs"] = np.column_stack([block.speed, block.acceleration])
         every = np.ones(len(own), dtype=bool)
         parts.append(RecordFit(**rows, **left, friction=block.y - other, compared=every))
     told = [information_of(g * one.w, g * one.own_residual) for g, one in zip(weights, parts, strict=True)]

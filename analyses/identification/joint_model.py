@@ -125,6 +125,7 @@ class RecordFit(Rows):
     friction: Floats = field(repr=False)  # the drive less all but the friction
     noise: Floats = field(repr=False)  # what the simulated record does not explain of the own residual
     compared: Mask = field(repr=False)  # at which of the rows used
+    inputs: Floats = field(repr=False)  # speed and acceleration, (rows, 2), as `w` there free of noise
 
     @property
     def relative_residual(self) -> float:

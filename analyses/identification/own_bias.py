@@ -39,10 +39,11 @@ def without_bias(
     simulated records as by the measured ones; what the fit makes of them is known there (bias correction by
     indirect inference; Gourieroux, Monfort, Renault, 1993). It is taken off, and found again with the
     design that then comes of it. What the simulated records leave of a residual has no chance in it: the
-    errors are those of the difference of the two residuals, block by block (`events_of`). A record without
-    a command is simulated with one that moves the drive as recorded; of a long one the first part is. That
-    of the EMPS benchmark, with published figures, is left as it is. ``make`` gives the design that comes of
-    a model.
+    errors are those of the difference of the two residuals, block by block (`events_of`). The simulated
+    motion tells the regressors (`_with_noise`): noise of the recorded one takes nothing from the values. A
+    record without a command is simulated with one that moves the drive as recorded; of a long one the first
+    part is, and tells the values. That of the EMPS benchmark, with published figures, is left as it is.
+    ``make`` gives the design that comes of a model.
     """
     less = model
     driven: tuple[Record, ...] = ()
@@ -85,24 +86,25 @@ def _as_used(simulated: Record, measured: RecordFit) -> Record:
 
 
 def _corrected(start: Design, made: Design, model: JointModel, again: JointModel) -> JointModel:
+    parts = with_noise(model, again)
+    triples = list(zip(model.weights, model.records, parts, strict=True))
+    weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, _, part in triples]
+    rest = [weight * own.residual[part.compared] for weight, own, part in triples]
+    more = scaled_lstsq(np.concatenate([told for told, _ in weighed]), np.concatenate(rest))
+    less = replace(model, values=model.values + more, records=parts)
     found = {n: again[n] - default_value(made, n, start) for n in model.names if n in again.names}
     bias = np.array([found.get(name, 0.0) for name in model.names])
     wild = [n for n, b, s in zip(model.names, bias, _sizes(model), strict=True) if abs(b) > LARGEST_BIAS * s]
     if wild:
         told = f"not taken off: more than {100 * LARGEST_BIAS:g} % of {', '.join(wild)}"
         told += "; the intervals hold it"
-        return replace(model, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
-    parts = with_noise(model, again)
-    pairs = zip(model.weights, parts, strict=True)
-    weighed = [(weight * part.w[part.compared], weight * part.noise) for weight, part in pairs]
-    share = sum(len(noise) for _, noise in weighed) / model.rows_used  # of a long record the first part
+        return replace(less, bias_told=told, covariance=model.covariance + np.outer(bias, bias))
     moved = _by_direction(model, again)
     singles = zip(model.alone, again.alone, weighed, strict=False)
     less = replace(
-        model,
-        values=model.values - bias,
-        covariance=share * wider_covariance(weighed) + np.outer(moved, moved),
-        records=parts,
+        less,
+        values=less.values - bias,
+        covariance=wider_covariance(weighed) + np.outer(moved, moved),
         alone=tuple(_alone(*each, partial(default_value, made, start=start), model) for each in singles),
         bias={name: float(b) for name, b in zip(model.names, bias, strict=True)},
         bias_told="found on records simulated with the result, and taken off",
@@ -116,12 +118,28 @@ def with_noise(model: JointModel, again: JointModel) -> tuple[RecordFit, ...]:
 
 
 def _with_noise(measured: RecordFit, simulated: RecordFit) -> RecordFit:
-    """The record's part, its noise what is left where the simulated residual is taken off: rows of both."""
+    """The record's part, its noise what is left where the simulated residual is taken off: rows of both.
+
+    Its regressors are there what the simulated ones tell of them (two-stage least squares; as IDIM-IV, Janot,
+    Vandanjon, Gautier, 2014): noise of the recorded motion is not in them.
+    """
     both, more = measured.shared(simulated), len(measured.keep) - len(simulated.keep)
     if more < 0 or np.count_nonzero(both) < 2 * measured.w.shape[1]:
         return measured
     own, model = (part.at(both, part.own_residual) for part in (measured, simulated))
-    return replace(measured, noise=own - model, compared=np.pad(both, (0, more))[measured.keep])
+    table, seen = (measured.at(both, each) for each in (measured.w, measured.inputs))
+    told, free = (_projected(simulated.at(both, simulated.w), each) for each in (table, seen))
+    compared = np.pad(both, (0, more))[measured.keep]
+    w, inputs = measured.w.copy(), measured.inputs.copy()
+    w[compared], inputs[compared] = told, free
+    noise = own - table @ scaled_lstsq(told, own) - model
+    return replace(measured, w=w, inputs=inputs, noise=noise, compared=compared)
+
+
+def _projected(on: Floats, values: Floats) -> Floats:
+    """What combinations of some columns make of others."""
+    on = on / np.maximum(np.linalg.norm(on, axis=0), 1e-300)
+    return np.asarray(on @ np.linalg.lstsq(on, values, rcond=None)[0])
 
 
 def _by_direction(model: JointModel, again: JointModel) -> Floats:

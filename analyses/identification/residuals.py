@@ -64,7 +64,8 @@ def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
     rows = np.lib.stride_tricks.sliding_window_view(rest, order + 1)[:, ::-1]
     a = np.append(1.0, -np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0])
     both = np.arange(-reach, reach + 1, dtype=np.int64)
-    inputs = {"": rest, "speed": part.speed[part.compared], "acceleration": part.acceleration[part.compared]}
+    speed, acceleration = part.inputs[part.compared].T
+    inputs = {"": rest, "speed": speed, "acceleration": acceleration}
     white, *_ = made = [lfilter(a, [1.0], x)[order:] for x in inputs.values()]
     for of, x in zip(inputs, made, strict=True):
         lags = both if of else both[reach + 1 :]

@@ -7,7 +7,7 @@ from math import pi, remainder
 
 import numpy as np
 
-from actuator_lti.design import with_values
+from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.fields import field_of
 from actuator_lti.design.model import Correlation, Design, FrictionPoint, Gravity, Tolerance
@@ -117,7 +117,7 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     Margins and Monte Carlo then inherit them. Correlations below 0.005 are left out; old ones between the
     same keys are replaced.
     """
-    fit = _possible(fit)
+    fit = _possible(design, fit)
     values = {p: _short(float(v)) for p, v in zip(fit.names, fit.values, strict=True)}
     if "friction.viscous_reverse" in fit.names and design.friction.offset_torque_Nm:
         values["friction.offset_torque"] = 0.0
@@ -141,14 +141,24 @@ def design_with_fit(design: Design, fit: Fit, source: str) -> Design:
     return with_correlations(replace(changed, parameters=FrozenMap(parameters)), fit)
 
 
-def _possible(fit: Fit) -> Fit:
-    """Without what came out below zero within its error and cannot be: there the design keeps its own."""
-    kept = []
-    for path in fit.names:
-        allowed, nothing = field_of(path), fit[path] < 0.0 <= fit[path] + 2.0 * fit.std(path)
-        if not nothing or allowed is None or allowed.accepts(fit[path]):
-            kept.append(path)
-    return fit.mapped({path: {path: 1.0} for path in kept}, {path: fit[path] for path in kept})
+def _possible(design: Design, fit: Fit) -> Fit:
+    """Without what came out below zero within its error and cannot be: there the design keeps its own.
+
+    The others are what the fit expects of them beside that (conditional mean), where they can be.
+    """
+    gone = [p for p in fit.names if fit[p] < 0.0 <= fit[p] + 2.0 * fit.std(p) and not _accepts(p, fit[p])]
+    names, c = tuple(path for path in fit.names if path not in gone), fit.covariance
+    stated = [path for path in gone if path in design.parameters]
+    k, g = ([fit.names.index(path) for path in these] for these in (names, stated))
+    off = np.array([parameter_value(design, path) - fit[path] for path in stated])
+    moved = fit.values[k] + c[np.ix_(k, g)] @ np.linalg.lstsq(c[np.ix_(g, g)], off, rcond=None)[0]
+    possible = all(_accepts(path, value) for path, value in zip(names, moved, strict=True))
+    return Fit(names=names, values=moved if possible else fit.values[k], covariance=c[np.ix_(k, k)])
+
+
+def _accepts(path: str, value: float) -> bool:
+    allowed = field_of(path)
+    return allowed is None or allowed.accepts(value)
 
 
 def with_correlations(design: Design, fit: Fit) -> Design:

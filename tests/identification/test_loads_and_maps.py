@@ -132,6 +132,10 @@ def test_a_value_below_zero_within_its_error_is_the_design_s_own() -> None:
     fit = Fit(names=names, values=np.array([-8e-6, 2e-6]), covariance=covariance)
     made, own = design_with_fit(_joint(), fit, "record").friction, _joint().friction
     assert (made.load_coefficient, made.viscous_Nms_rad) == (own.load_coefficient, 2e-6)
+    # of two normal values the mean of one at the other: m + c/v (x - m)
+    beside = replace(fit, covariance=np.array([[1e-10, 2e-13], [2e-13, 1e-14]]))
+    moved = design_with_fit(_joint(), beside, "record").friction.viscous_Nms_rad
+    assert moved == pytest.approx(2e-6 + 2e-3 * (own.load_coefficient + 8e-6))
     alone = fit.mapped({names[0]: {names[0]: 1.0}})
     assert design_with_fit(_joint(), alone, "record").friction == own
 
