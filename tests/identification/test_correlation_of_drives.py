@@ -8,14 +8,15 @@ import pytest
 
 from actuator_lti.design import load_design, with_values
 from actuator_lti.design.model import Coupling, Design, FrictionPoint, Gravity, LoadFriction, PositionLoop
-from analyses.correlation.closed_loop import CorrelationResult, correlate_record
+from analyses.correlation.closed_loop import CorrelationResult, correlate_record, model_signals
 from analyses.correlation.compare import compare_signals
 from analyses.correlation.driving import command_of
 from analyses.records.open_record import open_record
+from analyses.records.record import HELD
 from nonlinear import Trajectory, commands, loads, simulate
 from nonlinear.commands import Command
 from tests.changed import changed
-from tests.identification.bench_records import write
+from tests.identification.bench_records import record_of, write
 from tests.refusals import refused
 
 ROTARY = {
@@ -221,3 +222,16 @@ def test_the_delay_is_found_to_a_fraction_of_a_sample(delay: float) -> None:
 
     result = compare_signals("speed", "rad/s", time, signal(time - delay), signal(time))
     assert result.delay_s == pytest.approx(delay, abs=2e-6)
+
+
+def test_a_held_command_steps_at_its_rows_whatever_the_stamps_count_from() -> None:
+    """Stamps of 1.7e9 s are good to 2.4e-7 s: a step of the command is a tick late where one is rounded up."""
+    period, rows = BASE.controller.period_s, np.arange(120)
+    held = 0.01 * np.repeat([0.0, 1.0, -1.0, 2.0, 1.0, 0.0], 20)
+    made = []
+    for start in (0.0, 1.7e9):
+        time = start + rows * 10 * period
+        record = replace(record_of(time, reference=held, angle=np.zeros(rows.size)), between=HELD)
+        made.append(model_signals(BASE, record, {"angle": record["angle"]})[0]["angle"])
+    assert made[0].max() > 1.0
+    assert np.array_equal(*made)
