@@ -224,8 +224,8 @@ def test_the_delay_is_found_to_a_fraction_of_a_sample(delay: float) -> None:
     assert result.delay_s == pytest.approx(delay, abs=2e-6)
 
 
-def test_a_held_command_steps_at_its_rows_whatever_the_stamps_count_from() -> None:
-    """Stamps of 1.7e9 s are good to 2.4e-7 s: a step of the command is a tick late where one is rounded up."""
+def test_a_held_command_steps_at_its_rows_from_any_epoch() -> None:
+    """Stamps of 1.7e9 s are good to 2.4e-7 s: a step was a tick late where one is rounded up."""
     period, rows = BASE.controller.period_s, np.arange(120)
     held = 0.01 * np.repeat([0.0, 1.0, -1.0, 2.0, 1.0, 0.0], 20)
     made = []
