@@ -48,6 +48,7 @@ def wrong_time_of_speed(design: Design, record: Record) -> str:
     """The same of a speed that follows its command: by what the current accelerates beside its friction.
 
     The unit of the time is in the inertia alone, and no other factor is; that is known to a factor of two.
+    Noise of the speed makes it too small, and too large where it is regressed the other way: both say it.
     """
     rate, kM = RATES[design.axis], design.effective_motor.torque_constant_Nm_A
     if not {rate, f"{rate}_reference", "current"} <= record.signals.keys() or kM is None:
@@ -56,11 +57,13 @@ def wrong_time_of_speed(design: Design, record: Record) -> str:
     followed, _ = ratio_of(speed, record[f"{rate}_reference"])
     if _is_loaded(design, record) or not 0.5 < followed < 2.0:
         return ""
-    parts = np.column_stack(_own_torques(design, speed, record))
+    own, resisting = _own_torques(design, speed, record)
+    parts = np.column_stack([own, resisting])
     inertia, friction = shares = scaled_lstsq(parts, torque)
+    inverse = scaled_lstsq(np.column_stack([torque, resisting]), own)[0]
     _, alike = ratio_of(torque, parts @ shares)
-    size = max(inertia, 1.0 / inertia) if inertia > 0.0 else 1.0
-    factor = next((factor for factor in TIMES[1:] if 0.5 < size / factor < 2.0), None)
+    units = (factor**side for factor in TIMES[1:] for side in (1, -1))
+    factor = next((one for one in units if 0.5 < inertia / one < 2.0 and 0.5 < one * inverse < 2.0), None)
     if alike < ALIKE or not 0.5 < friction < 2.0 or factor is None:
         return ""
     told = (

@@ -79,8 +79,11 @@ class Problem:
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
         """All toleranced parameters, the gains among them without limits: those cut about each candidate."""
-        known, cut = set(variable_paths(self.design)), {"lower": -inf, "upper": inf}
-        every = ((p, v, replace(t, **cut) if p in self.paths else t) for p, v, t in drawn(self.design))
+        known = set(variable_paths(self.design))
+        every = (
+            (p, v, replace(t, lower=-inf, upper=inf) if p in self.paths else t)
+            for p, v, t in drawn(self.design)
+        )
         return tuple(Factor(*each) for each in every if each[0] in known)
 
     @cached_property

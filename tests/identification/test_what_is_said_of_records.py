@@ -121,6 +121,20 @@ def test_a_speed_drive_tells_the_unit_of_its_time_by_its_inertia(factor, named, 
     assert all(one.passed is False and f"factor {named}" in one.text for one in told)
 
 
+@pytest.mark.parametrize("counts", [2_000, 6_000, 10_000, 20_000])
+def test_noise_of_a_speed_is_no_unit_of_its_time(counts: int) -> None:
+    """Slow motion against friction, the speed counted over 0.1 ms: by its noise the inertia is 1/1000."""
+    time, kM = 1e-4 * np.arange(40_000), float(DRIVE.motor.torque_constant_Nm_A or 0.0)
+    speed, friction = 500.0 * np.sin(0.5 * np.pi * time), DRIVE.friction
+    torque = DRIVE.inertia_kgm2 * np.gradient(speed, time) + friction.viscous_Nms_rad * speed
+    torque += friction.dry_torque_Nm * np.sign(speed)
+    count = 2.0 * np.pi / counts
+    counted = np.diff(np.floor(1e-4 * np.cumsum(speed) / count), prepend=0.0) * count / 1e-4
+    logged = {"time": time, "speed_reference": speed, "speed": counted, "current": torque / kM}
+    record = _record(logged, "speed_reference", "speed", "current")
+    assert not any(one.subject.startswith("time") for one in check_record(DRIVE, record))
+
+
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize("signals", [("angle",), ("reference", "angle", "speed"), ("speed",)])
 def test_the_sign_of_a_current_is_told_without_a_voltage(sign, signals, columns: Columns) -> None:
