@@ -19,7 +19,7 @@ from actuator_lti.types import Floats
 from analyses.correlation.closed_loop import measured_signals, model_signals
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import wider_covariance
-from analyses.estimation.parameters import parameter
+from analyses.estimation.parameters import default_value, parameter
 from analyses.identification import to_design
 from analyses.identification.electrical import NAMES, NOT_SHOWN, SHOWN, ElectricalFit, kept_inductance
 from analyses.identification.joint_model import JointModel
@@ -49,6 +49,8 @@ def found_together(
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
     inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
     keys = {name: parameter(name).key or inertia for name in (*names, *motor)}
+    lacking = {keys[name]: default_value(design, name) for name in names if name.endswith("_reverse")}
+    design = with_values(design, lacking | {"friction.offset_torque": 0.0} if lacking else {})
     found = _by_simulation(design, records, tuple(keys.values()), others, is_nearest)
     if found is None:
         return None
