@@ -207,7 +207,8 @@ def _summary(result: FrictionEffects, fine: Unit) -> str:
     settlings = [one for point in result.points for one in point.cycles.settlings]
     if (swing := noticed(result.design, settlings)) is not None:
         why = told(result.design, swing, *fine)
-        return f"Without counts and noise too a step does not come to rest: {why}."
+        alone = "Without counts and noise a" if quiet(result.design) != result.design else "A"
+        return f"{alone} step does not come to rest: {why}."
     if any(abs(one.rest.error) > LEFT * one.amplitude_rad for one in settlings):
         most = max(settlings, key=lambda one: abs(one.rest.error))
         under = f", at a load of {most.load_Nm:g} {result.design.load_unit}" if most.load_Nm else ""
