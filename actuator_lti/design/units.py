@@ -115,7 +115,7 @@ _MINUTE = "[minute]"  # counted beside the time: without an angle it is that of 
 
 _AMPERE = re.compile(r"\bA\b")
 MOST_FACTORS = 40
-_GD2 = re.compile(r"\s*\(?\bGD(?:\^?2|²)\)?\s*=?\s*")
+_GD2 = re.compile(r"\s*\(?\b[GP]D(?:\^?2|²)\)?(?! ?/)\s*[=:]?\s*", re.I)  # PD2 in the south of Europe
 _INNER = re.compile(r"\(([^()]*)\)")
 _FACTOR = re.compile(r"\s*([*/]?)\s*(_[0-9]+|[A-Za-z_µΩ]+|1(?:000)?(?![0-9.]))(?:\s*\^(-?[1-6]))?\s*")
 _WEIGHTS = re.compile(r"\b(oz|lb)s?\b|\b(kg|g)m?(?=[* ]c?m\b)")

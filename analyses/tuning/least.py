@@ -103,13 +103,17 @@ def _evolved(problem: Problem, best: Floats, working: Floats) -> Floats:
     centre = np.where(free, here, problem.coordinates(problem.present))
     reach = np.where(free, WIDEST, np.sqrt(problem.change(best[None, :])[0]))
     box = np.clip([centre - reach, centre + reach], low, high)
+    middle = box.mean(axis=0)
+    begin = middle + (1.0 - 1e-6) * (
+        np.clip(here, *box) - middle
+    )  # an end is outside by rounding, and refused
 
     def limits(x: Floats) -> Floats:
         made = (problem.rows(np.atleast_2d(x.T), working) - MET).T
         return made if x.ndim > 1 else made[:, 0]
 
     result = differential_evolution(
-        lambda x: problem.change(problem.values(x.T)), [*zip(*box, strict=True)], x0=np.clip(here, *box),
+        lambda x: problem.change(problem.values(x.T)), [*zip(*box, strict=True)], x0=begin,
         constraints=NonlinearConstraint(limits, 0.0, np.inf), maxiter=GENERATIONS, popsize=MEMBERS,
         tol=1e-8, polish=False, vectorized=True, updating="deferred", rng=np.random.default_rng(1),
         callback=lambda x, convergence: problem.spent,

@@ -3,8 +3,9 @@
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from math import inf
 
 import numpy as np
 
@@ -77,9 +78,13 @@ class Problem:
 
     @cached_property
     def toleranced(self) -> tuple[Factor, ...]:
-        """All toleranced parameters, the gains that have a tolerance among them."""
+        """All toleranced parameters, the gains among them without limits: those cut about each candidate."""
         known = set(variable_paths(self.design))
-        return tuple(Factor(p, v, t) for p, v, t in drawn(self.design) if p in known)
+        every = (
+            (p, v, replace(t, lower=-inf, upper=inf) if p in self.paths else t)
+            for p, v, t in drawn(self.design)
+        )
+        return tuple(Factor(*each) for each in every if each[0] in known)
 
     @cached_property
     def factors(self) -> tuple[Factor, ...]:
@@ -166,10 +171,11 @@ class Problem:
         moved = as_values(self.design, [f.path for f in factors], np.tile(corners, (len(gains), 1)))
         values = {**chosen, **moved}
         for factor in (f for f in factors if f.path in chosen):
-            middle, tolerance = chosen[factor.path], factor.tolerance
-            share = middle / factor.nominal if tolerance.relative else 1.0
+            middle, own = chosen[factor.path], self.design.parameters[factor.path].tolerance
+            assert own is not None
+            share = middle / factor.nominal if own.relative else 1.0
             away = share * (values[factor.path] - factor.nominal)
-            values[factor.path] = np.clip(middle + away, tolerance.lower, tolerance.upper)
+            values[factor.path] = np.clip(middle + away, own.lower, own.upper)
         return values
 
 

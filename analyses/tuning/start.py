@@ -119,9 +119,12 @@ def step_of_gain(design: Design, path: str) -> float | None:
 
 
 def allowed_range(design: Design, path: str) -> tuple[float, float]:
-    """Smallest and largest SI value of a gain that its object can hold."""
-    known, step = object_of(design, path), step_of_gain(design, path)
-    return (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
+    """Smallest and largest SI value of a gain that its object can hold and a truncated tolerance allows."""
+    known, step, own = object_of(design, path), step_of_gain(design, path), design.parameters.get(path)
+    held = (0.0, inf) if known is None or step is None else (max(known.low, 1) * step, known.high * step)
+    if own is None or own.tolerance is None:
+        return held
+    return max(held[0], own.tolerance.lower), min(held[1], own.tolerance.upper)
 
 
 def neighbours(design: Design, paths: tuple[str, ...], gains: Floats) -> Floats:

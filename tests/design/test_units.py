@@ -179,6 +179,8 @@ def test_a_time_in_minutes_does_not_turn_the_speeds_read_after_it() -> None:
                 "0.6668522 N m2",
                 "GD2 0.068 kgf m2",
                 "GD² = 0.068 kgm²",
+                "gd2: 0.068 kg m2",
+                "PD2 = 0.068 kg m2",
             )
         ],
         ("0.068 kg m2 (GD2)", "kg*m^2", "a GD2; allowed"),

@@ -18,6 +18,7 @@ from actuator_lti.design.objects import export_objects
 from actuator_lti.errors import InputError
 from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.requirements import evaluate_requirements
+from analyses.studies.sampling import Factor
 from analyses.tuning import TuningSettings, tune
 from analyses.tuning.problem import gain_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
@@ -78,6 +79,25 @@ def test_a_gain_that_is_searched_for_keeps_its_tolerance(text, width, most, aim)
     upper = gain * 1.1 if "%" in text else gain + 7.0
     assert tuned.requirements[0].corner == {GAIN: pytest.approx(upper)}
     assert (tuned.feasible, tuned.corners, len(tuned.confirmed), upper <= bound) == (True, 3, 2, True)
+
+
+@pytest.mark.parametrize(("lower", "upper", "least"), [(130.0, 250.0, 134.46), (190.0, 210.0, 190.0)])
+def test_a_gain_stays_within_the_limits_of_its_tolerance(lower, upper, least):
+    """From 200 1/s: the known gain, 149.46 1/s, less 3 std; the nearest limit where that is beyond.
+
+    The worst corner is 3 std above the gain that was found, or the limit, as `corners` of it has them.
+    """
+    wide = model.Tolerance(kind="truncated-normal", std=5.0, lower=lower, upper=upper, text="5 1/s")
+    stated = model.Parameter(path=GAIN, text="200 1/s", value=200.0, unit="1/s", tolerance=wide)
+    design = changed(integrator(need("phase_margin", 60.0, loop="position")), controller={
+        "position": PositionLoop(gain=200.0)
+    })  # fmt: skip
+    tuned = tune(replace(design, parameters={GAIN: stated}), TuningSettings(curve=False))
+    gain = tuned.design.parameters[GAIN]
+    most = Factor(GAIN, gain.value, gain.tolerance).box[1]
+    assert gain.value == pytest.approx(least, rel=1e-4)
+    assert tuned.requirements[0].corner[GAIN] == pytest.approx(most)
+    assert tuned.feasible == (least < 149.46)
 
 
 def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
