@@ -34,23 +34,23 @@ FIRST_GAIN = 0.03  # part of the squares that a step takes, with which a first s
 def found_together(
     design: Design,
     records: Sequence[Record],
-    names: Sequence[str],
+    model: JointModel,
     others: Sequence[Sequence[Record]],
     is_nearest: Callable[[Sequence[Record]], bool],
 ) -> Fit | None:
     """Values of the motion and of the motor, by their names, with which the simulated drive has the records.
 
-    ``design`` is where the search begins; ``names`` are those of the motion. In a first search each signal
+    ``design`` is where the search begins, and where it has no friction ``model``, which tells what is looked
+    for of the motion. In a first search each signal
     counts by what the best of ``others``, records simulated with other commands, leaves of it. None where the
     records that are simulated behind it are not the nearest.
     """
     back = design.motor.back_emf_constant_Vs_rad or design.motor.torque_constant_Nm_A
-    design = with_values(design, {BACK: float(back or 0.0)})
+    design = to_design.with_structure(with_values(design, {BACK: float(back or 0.0)}), model)
     motor = [one for one in NAMES if parameter(one).key and parameter_value(design, parameter(one).key)]
     inertia = max(to_design.INERTIAS, key=lambda key: _part_of_inertia(design, key))
-    keys = {name: parameter(name).key or inertia for name in (*names, *motor)}
-    lacking = {keys[name]: default_value(design, name) for name in names if name.endswith("_reverse")}
-    design = with_values(design, lacking | {"friction.offset_torque": 0.0} if lacking else {})
+    keys = {name: parameter(name).key or inertia for name in (*model.names, *motor)}
+    design = with_values(design, _first_friction(design, model))
     found = _by_simulation(design, records, tuple(keys.values()), others, is_nearest)
     if found is None:
         return None
@@ -58,6 +58,15 @@ def found_together(
     scale = to_design.inertia_share(design, made.inertia_kgm2, inertia)[1]
     slopes = {name: {key: 1.0 / scale if name == "inertia" else 1.0} for name, key in keys.items()}
     return found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
+
+
+def _first_friction(design: Design, model: JointModel) -> dict[str, float]:
+    """Dry friction and that of the reverse to begin with, not zero; by direction they hold the offset."""
+    reverse = [name for name in model.names if name.endswith("_reverse")]
+    names = {*reverse, *(name for name in model.names if name.startswith("dry"))}
+    most = {name: max(abs(model[name]), model.std(name)) for name in names}
+    first = {parameter(name).key: default_value(design, name) or most[name] for name in names}
+    return first | {"friction.offset_torque": 0.0} if reverse else first
 
 
 def _part_of_inertia(design: Design, key: str) -> float:

@@ -149,8 +149,7 @@ def _together(
 ) -> list[Found]:
     """Motor and motion by simulation; again where a lag of the current was taken back."""
     held, (_, raw) = held_values(design, plain, settings), by_voltage(plain, records, recipe)
-    names = _raw(plain, settings, held, recipe, records, np.ones(len(records))).names
-
+    model = _raw(plain, settings, held, recipe, records, np.ones(len(records)))
     likes = [one.right.model.simulated for one in others]
 
     def is_nearest(simulated: Sequence[Record]) -> bool:
@@ -160,7 +159,7 @@ def _together(
     first: Diagnosed | None = None
     while True:
         try:
-            both = found_together(plain, records, names, likes, is_nearest)
+            both = found_together(plain, records, model, likes, is_nearest)
         except (InputError, NumericalError):  # they do not tell all of it, or cannot be simulated
             return [_found(design, plain, records, settings, recipe)]
         if both is None:

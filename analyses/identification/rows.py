@@ -105,7 +105,8 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     place, rate = place_of(design, record), RATES[design.axis]
     if _too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
-    values = record[rate] if place is None else place[1] - place[1].mean()
+    values = record[rate] if place is None else place[1] - place[1][0]  # exactly zero of a constant angle
+    values = values if place is None else values - values.mean()
     power = np.abs(rfft(values)) ** 2
     below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
     count, rest = np.count_nonzero(below), np.count_nonzero(~below)

@@ -107,9 +107,8 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
             rows[_STARTS[name]] = SCALES * value.real
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
     size = _sizes(rows, round(period), 2) / cycle.output_rad
-    if (
-        size.max() >= SCALES[0] and size.min() < np.inf
-    ):  # else all have died out, or failed; large may still fall
+    # What has died out, or failed, from every size is no cycle; what is large now may still fall to it
+    if size.max() >= SCALES[0] and size.min() < np.inf:
         size = _sizes(rows, round(3.0 * period), CYCLES_WATCHED // 3) / cycle.output_rad
     grows = size > SCALES
     turns = np.flatnonzero((grows[1:] != grows[:-1]) & (grows[:-1] == cycle.stable))
