@@ -179,10 +179,6 @@ def _made(
     source = f"identified from {names_of(records)}{at_constant(model, start)}"
     try:
         values = to_design.joint_values(start, model, inertia_to=settings.inertia_to)
-        for record in records:
-            for key in record.settings.keys() & set(values.names):
-                told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
-                raise InputError(f"settings.{key}: {told}", where=record.name)
         made = to_design.design_with_fit(to_design.with_structure(start, model), values, source)
         if both is not None:
             both = to_design.joint_values(start, both, inertia_to=settings.inertia_to)
@@ -191,6 +187,10 @@ def _made(
         if all(item.passed is not False for item in items):
             raise
         return start, None, error.message
+    for record in records:
+        for key in record.settings.keys() & set(values.names):
+            told = f"is found from all records; allowed: any other key, or --fix {key}=VALUE"
+            raise InputError(f"settings.{key}: {told}", where=record.name)
     refined = None
     if settings.refine:
         refined = refine_records(made, records, values.names, progress=progress)
