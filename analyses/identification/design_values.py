@@ -21,10 +21,9 @@ from analyses.estimation.parameters import default_value, own_share, own_std, pa
 from analyses.identification.electrical import fit_electrical, without_own_bias
 from analyses.identification.joint_model import JointModel
 from analyses.identification.rows import drive_of, rows_under
-from analyses.records.consistency import SURE, one_phase
+from analyses.records.consistency import NO_CHANCE, SURE, one_phase
 from analyses.records.record import Record
 
-NO_CHANCE = 1e-3  # level at which the design's numbers as a whole are rejected, and one of them is
 EXPLAINED = 0.01  # level above which a cause explains what is off
 LEAST_VALUES = 3
 ALIKE = 0.02

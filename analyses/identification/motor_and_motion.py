@@ -60,15 +60,18 @@ def motor_and_motion(
     ways = [
         [replace(one, between=way) for one in records] for way in sorted(read or [SMOOTH], key=HELD.__eq__)
     ]
+    simulated = settings.electrical and settings.friction != "map" and not _gravity(plain, settings)
+    together = partial(_together, design, plain, settings, recipe)
     tried: list[Found] = []
     for taken in ways:
-        tried += _followed(design, plain, taken, settings, recipe, tried)
+        found = together(tried, taken) if simulated and taken[0].between == HELD else None
+        tried += [_found(design, plain, taken, settings, recipe)] if found is None else found
         if not tried[0].right.model.simulated:  # no bias is taken off
             return tried[0]
     if tried[-1].electrical is not None and tried[-1].electrical.with_motion is not None:
         for taken in ways[:-1]:
             with suppress(InputError, NumericalError):
-                tried += _together(design, plain, taken, settings, recipe, tried)
+                tried += together(tried, taken) or []
     misses = _misses(plain, [_both_ways(one) for one in tried])
     best = int(np.argmin(np.sum(misses, axis=1)))
     best_one = tried[best]
@@ -124,30 +127,18 @@ def _widened(plain: Design, taken: Found, other: Found, share: float) -> Found:
     return Found(start=start, electrical=motor, right=right)
 
 
-def _followed(
-    design: Design,
-    plain: Design,
-    records: Sequence[Record],
-    settings: Settings,
-    recipe: Recipe | None,
-    others: Sequence[Found],
-) -> list[Found]:
-    """What the records tell where the drive took its command in their way; empty where others are nearer."""
-    held = {one.between for one in records} == {HELD} and settings.electrical
-    if held and settings.friction != "map" and not _gravity(plain, settings):
-        return _together(design, plain, records, settings, recipe, others)
-    return [_found(design, plain, records, settings, recipe)]
-
-
 def _together(
     design: Design,
     plain: Design,
-    records: Sequence[Record],
     settings: Settings,
     recipe: Recipe | None,
     others: Sequence[Found],
-) -> list[Found]:
-    """Motor and motion by simulation; again where a lag of the current was taken back."""
+    records: Sequence[Record],
+) -> list[Found] | None:
+    """Motor and motion by simulation; again where a lag of the current was taken back.
+
+    Empty where others are nearer; None where the records do not tell all of it, or cannot be simulated.
+    """
     held, (_, raw) = held_values(design, plain, settings), by_voltage(plain, records, recipe)
     model = _raw(plain, settings, held, recipe, records, np.ones(len(records)))
     likes = [one.right.model.simulated for one in others]
@@ -160,8 +151,8 @@ def _together(
     while True:
         try:
             both = found_together(plain, records, model, likes, is_nearest)
-        except (InputError, NumericalError):  # they do not tell all of it, or cannot be simulated
-            return [_found(design, plain, records, settings, recipe)]
+        except (InputError, NumericalError):
+            return None
         if both is None:
             return []
         motor = motor_of(both, raw, plain)

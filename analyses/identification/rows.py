@@ -16,7 +16,7 @@ from analyses.estimation.parameters import default_value, pendulum_angle
 from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
-from analyses.records.consistency import place_of
+from analyses.records.consistency import NO_CHANCE, place_of
 from analyses.records.differentiation import Motion, decimated
 from analyses.records.naming import LOADS, RATES
 from analyses.records.record import Record, lasting, period_of, prepared
@@ -25,7 +25,6 @@ REST_SHARE = 0.005
 REST_TIME_S = 0.03
 END_SHARE = 0.02
 SHORTEST_S = 0.2
-NO_CHANCE = 1e-3
 
 
 def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int | None = None) -> Recipe:
@@ -105,8 +104,11 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     place, rate = place_of(design, record), RATES[design.axis]
     if _too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
-    values = record[rate] if place is None else place[1] - place[1][0]  # exactly zero of a constant angle
-    values = values if place is None else values - values.mean()
+    if place is None:
+        values = record[rate]
+    else:
+        moved = place[1] - place[1][0]  # exactly zero of a constant angle
+        values = moved - moved.mean()
     power = np.abs(rfft(values)) ** 2
     below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
     count, rest = np.count_nonzero(below), np.count_nonzero(~below)

@@ -15,8 +15,8 @@ from actuator_lti.design.model import Design
 from analyses.correlation.following import Followed
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
-from analyses.identification.design_values import NO_CHANCE, DesignValue, cause
-from analyses.records.consistency import ALIKE, RATE_TOLERANCE, Finding, wrong_of
+from analyses.identification.design_values import DesignValue, cause
+from analyses.records.consistency import ALIKE, NO_CHANCE, RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
 

@@ -272,8 +272,9 @@ def conduct(run: Trajectory, full_deflection_rad: float = 0.0) -> Conduct:
         rest = counted(rest, full_deflection_rad)
     if not rest.comes_to_rest:
         text = words(rest, factor, unit).removeprefix("limit cycle of ").removeprefix("still moving ")
-        longer = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0 or rest.verdict == "diverging"
-        beyond = f"followed for {rest.after_s:.3g} s beyond the run" if longer else ""
+        shorter = run.time_s[-1] * (rest.frequency_hz or inf) < 1.0  # the run than a period
+        unseen = shorter or rest.verdict == "diverging"
+        beyond = f"followed for {rest.after_s:.3g} s beyond the run" if unseen else ""
         return Conduct(rest.verdict, text, beyond)
     limits = [f"{n} limit of {run.limits[n].limit:.4g} {run.limits[n].unit}" for n in rest.limited]
     if limits:

@@ -21,6 +21,7 @@ from analyses.records.record import DISORDER, HELD, Record
 from analyses.records.single_rows import NORMAL, impossible_steps, named_rows, noise_bound
 
 RATE_TOLERANCE = 0.02  # of speed over rate: above, no design is made; below, it widens the intervals
+NO_CHANCE = 1e-3  # level at which chance is rejected
 SURE = 4.0  # standard errors beyond which noise explains no difference: by chance in one record of 16 000
 TICK_TOLERANCE = 1e-3
 ONE_PHASE = (

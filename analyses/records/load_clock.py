@@ -10,11 +10,10 @@ from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 from analyses.estimation.means import correlation_time
 from analyses.records.clocks import ClockJoin
+from analyses.records.consistency import NO_CHANCE, SURE
 from analyses.records.record import Record
 from analyses.records.steady_window import CRITERION, find_steady_window
 
-NO_CHANCE = 1e-3  # level at which the join is rejected
-SURE = 4.0
 GRID = 40_000  # points over the longer record, at most
 ROUNDING = 1e-9
 

@@ -18,6 +18,7 @@ from analyses.tuning.solve import Program, Solution, Spent, rounds, solve, viola
 MET = 1e-6  # relative distance that a requirement keeps, above the rounding of a margin
 GENERATIONS = 60
 MEMBERS = 8  # of a generation, for each value
+INSIDE = 1.0 - 1e-6  # of the box, where a search begins: an end is outside by rounding, and refused
 WIDEST = 3.0  # a factor 20, for a value that costs nothing wherever it is
 WAY = np.array([0.0, 1e-4, 1e-3, 1e-2, 0.05, 0.1, 0.2, 0.4, 0.7])
 BACK = np.linspace(0.0, 1.0, 17)[1:]
@@ -104,9 +105,7 @@ def _evolved(problem: Problem, best: Floats, working: Floats) -> Floats:
     reach = np.where(free, WIDEST, np.sqrt(problem.change(best[None, :])[0]))
     box = np.clip([centre - reach, centre + reach], low, high)
     middle = box.mean(axis=0)
-    begin = middle + (1.0 - 1e-6) * (
-        np.clip(here, *box) - middle
-    )  # an end is outside by rounding, and refused
+    begin = middle + INSIDE * (np.clip(here, *box) - middle)
 
     def limits(x: Floats) -> Floats:
         made = (problem.rows(np.atleast_2d(x.T), working) - MET).T

@@ -49,11 +49,11 @@ def _cycle_verdict(design: Design, point: FrictionPoint, fine: Unit, load: str) 
     if not cycles.described:
         agree += "; the describing function is refuted: a sinusoid spends no time at rest"
     predicted = "; ".join(_predicted(item, fine) for item in cycles.confirmations) or "none"
-    swings = 0.0 if swing is None else swing.swing_rad if swing.rest.verdict != "diverging" else None
+    diverges = swing is not None and swing.rest.verdict == "diverging"  # of no size
     return doc.verdict(
         f"validation-hunting-{point.load_Nm:g}",
         f"No limit cycle of friction after steps at {point.load_Nm:g} {load}",
-        value=None if swings is None else fine.scale * swings,
+        value=None if diverges else 0.0 if swing is None else fine.scale * swing.swing_rad,
         limit=fine.scale * accepted_rad(design),
         unit=fine.unit,
         passed=verdict_of(design, swing),
