@@ -96,14 +96,16 @@ def _flags(upper: str) -> str:
 
 def _constants(ours: Controller, upper: str) -> str:
     """Numbers of the configuration that the program around the controller wants."""
-    upper += "CONTROLLER_"
-    lines = [f"#define {upper}PERIOD_S {c_float(float(ours.p[at.PERIOD]))} /* of a step, s */"]
+    lines = [f"#define {upper}CONTROLLER_PERIOD_S {c_float(float(ours.p[at.PERIOD]))} /* of a step, s */"]
     for each in ours.measured.members:
         if each.kind == "count":
-            name = each.name.replace("motor_", "").upper()
             value = c_float(ours.counts_per_rad(each.first))
-            lines.append(f"#define {upper}{name}_PER_RAD {value} /* of {each.name} */")
+            lines.append(f"#define {_per_rad(each.name, upper)} {value} /* of {each.name} */")
     return "\n".join(lines)
+
+
+def _per_rad(counts: str, upper: str) -> str:
+    return f"{upper}CONTROLLER_{counts.removeprefix('motor_').upper()}_PER_RAD"
 
 
 def _structs(ours: Controller) -> str:
@@ -124,12 +126,12 @@ def _signal_words(ours: Controller, member: Member) -> str:
 
 def _angles(ours: Controller, upper: str) -> str:
     """What to give for an angle in rad where the encoder is all there is."""
-    named = {each.name: each for each in ours.measured.members}
+    named = {each.name for each in ours.measured.members}
     return "".join(
         f" Where the encoder is all there is, give `{side}_angle_rad` as `{side}_counts / "
-        f"{upper}CONTROLLER_{'OUTPUT_' if side == 'output' else ''}COUNTS_PER_RAD`."
+        f"{_per_rad(f'{side}_counts', upper)}`."
         for side in ("motor", "output")
-        if {f"{side}_angle_rad", f"{side}_counts"} <= named.keys()
+        if {f"{side}_angle_rad", f"{side}_counts"} <= named
     )
 
 
