@@ -158,7 +158,7 @@ def model_signals(
     notes = [] if notes is None else notes
     notes.extend(driven.notes)
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
-    if (np.abs(time - even) <= 4.0 * np.spacing(record.time_s[-1])).all():
+    if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
         time = even  # stamps of an epoch have few digits: a step of the command would miss its tick
     supply = driving.supply_of(driven, record, time, notes)
     model, load = driving.load_of(driven.design, record, time, notes)

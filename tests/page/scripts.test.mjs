@@ -49,7 +49,7 @@ test("numbers keep their digits and their sign", () => {
 });
 
 test("what is typed is a number with a decimal point, as on the command line", () => {
-  assert.deepEqual(["6.5", " −2 ", "1e3", "6,000", "6,5", "", "0x20"].map((text) => typed(text)), [6.5, -2, 1000, NaN, NaN, NaN, NaN]);
+  assert.deepEqual(["6.5", " −2 ", "1e3", "6,000", "6,5", "", "0x20", "−5e−3"].map((text) => typed(text)), [6.5, -2, 1000, NaN, NaN, NaN, NaN, -0.005]);
   assert.deepEqual(["5 1/s", "5", "5 A", "1/s"].map((text) => typed(text, "1/s")), [5, 5, NaN, NaN]);
   assert.equal(refused("6,000", "a number above 0"), '"6,000": a decimal comma; use a decimal point');
   assert.equal(refused("-1", "a number above 0"), '"-1": a number above 0');

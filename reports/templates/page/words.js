@@ -23,7 +23,7 @@ export const choice = (words, options, value, change) => {
 };
 // what is typed as a number, its unit behind it or not; NaN where it is none
 export const typed = (text, unit = "") => {
-  const words = text.trim().replace("−", "-"), number = unit && words.endsWith(unit) ? words.slice(0, -unit.length).trim() : words;
+  const words = text.trim().replaceAll("−", "-"), number = unit && words.endsWith(unit) ? words.slice(0, -unit.length).trim() : words;
   return /^[-+.\d][-+.\de]*$/i.test(number) ? Number(number) : NaN;
 };
 export const refused = (text, allowed) => `"${text}": ${text.includes(",") ? "a decimal comma; use a decimal point" : allowed}`;
