@@ -133,10 +133,9 @@ def script(*, live: bool = False) -> str:
 def security_policy(script: str, *, wasm: bool) -> str:
     """Give the page's content security policy: no request at all, and only this script runs."""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    allowed = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
-    return (
-        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}; base-uri 'none'"
-    )
+    scripts = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
+    own = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+    return f"{own}; script-src {scripts}; base-uri 'none'"
 
 
 def show_signed(value: float | None, digits: int = 3) -> str:

@@ -45,9 +45,8 @@ UPDATES = 400  # of the position loop in a window
 class RestSweep(Compared):
     """Response from rest, one entry a frequency."""
 
-    # Shape (K,): command at the output shaft, peak
     frequency_hz: Floats
-    amplitude_rad: Floats
+    amplitude_rad: Floats  # shape (K,): command at the output shaft, peak
     # Shape (K,): output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN
     # where nothing moves)
     measured: Complexes
@@ -140,8 +139,7 @@ class AmplitudeMargin:
     """Where an oscillation lasts after a release from one deviation."""
 
     loop: str
-    # ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``
-    kind: str
+    kind: str  # ``"gain"`` or ``"delay"``
     size: str
     part: float  # of the full deflection, speed or current
     friction_on: bool
@@ -150,13 +148,10 @@ class AmplitudeMargin:
     value: float | None
     furthest: float
     period_s: float
-    # Limit that acts longest while the oscillation lasts, just past the value; empty where none does
-    limiter: str = ""
-    # Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value
-    output: float = nan
+    limiter: str = ""  # that acts longest while it lasts, just past the value; empty where none does
+    output: float = nan  # of that oscillation at the output, rad (linear axis: m); NaN without a value
     axis: str = "rotary"
-    # Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`
-    coarser: bool = False
+    coarser: bool = False  # fewer than `VALUES` were asked: those take over `MOST_TICKS`
     too_long: bool = False  # whether none was asked, as they take over `TOO_MANY` ticks
 
 

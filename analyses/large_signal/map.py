@@ -47,14 +47,10 @@ class AmplitudeMap(Compared):
     load_Nm: float
     amplitude_rad: np.ndarray  # shape (a,): peak command at the output shaft (linear axis: m)
     frequency_hz: np.ndarray  # shape (f,)
-    # Shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`
-    cause: np.ndarray
+    cause: np.ndarray  # shape (a, f): index into `CAUSES`
     waveform: np.ndarray
-    # Shape (a, f, limiters): fraction of the last window in which speed, acceleration, current and voltage
-    # limits act
-    limiter_fraction: np.ndarray
-    # Shape (a, f): of the output in the last window
-    stick_fraction: np.ndarray
+    limiter_fraction: np.ndarray  # shape (a, f, limiters): of the last window in which each acts
+    stick_fraction: np.ndarray  # shape (a, f), as what follows: of the output in the last window
     distortion: np.ndarray
     unsteadiness: np.ndarray
     response: np.ndarray  # shape (a, f): fundamental of the output over the command
@@ -63,8 +59,7 @@ class AmplitudeMap(Compared):
     # against the tones, which acts later than they are simulated (`slow_protection`)
     onset_rad: Mapping[str, np.ndarray]
     ticks: int  # simulated in all
-    # Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`
-    coarser: bool = False
+    coarser: bool = False  # than asked for, as that would take more than `MOST_TICKS`
 
     @property
     def gain_db(self) -> np.ndarray:
@@ -184,11 +179,9 @@ class AmplitudeBode(Compared):
     frequency_hz: np.ndarray  # shape (f,)
     fractions: tuple[float, ...]  # Of full deflection; those of the design that the map has
     amplitude_rad: np.ndarray  # shape (k,)
-    # Shape (k, f): Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle
-    gain_db: np.ndarray
+    gain_db: np.ndarray  # shape (k, f): -inf and NaN where nothing moves, NaN where it did not settle
     phase_deg: np.ndarray
-    # Shape (f,)
-    linear_db: np.ndarray
+    linear_db: np.ndarray  # shape (f,)
     linear_deg: np.ndarray
     all_amplitude_rad: np.ndarray  # shape (a,): Every amplitude of the map
     # Shape (a,): First crossing; between two frequencies of the map the linear response, and what the
@@ -200,8 +193,7 @@ class AmplitudeBode(Compared):
     # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
     # points tell: from 0 where the first of them is below already, to inf where none is
     minus3db_range_hz: np.ndarray
-    # Shape (a,): Whether the gain is below -3 dB at the whole frequency already
-    below_from_start: np.ndarray
+    below_from_start: np.ndarray  # shape (a,): below -3 dB at the whole frequency already
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
     level_db: float = MINUS_3DB

@@ -63,8 +63,7 @@ LONGEST_PERIODS = 20_000
 class LinearSteadyState:
     """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part."""
 
-    # Shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited jerk included
-    output: np.ndarray
+    output: np.ndarray  # shape (K,): command to output angle, fundamental over all ticks, mean included
     states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
     settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
@@ -145,7 +144,6 @@ class Tone:
 
     @property
     def omega_rad_s(self) -> float:
-        """Angular frequency."""
         return 2.0 * math.pi * self.frequency_hz
 
 

@@ -28,7 +28,6 @@ class CodeCheck:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Predictions that the compiled code does not meet."""
         return tuple(entry for entry in self.entries if entry.verdict is Verdict.NOT_MET)
 
     def largest(self, *quantities: str) -> Row | None:

@@ -72,10 +72,8 @@ class LoopFigures:
     held: LoopFigures | None = None
     by_hold: bool = False  # unstable only as a torque over the angle is held over a tick
     locked: LoopFigures | None = None  # of a current loop with a free rotor, where it was asked for: locked
-    # What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk
-    mean: CommandMean | None = None
-    # Of a position loop with a mean or a filter of the command: with bandwidth and step behind them
-    reference: LoopFigures | None = None
+    mean: CommandMean | None = None  # of a limited jerk, between the user's command and ``plain_response``
+    reference: LoopFigures | None = None  # of a position loop with a mean or filter: behind them
 
     def asked(self, requirement: Requirement) -> LoopFigures:
         """The figures that a requirement means: of which current loop, of which response."""
@@ -97,7 +95,6 @@ class LoopFigures:
 
     @property
     def by_itself(self) -> str:
-        """What is said of a loop that is unstable by itself."""
         return f"{OPEN[self.loop.name]}, as {ACTIVE if self.by_hold else AWAY}"
 
     @property
@@ -107,7 +104,6 @@ class LoopFigures:
 
     @cached_property
     def response(self) -> Any:
-        """What bandwidth and step are taken of, as a python-control system."""
         return as_control(self.plain_response)
 
     @property
@@ -117,7 +113,6 @@ class LoopFigures:
 
     @property
     def stable(self) -> bool:
-        """Whether the closed loop is known to be stable."""
         return self.margins.stable is True
 
 
@@ -293,7 +288,6 @@ def _differing(margins: StabilityMargins, other: StabilityMargins) -> str:
 
 
 def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures:
-    """The current loop with the rotor locked."""
     fixed = other_loops(loops, loops.design, rotor="locked").present["current"]
     return loop_figures(fixed, step=step, certify=certify)
 

@@ -30,7 +30,6 @@ FAR = 4.0  # times a threshold: where it is looked for then
 
 
 def torque_rows(design: Design, model: Design) -> Iterator[Row]:
-    """All rows of the mechanics."""
     yield from _inertias(design, model)
     yield from _steady(design, model)
     if design.friction.law == "coulomb":

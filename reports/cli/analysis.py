@@ -198,9 +198,6 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
     if option.argument:
         needed = Parameter.empty if default is None else default
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
-    made = typer.Option(
-        f"--{option.flag or flag(name)}",
-        metavar=option.metavar or "NUMBER" * is_number(kind) or None,
-        help=option.words,
-    )
+    metavar = option.metavar or "NUMBER" * is_number(kind) or None
+    made = typer.Option(f"--{option.flag or flag(name)}", metavar=metavar, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)

@@ -28,7 +28,6 @@ PANELS = {
 def build() -> typer.Typer:
     app = typer.Typer(
         name="actuator-lti",
-        add_completion=True,
         no_args_is_help=True,
         pretty_exceptions_enable=False,
         rich_markup_mode="rich",
@@ -42,7 +41,6 @@ def build() -> typer.Typer:
 
 
 def built() -> Any:
-    """The command with all that are below it."""
     return bounded(typer.main.get_command(build()))
 
 
