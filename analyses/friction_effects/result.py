@@ -57,12 +57,9 @@ class LimitCycles:
 
 
 def limit_cycles(
-    design: Design,
-    load_Nm: float,
-    predicted: tuple[Cycle, ...] | None = None,
-    loops: Loops | None = None,
+    design: Design, load_Nm: float, predicted: tuple[Cycle, ...] | None = None, loops: Loops | None = None,
     settlings: Iterable[Settling] | None = None,
-) -> LimitCycles:
+) -> LimitCycles:  # fmt: skip
     """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
     The steps are those that judge the whole drive, without counts and noise (`analyses.motion.settling`).

@@ -90,9 +90,7 @@ class Conditional:
 
 def saturation_gain(ratio: float) -> float:
     """Describing function of saturation, of amplitude over limit; 1 up to the limit."""
-    if ratio <= 1.0:
-        return 1.0
-    return 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
+    return 1.0 if ratio <= 1.0 else 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
 
 
 def saturation_ratio(gain: float) -> float:
@@ -115,15 +113,11 @@ def conditional_stability(design: Design, loops: Loops) -> Conditional:
     threshold, following = step_threshold(design)
     hertz, amplitude = _hovering(design, threshold) if threshold else (None, None)
     return Conditional(
-        margins=margins,
-        predictions=tuple(one for one in predictions if one is not None),
-        threshold_rad=threshold,
-        next_rad=following,
-        full_deflection_rad=design.validation.full_deflection_rad,
-        oscillation_hz=hertz,
-        oscillation_rad=amplitude,
-        **({} if following is None else _end(design, following)),
-    )
+        margins=margins, predictions=tuple(one for one in predictions if one is not None),
+        threshold_rad=threshold, next_rad=following,
+        full_deflection_rad=design.validation.full_deflection_rad, oscillation_hz=hertz,
+        oscillation_rad=amplitude, **({} if following is None else _end(design, following)),
+    )  # fmt: skip
 
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:

@@ -102,13 +102,9 @@ class AmplitudeMap(Compared):
 
 
 def amplitude_map(
-    design: AnyDesign,
-    loops: Loops,
-    *,
-    load_Nm: float = 0.0,
-    friction_on: bool = True,
+    design: AnyDesign, loops: Loops, *, load_Nm: float = 0.0, friction_on: bool = True,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
-) -> AmplitudeMap:
+) -> AmplitudeMap:  # fmt: skip
     """Simulate sines over amplitude and frequency and say what each shows.
 
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
@@ -142,21 +138,16 @@ def amplitude_map(
         cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
-        load_Nm=load_Nm,
-        amplitude_rad=levels,
-        frequency_hz=omega / (2.0 * np.pi),
-        cause=cause.reshape(shape),
+        load_Nm=load_Nm, amplitude_rad=levels, frequency_hz=omega / (2.0 * np.pi), cause=cause.reshape(shape),
         waveform=waveforms(result).reshape(shape),
         limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),
         distortion=result.distortion("output_angle_rad").reshape(shape),
         unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
-        response=(result.phasor("output_angle_rad") / amplitude).reshape(shape),
-        linear=start.output,
+        response=(result.phasor("output_angle_rad") / amplitude).reshape(shape), linear=start.output,
         onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
-        ticks=int(result.column("ticks").sum()),
-        coarser=counts != given,
-    )
+        ticks=int(result.column("ticks").sum()), coarser=counts != given,
+    )  # fmt: skip
 
 
 def slow_protection(design: Design, loops: Loops) -> list[str]:
@@ -225,23 +216,14 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     first_3 = np.array([_crossing(fine, between(row, fine_db), level) for row in gain])
     first_90 = np.array([_crossing(fine, between(row, fine_deg), -90.0) for row in phase])
     return AmplitudeBode(
-        load_Nm=amplitude_map.load_Nm,
-        frequency_hz=hz,
-        fractions=tuple(on_it),
-        amplitude_rad=amplitude_map.amplitude_rad[places],
-        gain_db=gain[places],
-        phase_deg=phase[places],
-        linear_db=fine_db[::FINE],
-        linear_deg=fine_deg[::FINE],
-        all_amplitude_rad=amplitude_map.amplitude_rad,
-        minus3db_hz=first_3,
-        minus90deg_hz=first_90,
+        load_Nm=amplitude_map.load_Nm, frequency_hz=hz, fractions=tuple(on_it),
+        amplitude_rad=amplitude_map.amplitude_rad[places], gain_db=gain[places], phase_deg=phase[places],
+        linear_db=fine_db[::FINE], linear_deg=fine_deg[::FINE], all_amplitude_rad=amplitude_map.amplitude_rad,
+        minus3db_hz=first_3, minus90deg_hz=first_90,
         minus3db_range_hz=np.array([crossing_range(hz, row, level) for row in gain]),
-        below_from_start=gain[:, 0] < level,
-        linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
-        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)),
-        level_db=level,
-    )
+        below_from_start=gain[:, 0] < level, linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
+        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)), level_db=level,
+    )  # fmt: skip
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:

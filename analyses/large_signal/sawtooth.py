@@ -145,17 +145,10 @@ def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float
     shown = slice(-PERIODS_SHOWN * period, None, max(1, PERIODS_SHOWN * period // POINTS))
     time = run.time_s[shown]
     return SawtoothRun(
-        load_Nm=load_Nm,
-        time_s=time - time[0],
-        reference_rad=run.reference_rad[shown],
-        output_rad=run.output_angle_rad[shown],
-        output_rate_rad_s=run.motor_speed_rad_s[shown] / N,
-        speed_command_rad_s=run.speed_command_rad_s[shown] / N,
-        current_A=run.current_A[shown],
-        gain=fundamental / amplitude,
-        lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0),
-        peak_rad=peak,
+        load_Nm=load_Nm, time_s=time - time[0], reference_rad=run.reference_rad[shown],
+        output_rad=run.output_angle_rad[shown], output_rate_rad_s=run.motor_speed_rad_s[shown] / N,
+        speed_command_rad_s=run.speed_command_rad_s[shown] / N, current_A=run.current_A[shown],
+        gain=fundamental / amplitude, lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0), peak_rad=peak,
         distortion=math.sqrt(max(rms**2 - fundamental**2 / 2.0, 0.0)) / (fundamental / math.sqrt(2.0)),
-        crest=peak / rms,
-        formula=formula,
-    )
+        crest=peak / rms, formula=formula,
+    )  # fmt: skip

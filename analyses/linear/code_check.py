@@ -32,8 +32,7 @@ class CodeCheck:
 
     def largest(self, *quantities: str) -> Row | None:
         """The entry of these quantities with the largest difference; ``None`` where none is measured."""
-        known = [e for e in self.entries if e.name in quantities]
-        return max(known, key=lambda e: e.error, default=None)
+        return max((e for e in self.entries if e.name in quantities), key=lambda e: e.error, default=None)
 
 
 def check_code(design: Design) -> CodeCheck:

@@ -117,14 +117,9 @@ class LoopFigures:
 
 
 def loop_figures(
-    loop: Loop,
-    response: Any = None,
-    *,
-    bandwidth: bool = True,
-    step: bool = True,
-    certify: bool = False,
+    loop: Loop, response: Any = None, *, bandwidth: bool = True, step: bool = True, certify: bool = False,
     mean: CommandMean | None = None,
-) -> LoopFigures:
+) -> LoopFigures:  # fmt: skip
     """Compute all figures of a loop; ``certify``: its margins by exact arithmetic, see `stability_margins`.
 
     Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
@@ -162,13 +157,9 @@ def _answering(
         return own if mean is None else commanded_step(response, own, mean)
 
     return replace(
-        figures,
-        plain_response=response,
-        bandwidth=_if_there_is(band, notes) if bandwidth else None,
-        step=_if_there_is(steps, notes) if step else None,
-        notes=tuple(dict.fromkeys(notes)),
-        mean=mean,
-    )
+        figures, plain_response=response, bandwidth=_if_there_is(band, notes) if bandwidth else None,
+        step=_if_there_is(steps, notes) if step else None, notes=tuple(dict.fromkeys(notes)), mean=mean,
+    )  # fmt: skip
 
 
 def _far_from_asked(name: str, dc_gain: float) -> list[str]:
@@ -191,13 +182,9 @@ def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
 
 
 def all_loop_figures(
-    loops: Loops,
-    *,
-    step: bool = True,
-    refused: list[str] | None = None,
-    certify: bool = False,
+    loops: Loops, *, step: bool = True, refused: list[str] | None = None, certify: bool = False,
     locked: bool | None = None,
-) -> dict[str, LoopFigures]:
+) -> dict[str, LoopFigures]:  # fmt: skip
     """Compute the figures of every loop that the design has, innermost first, by name; see `loop_figures`.
 
     A loop whose margins cannot be found is left out, and the reason added to ``refused`` where that is given.

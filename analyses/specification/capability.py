@@ -90,18 +90,13 @@ def _manoeuvre(
     thin = _thinned(speed, torque)
     rms = None if current is None else _rms(current)
     return Manoeuvre(
-        name=name,
-        load_Nm=load_Nm,
-        speed_rad_s=speed[thin],
-        torque_Nm=torque[thin],
-        rms_current_A=rms,
-        peak_current_A=None if current is None else float(current.max()),
-        rms_torque_Nm=_rms(torque),
+        name=name, load_Nm=load_Nm, speed_rad_s=speed[thin], torque_Nm=torque[thin], rms_current_A=rms,
+        peak_current_A=None if current is None else float(current.max()), rms_torque_Nm=_rms(torque),
         peak_torque_Nm=float(np.max(np.abs(torque))),
         duty=thermal_duty(design, rms) if period is not None else None,
         limits={key: use.fraction for key, use in run.limits.items() if use.active},
         periodic=period is not None,
-    )
+    )  # fmt: skip
 
 
 def _rms(values: np.ndarray) -> float:
@@ -112,8 +107,7 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
     spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
-    places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
-    return np.unique(np.minimum(places, len(way) - 1))
+    return np.unique(np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], POINTS)), len(way) - 1))
 
 
 @dataclass(frozen=True)

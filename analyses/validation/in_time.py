@@ -4,8 +4,8 @@ The step is injected at the place on the operating motion; the simulated answer 
 at every sample.  Beside a gain margin K the drive is started on the critical mode of its own tangent, at
 K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and w its left eigenvector,
 ``w^H (s - s_calm)`` is multiplied by the predicted eigenvalue in every period, exactly.  No window is
-searched, nothing waited for.  A sine begins in the steady state that it has by the tangent, and its fundamentals
-are correlated over whole periods: what a frequency-response analyser on the bench would see.
+searched, nothing waited for.  A sine begins in the steady state that it has by the tangent, its fundamentals
+correlated over whole periods: what a frequency-response analyser on the bench would see.
 """
 
 from collections.abc import Callable

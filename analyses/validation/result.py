@@ -118,9 +118,7 @@ class Validation:
             return Verdict.NOT_MET
         doubts = [not self.waived(f"stable-{name}") for name in self.undecided]
         doubts.append(self.rest is Verdict.NOT_PROVEN and waiver_of_rest(self.design) is None)
-        if not self.rows or any(doubts):
-            return Verdict.NOT_PROVEN
-        return self.tally.verdict
+        return Verdict.NOT_PROVEN if not self.rows or any(doubts) else self.tally.verdict
 
     @property
     def passed(self) -> bool:

@@ -36,15 +36,9 @@ class Row:
 
 
 def judged(
-    name: str,
-    loop: str,
-    predicted: float | None,
-    found: float | None,
-    allowed: float,
-    *,
-    resolved: bool = True,
-    **words: str,
-) -> Row:
+    name: str, loop: str, predicted: float | None, found: float | None, allowed: float, *,
+    resolved: bool = True, **words: str,
+) -> Row:  # fmt: skip
     """Judge one number: both there and within ``allowed``, or both absent.
 
     ``resolved`` says whether the measurement is good enough to tell a wrong prediction; ``words`` are unit,

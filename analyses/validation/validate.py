@@ -43,12 +43,9 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: AnyDesign,
-    settings: Settings | None = None,
-    progress: Progress = None,
-    *,
+    design: AnyDesign, settings: Settings | None = None, progress: Progress = None, *,
     model: Design | None = None,
-) -> Validation:
+) -> Validation:  # fmt: skip
     """Check every prediction of a design by the nonlinear simulator.
 
     ``settings``: which findings are looked for beside the checks; by default all.

@@ -108,14 +108,9 @@ def _kept_gains(variants: Sequence[Any]) -> Iterable[str]:
 
 
 def answer(
-    one: Analysis,
-    subject: Design | Study | None,
-    *,
-    as_json: bool,
-    out: Path | None = None,
-    quiet: bool = False,
-    **chosen: Any,
-) -> None:
+    one: Analysis, subject: Design | Study | None, *, as_json: bool, out: Path | None = None,
+    quiet: bool = False, **chosen: Any,
+) -> None:  # fmt: skip
     from actuator_lti.design import warnings_of
     from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated

@@ -31,15 +31,10 @@ NO_MOVE = (
 
 
 def section(
-    figures: Mapping[str, LoopFigures],
-    items: Sequence[doc.VerdictItem],
-    sections: Sequence[doc.Section],
-    point: WeakPoint | None = None,
-    ranges: Mapping[str, Mapping[str, Spread]] | None = None,
-    *,
-    bounds: Corners | None = None,
-    mend: str = "",
-) -> doc.Section:
+    figures: Mapping[str, LoopFigures], items: Sequence[doc.VerdictItem], sections: Sequence[doc.Section],
+    point: WeakPoint | None = None, ranges: Mapping[str, Mapping[str, Spread]] | None = None, *,
+    bounds: Corners | None = None, mend: str = "",
+) -> doc.Section:  # fmt: skip
     """Make the first screen from the loops, the verdicts on the requirements and all other sections.
 
     ``point`` is the weakest of all views and ``mend`` the words of the move that mends it; ``ranges`` are the
