@@ -263,20 +263,17 @@ def test_a_changed_value_says_what_it_was_with_its_relative_tolerance_or_the_abs
     assert absolute == emps.parameters["motor.rotor_inertia"].tolerance
 
 
-@pytest.mark.parametrize(
-    ("values", "says"),
-    [
-        ({"motor.resistence": 1.0}, 'nearest known: "motor.resistance"'),
-        ({"gear.bevel.ratio": 2.0}, "has no gear.bevel"),
-        ({"gear.ratio": 2.0}, "unknown parameter"),
-        ({"friction.law": 1.0}, "unknown parameter"),
-        ({"motor.resistance": -1.0}, "above 0"),
-        ({"motor.resistance": float("nan")}, "above 0"),
-        ({"motor.resistance": True}, "a number"),
-        ({"control.velocity.every": 1.5}, "whole number"),
-        ({"motor.back_emf_constant": 0.01}, "within 10 %"),
-    ],
-)
+@pytest.mark.parametrize(("values", "says"), [
+    ({"motor.resistence": 1.0}, 'nearest known: "motor.resistance"'),
+    ({"gear.bevel.ratio": 2.0}, "has no gear.bevel"),
+    ({"gear.ratio": 2.0}, "unknown parameter"),
+    ({"friction.law": 1.0}, "unknown parameter"),
+    ({"motor.resistance": -1.0}, "above 0"),
+    ({"motor.resistance": float("nan")}, "above 0"),
+    ({"motor.resistance": True}, "a number"),
+    ({"control.velocity.every": 1.5}, "whole number"),
+    ({"motor.back_emf_constant": 0.01}, "within 10 %"),
+])  # fmt: skip
 def test_an_impossible_change_is_refused(values: dict[str, float], says: str) -> None:
     """Relations may be left unchecked for sampling, but not ranges."""
     refused(with_values, AMBER, values, match=says)

@@ -128,17 +128,14 @@ def test_the_periodic_response_is_that_of_the_time_invariant_system(name: str) -
     assert result.slowest == pytest.approx(np.abs(lifted.poles()).max(), rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("name", "values", "quantities"),
-    [
-        ("ballscrew", {"coupling.stiffness": [4e7, 1e8, 3e8], "control.position.gain": [20.0, 60.0, 90.0]},
-         ("static_stiffness", "least_stiffness", "lost_motion")),
-        # delays of whole and broken ticks, damping of zero: other states, other zeros, taken group by group
-        ("fin",
-         {"control.computing_delay": [0.0, 1e-4, 2e-4, 5e-4], "coupling.damping": [0.0, 0.05, 0.05, 0.0]},
-         ("least_stiffness",)),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "values", "quantities"), [
+    ("ballscrew", {"coupling.stiffness": [4e7, 1e8, 3e8], "control.position.gain": [20.0, 60.0, 90.0]},
+     ("static_stiffness", "least_stiffness", "lost_motion")),
+    # delays of whole and broken ticks, damping of zero: other states, other zeros, taken group by group
+    ("fin",
+     {"control.computing_delay": [0.0, 1e-4, 2e-4, 5e-4], "coupling.damping": [0.0, 0.05, 0.05, 0.0]},
+     ("least_stiffness",)),
+])  # fmt: skip
 def test_stacked_designs_have_the_figures_of_each_alone(name, values, quantities):
     design, count = load_design(name), len(next(iter(values.values())))
     stacked = {path: np.array(each) for path, each in values.items()}
