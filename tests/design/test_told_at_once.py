@@ -4,19 +4,14 @@ import copy
 from typing import Any
 
 import pytest
-from control import tf
 from test_fuzz import leaves
 
-from actuator_lti import assemble_loops, sweep
 from actuator_lti.design import design_tree, load_design
 from actuator_lti.design.loader import design_from_tree, design_text
 from actuator_lti.design.writing import _override
 from actuator_lti.errors import InputError, Mistakes
-from actuator_lti.loops.delay_budget import delay_budget
-from actuator_lti.loops.limiters import onset
 from analyses.studies.study import load_study
-from nonlinear import Probe, commands, simulate
-from tests.refusals import mistakes, refused
+from tests.refusals import mistakes
 
 AMBER = load_design("ilr33-amber")
 RATIO = {"gear.planetary.ratio", "gear.worm.ratio"}
@@ -208,21 +203,3 @@ def test_no_mistake_hides_another_or_ends_in_a_traceback() -> None:
     assert "gear[3].name: missing" in line
     lines = mistakes(design_text("emps") + '[control.current]\ngain = "500 Hz"\n').split("\n")
     assert any("control.current = a table: not allowed with motor.source_gain" in line for line in lines)
-
-
-@pytest.mark.parametrize(("call", "words"), [
-    (lambda: delay_budget("ilr33-amber", "velocity", "a"), "frequency_rad_s = 'a'"),
-    (lambda: onset(assemble_loops(AMBER), "a"), "omega_rad_s = 'a'"),
-    (lambda: onset(assemble_loops(AMBER), float("nan")), "omega_rad_s = nan"),
-    (lambda: onset(assemble_loops(AMBER), 1.0, 3), "bias = 3"),
-    (lambda: onset(assemble_loops(AMBER), 1.0, {"curent": 1.0}), "curent"),
-    (lambda: onset("ilr33-amber", 1.0), "assemble_loops"),
-    (lambda: Probe(point="u", gain="x"), "probe gain = 'x'"),
-    (lambda: simulate(AMBER, commands.step(0.01), 0.01, progress=5), "progress = 5"),
-    (lambda: simulate(AMBER, commands.step(0.01), 0.01, tanh_tolerance=0), "tanh_tolerance = 0"),
-    (lambda: simulate(AMBER, commands.step(0.01), 0.01, friction_on="x"), "friction_on"),
-    (lambda: AMBER.with_law("velocity", tf([1.0, 0.0], [1.0], 1e-3), ["error"]), "system: improper"),
-    (lambda: sweep(AMBER, "limits.voltage", "10 V"), "allowed: several"),
-])  # fmt: skip
-def test_a_wrong_argument_is_named_with_what_is_allowed(call, words: str) -> None:
-    refused(call, words=words)

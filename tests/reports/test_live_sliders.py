@@ -10,7 +10,7 @@ from html import unescape
 
 import numpy as np
 import pytest
-from live_page import AMBER, HOSTILE, Page, command_line, page_text, same_figures, written
+from live_page import AMBER, Page, command_line, page_text, same_figures, written
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import Design, check_design, with_values
@@ -179,14 +179,6 @@ def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     assert float(rest.replace("−", "-")) < 1e-9
     page.settled(lambda: page.click(".dropped button"))
     assert page.locator('[data-chart="difference"]').is_hidden()
-
-
-def test_nothing_of_a_design_becomes_markup(opens) -> None:
-    design = replace(AMBER, name=HOSTILE, title=HOSTILE, description=HOSTILE)
-    result = opens(design)
-    result.type_value("control.position.gain", 130.0)
-    result.click('[data-do="file"]')
-    assert HOSTILE.split("\u202e")[0].split('"')[0] in result.input_value(".sheet textarea")
 
 
 def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
