@@ -76,8 +76,7 @@ class LoopSurvey:
 
     design: Design
     loops: Loops  # sampled, sliding, no load
-    # By form, then by loop; step figures of the sampled form only
-    forms: Mapping[str, Mapping[str, LoopFigures]]
+    forms: Mapping[str, Mapping[str, LoopFigures]]  # by form, then by loop; step figures of the sampled
     break_points: Mapping[str, BreakPoint]
     operating_points: tuple[OperatingPointFigures, ...]
     budgets: Mapping[str, DelayBudget]  # at the lowest gain crossover of each loop that has one
@@ -148,17 +147,14 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
-    """Measure the loops in a form other than the sampled one."""
     return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
 
 
 def _break_points(loops: Loops) -> dict[str, BreakPoint]:
-    """Measure the loop at every break point."""
     return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
-    """Measure the loop at one break point."""
     loop = loops.break_points[name]
     exact, states = exact_margins(loops, name) if loop.periodic else None, len(loop.plain_open.A)
     if exact is not None and states > MOST_STATES:
