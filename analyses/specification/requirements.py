@@ -121,12 +121,10 @@ class RequirementVerdict:
 
     @property
     def passes(self) -> bool:
-        """Whether it is met, or waived."""
         return self.verdict.passes(waived=self.waiver is not None)
 
     @property
     def role(self) -> Role:
-        """The colour of it."""
         return self.verdict.role(waived=self.waiver is not None)
 
 

@@ -72,8 +72,7 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
         bottom.curve(curve.frequency_hz, phase, name, **style.series(k))
     style.frequency(bottom, shown[0].frequency_hz)
     style.phase_axis(bottom, np.concatenate(phases))
-    caption = "Dynamic stiffness of the output, powered and unpowered."
-    return [doc.figure("stiffness", chart, caption)]
+    return [doc.figure("stiffness", chart, "Dynamic stiffness of the output, powered and unpowered.")]
 
 
 def _table(result: Stiffness, unit: str) -> doc.Block:
@@ -98,8 +97,7 @@ def _state(result: Stiffness, curve: StiffnessCurve) -> str:
 
 
 def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
-    loaded = any(one.load_Nm for one in result.curves)
-    return f", {curve.load_Nm:g} {result.design.load_unit}" * loaded
+    return f", {curve.load_Nm:g} {result.design.load_unit}" * any(one.load_Nm for one in result.curves)
 
 
 def _or_infinite(stiffness: float) -> float | str:

@@ -199,17 +199,14 @@ def test_section_and_refusal() -> None:
         limit_cycles(changed(FIN, controller={"position": None}))
 
 
-@pytest.mark.parametrize(
-    ("ratio", "hertz", "verdict"),
-    [
-        (1.0, 10.0, "confirmed"),
-        (1.2, 8.5, "confirmed"),
-        (1.0, 20.0, "refuted"),
-        (1.0, None, "refuted"),
-        (1.8, 10.0, "refuted"),
-        (None, None, "refuted"),
-    ],
-)
+@pytest.mark.parametrize(("ratio", "hertz", "verdict"), [
+    (1.0, 10.0, "confirmed"),
+    (1.2, 8.5, "confirmed"),
+    (1.0, 20.0, "refuted"),
+    (1.0, None, "refuted"),
+    (1.8, 10.0, "refuted"),
+    (None, None, "refuted"),
+])  # fmt: skip
 def test_confirmed_is_a_cycle_of_about_the_predicted_size_and_frequency(ratio, hertz, verdict) -> None:
     cycle = Cycle("play", False, 1e-3, 1e-3, 10.0, True, {})
     assert Confirmation(cycle, ratio, hertz).verdict == verdict
