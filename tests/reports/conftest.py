@@ -5,35 +5,38 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from filelock import FileLock
 from live_page import AMBER, Built, opened, written
 
 from actuator_lti import Design
 from analyses.validation import Settings, validate
 from reports.build import design_report
+from reports.document import load
 from reports.html import write_report
 from reports.sections.validation import section
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory) -> Built:
-    """Build the report of ilr33-amber at a fixed time, with a coarse validation."""
-    findings = ("injected sweep", "motion from rest", "large signals")
+def built(shared: Path) -> Built:
+    """The report of ilr33-amber at a fixed time, with a coarse validation."""
+    folder, findings = shared / "report", ("injected sweep", "motion from rest", "large signals")
     coarse = Settings(findings=findings, rest_frequencies=10, map_counts=(10, 16))
-    with pytest.MonkeyPatch.context() as patch:
+    with pytest.MonkeyPatch.context() as patch, FileLock(f"{folder}.lock"):
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        document = design_report(AMBER, section(validate(AMBER, coarse)))
-    page, data = write_report(document, tmp_path_factory.mktemp("report"))
-    return Built(document, page, data)
+        if not (folder / "report.json").exists():
+            write_report(design_report(AMBER, section(validate(AMBER, coarse))), folder)
+    data = folder / "report.json"
+    return Built(load(data), data.with_suffix(".html"), data)
 
 
 @pytest.fixture
-def opens(browser, tmp_path) -> Iterator[Callable[..., Any]]:
+def opens(browser, shared) -> Iterator[Callable[..., Any]]:
     """Open pages, of a design or from disk; in the end none has complained or asked for anything."""
     trouble: list[str] = []
     pages = []
 
     def call(what: Design | Path, fragment: str = "", **options: Any) -> Any:
-        path = written(what, tmp_path) if isinstance(what, Design) else what
+        path = written(what, shared) if isinstance(what, Design) else what
         pages.append(opened(browser, path, trouble, fragment, **options))
         return pages[-1]
 
