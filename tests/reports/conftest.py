@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from filelock import FileLock
 from live_page import AMBER, Built, opened, written
 
 from actuator_lti import Design
@@ -17,26 +16,28 @@ from reports.sections.validation import section
 
 
 @pytest.fixture(scope="session")
-def built(shared: Path) -> Built:
+def built(once: Callable[..., Path]) -> Built:
     """The report of ilr33-amber at a fixed time, with a coarse validation."""
-    folder, findings = shared / "report", ("injected sweep", "motion from rest", "large signals")
+    findings = ("injected sweep", "motion from rest", "large signals")
     coarse = Settings(findings=findings, rest_frequencies=10, map_counts=(10, 16))
-    with pytest.MonkeyPatch.context() as patch, FileLock(f"{folder}.lock"):
+
+    def write(folder: Path) -> None:
+        write_report(design_report(AMBER, section(validate(AMBER, coarse))), folder)
+
+    with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        if not (folder / "report.json").exists():
-            write_report(design_report(AMBER, section(validate(AMBER, coarse))), folder)
-    data = folder / "report.json"
+        data = once("report", write) / "report.json"
     return Built(load(data), data.with_suffix(".html"), data)
 
 
 @pytest.fixture
-def opens(browser, shared) -> Iterator[Callable[..., Any]]:
+def opens(browser, once) -> Iterator[Callable[..., Any]]:
     """Open pages, of a design or from disk; in the end none has complained or asked for anything."""
     trouble: list[str] = []
     pages = []
 
     def call(what: Design | Path, fragment: str = "", **options: Any) -> Any:
-        path = written(what, shared) if isinstance(what, Design) else what
+        path = written(what, once) if isinstance(what, Design) else what
         pages.append(opened(browser, path, trouble, fragment, **options))
         return pages[-1]
 

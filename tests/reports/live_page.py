@@ -2,12 +2,12 @@
 
 import json
 import math
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
-from filelock import FileLock
 from typer.testing import CliRunner
 
 from actuator_lti import Design, load_design
@@ -50,13 +50,13 @@ class Built(NamedTuple):
     data: Path
 
 
-def written(design: Design, shared: Path) -> Path:
+def written(design: Design, once: Callable[..., Path]) -> Path:
     """The page of a design without validation on disk, built once for all tests of a run."""
-    path = shared / f"{sha256(write_design(design).encode()).hexdigest()}.html"
-    with FileLock(f"{path}.lock"):
-        if not path.exists():
-            path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
-    return path
+
+    def write(path: Path) -> None:
+        path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
+
+    return once(f"{sha256(write_design(design).encode()).hexdigest()}.html", write)
 
 
 def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:

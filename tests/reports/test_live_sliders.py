@@ -190,9 +190,9 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
-def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(browser, shared):
+def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(browser, once):
     page = browser.new_context(offline=True, java_script_enabled=False).new_page()
-    path = written(AMBER, shared)
+    path = written(AMBER, once)
     page.goto(path.as_uri())
     assert page.locator("#hands-on").is_hidden()
     assert page.locator("#verdicts").is_visible()
