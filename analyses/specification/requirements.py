@@ -176,12 +176,13 @@ NOT_STATED = "the design does not state what this needs"
 
 
 def judged_by(design: Design, analysis: str, result: object) -> tuple[RequirementVerdict, ...]:
-    """Judge the requirements on what one analysis finds, ``failures`` or ``duty``, by its result."""
+    """Judge the requirements on what ``failures``, ``duty`` or ``stiffness`` finds, by its result."""
 
     def found(name: str) -> tuple[float | None, str]:
         return QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis), ""
 
-    own = {name for name, one in QUANTITIES.items() if one.reader.startswith(f"{analysis}.")}
+    of = analysis, f"{analysis}."
+    own = {name for name, one in QUANTITIES.items() if one.source in of or one.reader.startswith(of)}
     asked = (one for one in design.requirements if one.quantity in own)
     return tuple(verdict for one in asked for verdict in judged(design, one, {}, found))
 
