@@ -68,8 +68,7 @@ class Differences:
     def _led(self) -> None:
         """Let the commands before the first be those of the motion: else it is fed forward to there.
 
-        What an integral of the position holds of a standing drive, and the error before the first, is in no
-        row, either.
+        What an integral of the position holds of a standing drive is in no row, either.
         """
         setup, start = self.setup, self.drive.start
         place, N, speed = setup.design.controller.position, setup.design.total_ratio, setup.bias.speed_rad_s
@@ -81,7 +80,6 @@ class Differences:
         now = -N * size * since_s if speed else N * size
         period_s = place.every * setup.design.controller.period_s
         start[[at.S_REFERENCE, at.S_REFERENCE_BEFORE]] = now - speed * period_s * np.array([1.0, 2.0])
-        start[at.S_ERROR] = now - N * setup.bias.output_rad(setup.design) * (place.sensor == "output")
 
     def parts(self) -> Iterator[tuple[Parts, Floats, float]]:
         """A, B, C, D; stated errors of A over C beside B over D; the largest of the response, relative.

@@ -54,14 +54,11 @@ def _result(result: Stiffness, unit: str) -> str:
     first = result.curves[0]
     if np.isfinite(first.stiffness_Nm_rad).any():
         powered = [one for one in result.curves if (one.state, one.load_Nm) == ("powered", first.load_Nm)]
-        slow = min(powered, key=lambda one: one.static_Nm_rad)
+        static = min(one.static_Nm_rad for one in powered)
         weak = min(powered, key=lambda one: one.least)
-        static, (least, at) = slow.static_Nm_rad, weak.least
-        words = "infinite (the drive comes back)"
-        if math.isfinite(static):
-            words = f"{short(static, 4)} {unit}{_way(slow, ' ({})')}"
-        words = f"Powered{_at_load(result, first)}, the static stiffness is {words}"
-        words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz{_way(weak, ' ({})')}"
+        words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
+        words = f"Powered{_at_load(result, first)}, the static stiffness is {words}; the least is "
+        words += f"{short(weak.least[0], 4)} {unit} at {weak.least[1]:.3g} Hz{_way(weak, ' ({})')}"
     if result.checks:
         most, lost = max(check.difference for check in result.checks), result.lost_motion_difference
         count = len({check.frequency_hz for check in result.checks})
