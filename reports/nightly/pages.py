@@ -45,14 +45,8 @@ NIGHT_SIGNS = {
 
 def index(night: Overview, folder: str) -> str:
     """Make the page that stands at the root of the site; its links lead into ``folder``."""
-    return _render(
-        "nightly/index.html",
-        asset("nightly/nightly.js"),
-        night=night,
-        folder=folder,
-        STATE_ORDER=tuple(STATES),
-        headlines=changes.headlines(night.designs)[:MAX_HEADLINES],
-    )
+    told = {"headlines": changes.headlines(night.designs)[:MAX_HEADLINES], "STATE_ORDER": tuple(STATES)}
+    return _render("nightly/index.html", asset("nightly/nightly.js"), night=night, folder=folder, **told)
 
 
 def of_night(night: Overview, history: History, available: set[str]) -> Iterator[tuple[str, str]]:
@@ -69,16 +63,10 @@ def design_page(night: Overview, design: DesignView, history: History, available
     past = history.results(design.name)
     course = course_of(night, design, history, past)
     return _render(
-        "nightly/design.html",
-        bundled("figures"),
-        night=night,
-        design=design,
-        charts=course.charts,
-        steady=course.steady,
-        nights=_nights(night, design, past, course, available),
-        more_nights=max(0, len(past) - MAX_NIGHTS),
-        max_changes=changes.SHOWN_CHANGES,
-    )
+        "nightly/design.html", bundled("figures"), night=night, design=design, charts=course.charts,
+        steady=course.steady, nights=_nights(night, design, past, course, available),
+        more_nights=max(0, len(past) - MAX_NIGHTS), max_changes=changes.SHOWN_CHANGES,
+    )  # fmt: skip
 
 
 def _render(template: str, code: str, **context: Any) -> str:
