@@ -80,9 +80,8 @@ def _nights(
     night: Overview, design: DesignView, past: list[Result], course: Course, available: set[str]
 ) -> list[Tree]:
     """Rows of the table of nights, the last first, with rows for nights that are missing (``gap``)."""
-    known, states = {r.run: r for r in past}, outcomes(past)
+    known, states, rows = {r.run: r for r in past}, outcomes(past), list[Tree]()
     gaps = {night.runs[i].id: count for i, count in night.missing}
-    rows: list[Tree] = []
     for run in reversed(night.runs):
         if (past and run.id < past[0].run) or len(rows) >= MAX_NIGHTS:
             break
@@ -152,9 +151,8 @@ def _add(
     for point in points:
         course.marks.setdefault(nights[point.index][0], []).append((figure, point))
     title, started = verdict.get("label", figure.name), [start for _, start in nights]
-    drawn = line_chart(
-        title, figure.unit, started, values, points, verdict.get("bound"), f"t{len(course.charts)}"
-    )
+    limit, prefix = verdict.get("bound"), f"t{len(course.charts)}"
+    drawn = line_chart(title, figure.unit, started, values, points, limit, prefix)
     shown = [(started[p.index][:10], p) for p in points]
     about = {"title": title, "id": verdict.get("id", ""), "unit": figure.unit, "flaps": to_and_fro}
     course.charts.append({**about, "svg": Markup(drawn), "points": shown})
