@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
-from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, slope_at
+from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, runs, slope_at
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import ExactMargins, Loops, assemble_loops, exact_margins
 from actuator_lti.loops.assemble import loops_at
@@ -60,11 +60,12 @@ class OperatingPointFigures:
     slope_Nms_rad: float  # slope of the friction torque over the motor speed
     figures: Mapping[str, LoopFigures]
     load_unit: str = "N m"
+    design: Design | None = None  # where it is not the design itself: another angle, or in motion
 
     @property
     def place(self) -> str:
         """Label and load in words; empty where the dry part slides, as the loops are judged."""
-        if self.kind == "sliding":
+        if self.label == SLIDING:
             return ""
         return self.label if self.load_Nm is None else f"{self.label}, load {self.load_Nm:g} {self.load_unit}"
 
@@ -168,7 +169,9 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 def operating_points(
     design: Design, refused: list[str], load_Nm: float = 0.0, *, described: bool = True, certify: bool = True
 ) -> tuple[OperatingPointFigures, ...]:
-    """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
+    """Measure the loops at each operating point that the drive has.
+
+    Sliding, on a crest and in a notch of what a motion averages, driving, driven, in the gap, at rest.
 
     ``refused`` gets the loops whose margins are not found, and why; ``load_Nm``: at the output, of the points
     that are not told at a load: it chooses the piece of a spring that bends; ``described``: friction
@@ -176,14 +179,19 @@ def operating_points(
     """
 
     def point(
-        label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
+        label: str,
+        load: float | None,
+        kind: OperatingPoint,
+        speed: float | None = None,
+        there: Design | None = None,
     ) -> OperatingPointFigures:
         at = Operating(point=kind, load_Nm=load_Nm if load is None else load, speed_amplitude_rad_s=speed)
-        slope, loops = slope_at(design, at), loops_at(design, at)
+        slope, loops = slope_at(design, at), loops_at(there or design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
-        return OperatingPointFigures(kind, label, load, slope, figures, design.load_unit)
+        return OperatingPointFigures(kind, label, load, slope, figures, design.load_unit, there)
 
-    points = [point("sliding", None, "sliding")]
+    points = [point(SLIDING, None, "sliding")]
+    points += [point(label, None, "sliding", there=there) for label, there in turned(design)]
     if design.coupling is not None and design.friction.load_coefficient:
         points.append(point("load driven by the motor", None, "driving"))
         points.append(point("motor driven by the load", None, "driven"))
@@ -199,7 +207,24 @@ def operating_points(
     return tuple(points)
 
 
-AT_REST = "at rest"
+SLIDING, AT_REST = "sliding", "at rest"
+
+
+def turned(design: Design) -> Iterator[tuple[str, Design]]:
+    """The drive where its cogging or gear error is steepest, and in a motion that averages them.
+
+    On a crest it drives the rotor away, in a notch it holds it: margins are extreme there.
+    """
+    motor, load = design.motor, design.load
+    if runs(design) or not (motor.cogging_Nm or load.gear_error_Nm):
+        return
+    for where, phase in (("on a crest", 0.0), ("in a notch", np.pi)):
+        if motor.cogging_Nm:
+            yield f"{where} of the cogging", replace(design, motor=replace(motor, cogging_phase_rad=phase))
+        if load.gear_error_Nm:
+            at = replace(load, gear_error_phase_rad=phase)
+            yield f"{where} of the gear error", replace(design, load=at)
+    yield "in motion", replace(design, motor=motor.straight(), load=replace(load, gear_error_Nm=0.0))
 
 
 def at_rest(design: Design) -> str:

@@ -67,7 +67,8 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
         yield _at_break_point(name, point)
     for one in survey.operating_points:
         if one.kind != "describing-function":
-            yield from _loops(one.place, one.figures, kind=one.kind, load_Nm=one.load_Nm or 0.0)
+            at = {"kind": one.kind, "load_Nm": one.load_Nm or 0.0, "design": one.design}
+            yield from _loops(one.place, one.figures, **at)
     for corner in corners.corners[1:] if corners else ():
         place = corner.name.replace("worst ", "tolerances of the worst ", 1)
         yield from _loops(place, corner.figures, design=corner.design)
