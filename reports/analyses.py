@@ -138,13 +138,13 @@ ANALYSES = (
         "stiffness", LINEAR, function="analyses.stiffness.stiffness", words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
-        Met where the simulator agrees; not proven where no position loop holds the
-        output. The exit status is 1 where it is not met, or not proven.
+        Met where the simulator agrees and the requirements on them are met; not proven where no
+        position loop holds the output. The exit status is 1 where it is not met, or not proven.
 
         Try: actuator-lti stiffness joint
         """,
     ),
-    Analysis("corners", LINEAR, CornersAsked, also=True),
+    Analysis("corners", LINEAR, CornersAsked, also=True, doing="judging"),
     Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),
