@@ -68,6 +68,8 @@ class Operating:
         """The same, refused where the design has no such operating point."""
         if self.point in ("driving", "driven", "gap") and design.coupling is None:
             raise InputError(f"operating_point = {self.point!r}: the design has no coupling")
+        if self.rotor == "locked" and not design.motor.has_electrical_dynamics:
+            raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
         return self
 
 
@@ -80,11 +82,9 @@ def slope_at(design: Design, at: Operating) -> Any:
     """
     if at.point == "describing-function":
         return sum(_described(design, at, way) for way in (1, -1)) / 2
-    slope: Any = design.friction.viscous(at.direction)
-    if points := design.friction.map(at.direction):
-        (_, slope), *others = segments(points)
-        for start, following in others:
-            slope = np.where(start <= abs(at.speed_rad_s), following, slope)[()]
+    (_, slope), *others = friction_slopes(design, at.direction)
+    for start, following in others:
+        slope = np.where(start <= abs(at.speed_rad_s), following, slope)[()]
     if at.point == "rest":
         slope = slope + dry_torque(design, at.load_Nm, at.direction) / design.friction.smoothing_speed_rad_s
     return slope
@@ -92,10 +92,9 @@ def slope_at(design: Design, at: Operating) -> Any:
 
 def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
     """Tc = C0 + CM |M_ext| in N m at the motor; C0 is the first torque of a friction map."""
-    points, dry = design.friction.map(direction), design.friction.dry_Nm(load_Nm, direction)
-    if not points:
-        return dry
-    return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
+    if points := design.friction.map(direction):
+        return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
+    return design.friction.dry_Nm(load_Nm, direction)
 
 
 def rubs(design: Design) -> bool:
@@ -119,13 +118,10 @@ def friction_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
 
 
 def _described(design: Design, at: Operating, way: int) -> Any:
-    W, points = at.speed_amplitude_rad_s, design.friction.map(way)
+    W = at.speed_amplitude_rad_s
     assert W is not None
-    dry = described_dry(dry_torque(design, at.load_Nm, way), W)
-    if not points:
-        return design.friction.viscous(way) + dry
-    total, last = dry, 0.0
-    for start, slope in segments(points):
+    total, last = described_dry(dry_torque(design, at.load_Nm, way), W), 0.0
+    for start, slope in friction_slopes(design, way):
         total, last = total + (slope - last) * dead_zone(start / W), slope
     return total
 
@@ -197,17 +193,14 @@ def _moving(design: Design, at: Operating) -> bool:
 
 def torque_slope(design: Design, at: Operating) -> Any:
     """dT/d(motor angle) of the motor's own torque, in the same way."""
-    if at.torques_held:
-        return 0.0
     angle = _motor_angle_rad(design, at.angle_rad, at.twist_rad)
-    return design.motor.over_angle.slope_at(angle, moving=_moving(design, at))
+    return 0.0 if at.torques_held else design.motor.over_angle.slope_at(angle, moving=_moving(design, at))
 
 
 def moment_slope(design: Design, at: Operating) -> Any:
     """dM_ext/d(output angle) in N m/rad at the operating point; a float, or an array of stacked designs."""
-    if at.torques_held:
-        return 0.0
-    return design.load.over_angle.slope_at(at.angle_rad, moving=_moving(design, at))
+    slope_at = design.load.over_angle.slope_at
+    return 0.0 if at.torques_held else slope_at(at.angle_rad, moving=_moving(design, at))
 
 
 def pushes_away(design: Design, at: Operating) -> Any:
@@ -219,10 +212,8 @@ def pushes_away(design: Design, at: Operating) -> Any:
 
 
 def level(design: Design) -> Design:
-    """The same drive without what changes with the angle."""
     return replace(design, motor=design.motor.level(), load=design.load.level())
 
 
 def straight(design: Design) -> Design:
-    """The same drive without what bends with the angle."""
     return replace(design, motor=design.motor.straight(), load=design.load.straight())
