@@ -151,7 +151,7 @@ ANALYSES = (
         Try: actuator-lti stiffness joint
         """,
     ),
-    Analysis("corners", LINEAR, CornersAsked, also=True),
+    Analysis("corners", LINEAR, CornersAsked, also=True, doing="judging"),
     Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),

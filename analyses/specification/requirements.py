@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
@@ -12,7 +12,7 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
+from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops, with_unit
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
@@ -21,6 +21,7 @@ from actuator_lti.design.suspicions import beyond_profile
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Progress
 from analyses.linear.loop_figures import HELD, LoopFigures, all_loop_figures
 
 if TYPE_CHECKING:
@@ -28,11 +29,12 @@ if TYPE_CHECKING:
 
 
 def evaluate_requirements(
-    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None
+    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None, progress: Progress = None
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 
     ``figures`` are those of the sampled, sliding loops, computed where left out.
+    ``progress``: called with (requirements judged, requirements in all).
 
     Raises `InputError`: if a requirement names a quantity or a loop that is not known.
     """
@@ -46,11 +48,38 @@ def evaluate_requirements(
 
         return AskedFigures(design)
 
-    return tuple(
-        _with_limits(design, verdict)
-        for requirement in design.requirements
-        for verdict in judged(design, requirement, figures, lambda name: asked().figure(name))
-    )
+    made: list[RequirementVerdict] = []
+    for done, requirement in enumerate(design.requirements):
+        if progress is not None:
+            progress(done, len(design.requirements))
+        found = judged(design, requirement, figures, lambda name: asked().figure(name))
+        made += [_with_limits(design, verdict) for verdict in found]
+    return tuple(made)
+
+
+def judged_nominally(
+    design: Design,
+    left: Sequence[Requirement],
+    figures: Mapping[str, LoopFigures] | None,
+    untold: str,
+    progress: Progress = None,
+) -> tuple[RequirementVerdict, ...]:
+    """Judge in the nominal design what is not asked of its variants: not met, or else not proven of all.
+
+    ``untold``: why it is not asked of them. The rest is as in `evaluate_requirements`.
+    """
+    if not left:
+        return ()
+
+    def of_all(one: RequirementVerdict) -> RequirementVerdict:
+        if one.verdict is not Verdict.NOT_MET:
+            waiver = design.waiver_of(one.id)
+            return replace(one, verdict=Verdict.NOT_PROVEN, reason=untold, waiver=waiver)
+        found = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".4g")
+        return replace(one, reason=f"fails in the nominal design: {found}")
+
+    nominal = replace(design, requirements=tuple(left))
+    return tuple(map(of_all, evaluate_requirements(nominal, figures, progress)))
 
 
 def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:

@@ -79,22 +79,17 @@ THREE_LAGS = control.tf([9e3], np.polymul([1.0, 1e3, 1e6], [1e-3, 1.0]))
 
 
 @pytest.mark.parametrize("certify", [False, True])
-@pytest.mark.parametrize(
-    ("loop", "delay_s", "db"),
-    [
-        (1 / s, 1e-3, 20 * math.log10(500 * math.pi)),
-        (1 / s, 1e-6, 20 * math.log10(5e5 * math.pi)),
-        (1e-9 / s, 1.0, 20 * math.log10(5e8 * math.pi)),
-        (1e-9 / s, 1e-3, math.inf),  # 243.9 dB
-        (THREE_LAGS, 1e-9, 50.45756),  # 8/0.009 at 1000 sqrt(2) rad/s without the delay: 50.45757
-        (control.tf([0.5], [1, 1]), 1e6, 20 * math.log10(2.0)),
-        (control.tf([0.01], [1, 1]), 1e5, 40.0),
-        (control.tf([1.0], [1, 0, 0]) * control.tf([1.0], [1.0, 1.0]), 1e-3, None),
-    ],
-)
-def test_the_nearest_gain_margin_is_found_whatever_its_size(
-    loop: control.TransferFunction, delay_s: float, db: float | None, certify: bool
-) -> None:
+@pytest.mark.parametrize(("loop", "delay_s", "db"), [
+    (1 / s, 1e-3, 20 * math.log10(500 * math.pi)),
+    (1 / s, 1e-6, 20 * math.log10(5e5 * math.pi)),
+    (1e-9 / s, 1.0, 20 * math.log10(5e8 * math.pi)),
+    (1e-9 / s, 1e-3, math.inf),  # 243.9 dB
+    (THREE_LAGS, 1e-9, 50.45756),  # 8/0.009 at 1000 sqrt(2) rad/s without the delay: 50.45757
+    (control.tf([0.5], [1, 1]), 1e6, 20 * math.log10(2.0)),
+    (control.tf([0.01], [1, 1]), 1e5, 40.0),
+    (control.tf([1.0], [1, 0, 0]) * control.tf([1.0], [1.0, 1.0]), 1e-3, None),
+])  # fmt: skip
+def test_the_nearest_gain_margin_is_found_whatever_its_size(loop, delay_s, db, certify) -> None:
     if certify and delay_s > 1.0:
         pytest.skip("by hand, or by the other way: too many turns for certified intervals")
     m = stability_margins(loop, delay_s=delay_s, certify=certify)

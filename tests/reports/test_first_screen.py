@@ -109,17 +109,14 @@ def test_findings_come_from_the_sections_gravest_first_once_and_in_turns() -> No
     assert "".join(item["text"] for item in gathered([loud, quiet])) == "faebcd"
 
 
-@pytest.mark.parametrize(
-    ("more", "said"),
-    [
-        ({**LARGE, "kind": "gain", "value": 2.0},
-         "With its gain 6.02 dB higher, the position loop keeps oscillating by 0.0027 deg at the output once "
-         "let go from 50 % of full range. The current limit acts. Its linear gain margin, as validated, is "
-         "20 dB."),
-        ({**SMALL, "kind": "gain", "value": 1.0}, AS_IT_IS % ("gain", "20 dB")),
-        ({**SMALL, "kind": "delay", "value": 1e-5}, AS_IT_IS % ("delay", "1 ms")),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("more", "said"), [
+    ({**LARGE, "kind": "gain", "value": 2.0},
+     "With its gain 6.02 dB higher, the position loop keeps oscillating by 0.0027 deg at the output once "
+     "let go from 50 % of full range. The current limit acts. Its linear gain margin, as validated, is "
+     "20 dB."),
+    ({**SMALL, "kind": "gain", "value": 1.0}, AS_IT_IS % ("gain", "20 dB")),
+    ({**SMALL, "kind": "delay", "value": 1e-5}, AS_IT_IS % ("delay", "1 ms")),
+])  # fmt: skip
 def test_a_motion_that_keeps_oscillating_is_told_in_the_words_of_the_field(more: Any, said: str) -> None:
     item = AmplitudeMargin(loop="position", linear=10.0, furthest=40.0, period_s=1e-4, **more)
     assert remark(item) == said

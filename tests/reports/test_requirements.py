@@ -198,13 +198,10 @@ def test_margins_at_the_corners() -> None:
     assert phase.value == pytest.approx(min(abs(one.phase_margin_deg) for one in loops))
 
 
-@pytest.mark.parametrize(
-    ("name", "quantity", "reason"),
-    [
-        ("fin", "winding_temperature", "the design does not state what this needs"),
-        ("emps", "duty_current", "duty: an ideal torque source has no current"),
-    ],
-)
+@pytest.mark.parametrize(("name", "quantity", "reason"), [
+    ("fin", "winding_temperature", "the design does not state what this needs"),
+    ("emps", "duty_current", "duty: an ideal torque source has no current"),
+])  # fmt: skip
 def test_a_figure_that_there_is_not_says_why(name: str, quantity: str, reason: str) -> None:
     asked = replace(load_design(name), requirements=(requirement(quantity, maximum=1.0),))
     (found,) = evaluate_requirements(asked)
