@@ -190,8 +190,7 @@ def _fill(
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         blocks = stage_blocks(wired, stage)
         _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
-        unjudged = np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1))
-        for k in unjudged:
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1)):
             alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
             _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:

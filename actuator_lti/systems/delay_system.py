@@ -194,8 +194,7 @@ class DelaySystem(ControlFace):
         points = np.atleast_1d(np.asarray(x, dtype=complex))
         if points.ndim != 1:
             raise InputError("a system is evaluated at a number or a 1D array of complex frequencies")
-        y = response(self, points)
-        return control.lti._process_frequency_response(self, x, y, squeeze=squeeze)
+        return control.lti._process_frequency_response(self, x, response(self, points), squeeze=squeeze)
 
     def dcgain(self, warn_infinite: bool = False) -> Any:
         return self._dcgain(warn_infinite)
