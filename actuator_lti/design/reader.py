@@ -90,9 +90,8 @@ class Reader:
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
         self.gains: dict[str, tuple[Field, Tree, float, Per]] = {}
-        head, control, motor = (
-            tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
-        )
+        tables = (tree.get(key) for key in ("design", "control", "motor"))
+        head, control, motor = (each if isinstance(each, dict) else {} for each in tables)
         stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
         self.structure = Structure(_meant(head, "design.axis"), "velocity" in stages, "current" in stages)
         self.frame = Frame(self.structure, _meant(motor, "motor.constants"))
