@@ -145,8 +145,8 @@ ANALYSES = (
         words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
-        Met where the simulator agrees; not proven where no position loop holds the
-        output. The exit status is 1 where it is not met, or not proven.
+        Met where the simulator agrees and the requirements on them are met; not proven where no
+        position loop holds the output. The exit status is 1 where it is not met, or not proven.
 
         Try: actuator-lti stiffness joint
         """,

@@ -131,6 +131,8 @@ def _loop(
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
         own = [item for item in items if item.get("quantity") == quantity.name and item.get("loop") == name]
+        # with the rotor locked, or to the reference, it is another figure than that of the cell
+        own = [item for item in own if item["value"] in (None, quantity.read(figures.judged))]
         nearest = min(own, key=_nearness, default=None)
         over = ranges.get(quantity.name)
         cells.append(
