@@ -17,7 +17,12 @@ EXTRAS := $(patsubst %,--extra %,cluster dev docs export nightly pdf plot tables
 COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-extras --no-annotate --no-header \
   --no-emit-options --no-emit-index-url --no-emit-find-links --constraint constraints.txt
 
-.PHONY: page d3 differential newest installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
+# Where the environment says so (many containers do), Python keeps no bytecode: each process would compile its
+# libraries anew, which doubles the time of its start.
+unexport PYTHONDONTWRITEBYTECODE
+BOTH_CORES := --jobs=2 --output-sync=target
+
+.PHONY: page style types contracts d3 differential newest newest-wheel newest-report installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 
 # The main job.
 report: $(CORE)
@@ -77,11 +82,18 @@ page:
 d3:
 	npm ci --silent --no-audit --no-fund && node d3.bundle.js
 
-check: $(ALL) page
+style: $(ALL)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: $(ALL)
 	$(BIN)/mypy
+
+contracts: $(ALL)
 	$(BIN)/lint-imports
+
+check: $(ALL)
+	$(MAKE) $(BOTH_CORES) types page style contracts
 	$(BIN)/python -m pytest -q -n 2 --doctest-modules actuator_lti nonlinear analyses reports
 
 # Damaged files and extreme values for every loader and command: make fuzz SECONDS=3600 SEED=7
@@ -109,7 +121,12 @@ $(RELEASE): $(CORE)
 # The wheel in a clean environment with the newest versions of what it needs, and nothing else; make report in a
 # fresh copy: what it takes has a bound. Skipped offline.
 newest:
+	$(MAKE) $(BOTH_CORES) newest-wheel newest-report
+
+newest-wheel:
 	$(PYTHON) -m tests.install.clean_install
+
+newest-report:
 	$(PYTHON) -m tests.install.clean_install --report
 
 # The same with every Python that is here, and from the sources with the pinned versions.

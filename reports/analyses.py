@@ -41,8 +41,7 @@ class Analysis:
 
     name: str  # of the command, and of the section's module where that has no name of its own
     group: str  # panel of the help in which the command stands
-    # Dataclass of what is asked, its fields annotated (`analyses.request`); None: nothing
-    request: type | None = None
+    request: type | None = None  # dataclass, fields annotated (`analyses.request`); None: nothing is asked
     _: KW_ONLY
     words: str = ""  # the command's help, its first paragraph stands in the list; docstring of the request
     # ``package.name`` of ``(design, request) -> result``; where empty that of the command's name beside the
@@ -55,18 +54,15 @@ class Analysis:
     doing: str = ""  # what the bar says while the function works, which then takes ``progress``
     alone: bool = False  # whether it is asked of no design
     study: bool = False  # whether it is asked of a study (a file, or a design with variants), not of a design
-    # Whether the function takes ``out`` as well, the folder, and keeps there what it finds
-    keeps: bool = False
+    keeps: bool = False  # whether the function takes the folder ``out``, too, and keeps what it finds there
     written: str = ""  # a flag of the request that is set where the answer is written as a page or as JSON
     stem: str = ""  # name of the page's files; that of the command where empty
     # Folder of the page where none is given; without it, a page is made only where ``--out`` says so
     out: str = ""
-    # Module whose docstring holds a file to start from, behind ``::``; ``--example`` prints it
-    example: str = ""
+    example: str = ""  # module whose docstring holds a file to start from, behind ``::`` (``--example``)
 
     @property
     def help(self) -> str:
-        """What the command says of itself."""
         return cleandoc(self.words or (self.request.__doc__ if self.request else "") or "")
 
     @property
@@ -149,13 +145,13 @@ ANALYSES = (
         words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
-        Met where the simulator agrees; not proven where no position loop holds the
-        output. The exit status is 1 where it is not met, or not proven.
+        Met where the simulator agrees and the requirements on them are met; not proven where no
+        position loop holds the output. The exit status is 1 where it is not met, or not proven.
 
         Try: actuator-lti stiffness joint
         """,
     ),
-    Analysis("corners", LINEAR, CornersAsked, also=True),
+    Analysis("corners", LINEAR, CornersAsked, also=True, doing="judging"),
     Analysis("simulate", NONLINEAR, MotionAsked, function="analyses.motion.motion", doing="simulating"),
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),

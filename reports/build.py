@@ -45,18 +45,10 @@ Step = Callable[[str], AbstractContextManager[Progress]]
 
 
 def report(
-    design: AnyDesign,
-    out: str | PathLike[str] | None = None,
-    *,
-    validation: bool = True,
-    also: Sequence[str] = (),
-    added: Sequence[doc.Section] = (),
-    response: Any = None,
-    response_of: str = "",
-    averages: int | None = None,
-    source: str | None = None,
-    step: Step = lambda _words: nullcontext(),
-) -> Document:
+    design: AnyDesign, out: str | PathLike[str] | None = None, *, validation: bool = True,
+    also: Sequence[str] = (), added: Sequence[doc.Section] = (), response: Any = None, response_of: str = "",
+    averages: int | None = None, source: str | None = None, step: Step = lambda _words: nullcontext(),
+) -> Document:  # fmt: skip
     """Compute the whole report of a design, as the command of the same name does.
 
     What comes back is the document of `reports.document`, plain JSON. ``out``: folder of ``report.html`` and
@@ -139,12 +131,9 @@ def design_report(
         answered = attempt("first screen", first_screen, [])
     sections[:0] = [*(answered if figures else []), *notices([*missing, *unanswered], "linear")]
     made = doc.document(
-        title=design.title or design.name,
-        subtitle=design.description,
-        design=head,
-        provenance=origin,
+        title=design.title or design.name, subtitle=design.description, design=head, provenance=origin,
         sections=sections,
-    )
+    )  # fmt: skip
     live = attempt("sliders", lambda: live_model(design, source), None)
     if live and figures:
         made["live"] = live

@@ -40,9 +40,7 @@ def certain(value: Any, name: str = "") -> Any:
         return {key: certain(item, f"{name} {key}") for key, item in value.items()}
     if isinstance(value, list):
         floor = OF_LARGEST * max((abs(x) for x in value if isinstance(x, float)), default=0.0)
-        return [
-            0.0 if isinstance(item, float) and abs(item) <= floor else certain(item, name) for item in value
-        ]
+        return [0.0 if isinstance(x, float) and abs(x) <= floor else certain(x, name) for x in value]
     return value
 
 

@@ -137,13 +137,9 @@ def of(
 
 
 def listing(
-    caption: str,
-    items: Iterable[T],
-    columns: Sequence[Shown],
-    note: str = "",
-    status: Callable[[T], Status | None] | None = None,
-    more: Callable[[T], Mapping[str, Any]] | None = None,
-) -> Block:
+    caption: str, items: Iterable[T], columns: Sequence[Shown], note: str = "",
+    status: Callable[[T], Status | None] | None = None, more: Callable[[T], Mapping[str, Any]] | None = None,
+) -> Block:  # fmt: skip
     """Make a table of items, a row each: every column with what it shows of an item.
 
     ``more``: what a row says besides, as ``_scale`` (see `reports.document_schema`).
@@ -215,19 +211,10 @@ COMPARISONS = {">=": "≥", "<=": "≤"}
 
 
 def verdict(
-    id: str,
-    label: str,
-    *,
-    passed: bool | Verdict | None,
-    value: float | None = None,
-    limit: float | None = None,
-    unit: str = "",
-    distance: float | None = None,
-    source: str = "",
-    reason: str = "",
-    comparison: str = "",
-    waiver: Waiver | None = None,
-) -> VerdictItem:
+    id: str, label: str, *, passed: bool | Verdict | None, value: float | None = None,
+    limit: float | None = None, unit: str = "", distance: float | None = None, source: str = "",
+    reason: str = "", comparison: str = "", waiver: Waiver | None = None,
+) -> VerdictItem:  # fmt: skip
     """Make one item of `verdicts`; ``distance`` is positive on the good side, by itself where that is known.
 
     ``passed`` is ``None`` where there was nothing to compare: not proven. ``comparison`` is the good side of
@@ -269,17 +256,10 @@ def details(title: str, blocks: Sequence[Block]) -> Block:
 
 
 def section(
-    id: str,
-    title: str,
-    blocks: Sequence[Block],
-    *,
-    result: str = "",
-    intro: str = "",
-    status: Status = "info",
-    told: Severity | None = None,
-    findings: Iterable[Finding] = (),
+    id: str, title: str, blocks: Sequence[Block], *, result: str = "", intro: str = "",
+    status: Status = "info", told: Severity | None = None, findings: Iterable[Finding] = (),
     verdict: Verdict | None = None,
-) -> Section:
+) -> Section:  # fmt: skip
     """Make a section; ``id`` is its anchor.
 
     ``result``: one sentence that says what was found, ``intro``: how. ``told``: how grave the result is,
@@ -306,14 +286,9 @@ def severity(verdict: Verdict) -> Severity:
 
 
 def document(
-    *,
-    title: str,
-    subtitle: str,
-    design: Mapping[str, Any],
-    provenance: Mapping[str, Any],
-    sections: Sequence[Section],
-    kind: str = "report",
-) -> Document:
+    *, title: str, subtitle: str, design: Mapping[str, Any], provenance: Mapping[str, Any],
+    sections: Sequence[Section], kind: str = "report",
+) -> Document:  # fmt: skip
     """Put a document together; its verdict counts every verdict in its sections.
 
     Numbers are rounded to the digits that are the same on every machine (`reports.certain`). Names of files

@@ -124,8 +124,6 @@ class _Asked(TypedDict):
 
 
 class VerdictItem(_Asked):
-    """One verdict."""
-
     distance: float | None
     waiver: str  # by what one that is not proven is waived, else empty
     source: str
@@ -269,9 +267,8 @@ def validate(made: Any, origin: str | None = None) -> None:
     if not isinstance(made, dict) or made.get("schema") != SCHEMA:
         raise InputError(f"schema must be {SCHEMA!r}", where=origin)
     if made.get("version") != VERSION:
-        raise InputError(
-            f"version = {shown(made.get('version'))}: this program reads version {VERSION}", where=origin
-        )
+        found = shown(made.get("version"))
+        raise InputError(f"version = {found}: this program reads version {VERSION}", where=origin)
     try:
         _DOCUMENT.validate_python(made)
     except RecursionError:

@@ -78,38 +78,23 @@ def render(template: str, *, style: str = "", code: str = "", **context: Any) ->
     The script is ``code``, else that of every report. A page with sliders (``live`` is given) has one script
     more, and may compile WebAssembly.
     """
-    counter = itertools.count(1)
-    code = code or script(live="live" in context)
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            stylesheet=Markup(asset("style.css") + style),
-            script=Markup(code),
-            security_policy=security_policy(code, wasm="live" in context),
-            verdict_lines=verdict_lines,
-            role=role,
-            why=why,
-            LONG_TABLE=LONG_TABLE,
-            unique=lambda letter: f"{letter}{next(counter)}",
-            **context,
-        )
-    )
+    counter, live = itertools.count(1), "live" in context
+    code, sheet = code or script(live=live), Markup(asset("style.css") + style)
+    context |= {"security_policy": security_policy(code, wasm=live), "script": Markup(code)}
+    context["unique"] = lambda letter: f"{letter}{next(counter)}"
+    return environment().get_template(template).render(stylesheet=sheet, **context)
 
 
 @cache
 def environment() -> Environment:
     """Give the template environment: everything is escaped, an unknown name is an error."""
     made = Environment(
-        loader=PackageLoader("reports"),
-        autoescape=select_autoescape(default=True, default_for_string=True),
-        finalize=_seen,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+        loader=PackageLoader("reports"), autoescape=select_autoescape(default=True, default_for_string=True),
+        finalize=_seen, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
     made.filters |= {"show": show, "show_signed": show_signed}
-    made.globals["term"] = _term
+    made.globals |= {"term": _term, "verdict_lines": verdict_lines, "role": role, "why": why}
+    made.globals["LONG_TABLE"] = LONG_TABLE
     return made
 
 
@@ -133,13 +118,10 @@ def script(*, live: bool = False) -> str:
 def security_policy(script: str, *, wasm: bool) -> str:
     """Give the page's content security policy: no request at all, and only this script runs."""
     digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-    allowed = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
-    return (
-        f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {allowed}; base-uri 'none'"
-    )
+    scripts = f"'sha256-{digest}'" + " 'wasm-unsafe-eval'" * wasm
+    own = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+    return f"{own}; script-src {scripts}; base-uri 'none'"
 
 
 def show_signed(value: float | None, digits: int = 3) -> str:
-    if value is None:
-        return MISSING
-    return ("+" if value > 0 else "") + significant(value, digits)
+    return MISSING if value is None else ("+" if value > 0 else "") + significant(value, digits)

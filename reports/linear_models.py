@@ -139,6 +139,5 @@ def _for_matlab(value: Any) -> Any:
     if isinstance(value, dict):
         return {name: _for_matlab(item) for name, item in value.items()}
     if isinstance(value, list):
-        texts = any(isinstance(item, str) for item in value)
-        return np.array(value, dtype=object if texts else float)
+        return np.array(value, dtype=object if any(isinstance(item, str) for item in value) else float)
     return value

@@ -59,16 +59,11 @@ def pdf_bytes(made: Mapping[str, Any]) -> bytes:
     if len(data) > MAX_BYTES:
         raise InputError(f"report of {len(data)} bytes: at most {MAX_BYTES} can be typeset")
     try:
-        return bytes(
-            typst.compile(
-                str(TEMPLATE),
-                root=str(TEMPLATE.parent),
-                font_paths=[str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")],
-                sys_inputs={"document": data},
-                timestamp=_time(made),
-                format="pdf",
-            )
-        )
+        typeset = typst.compile(
+            str(TEMPLATE), root=str(TEMPLATE.parent), sys_inputs={"document": data}, timestamp=_time(made),
+            font_paths=[str(Path(matplotlib.get_data_path()) / "fonts" / "ttf")], format="pdf",
+        )  # fmt: skip
+        return bytes(typeset)
     except typst.TypstError as error:
         raise NumericalError(f"typst refuses the report: {str(error).splitlines()[0]}") from error
 

@@ -55,8 +55,7 @@ def commit() -> str | None:
     head = git(root, "rev-parse", "HEAD")
     if head is None:
         return None
-    changed = git(root, "status", "--porcelain", "--untracked-files=no")
-    return head + ("+changes" if changed else "")
+    return head + ("+changes" if git(root, "status", "--porcelain", "--untracked-files=no") else "")
 
 
 def git(place: Path, *arguments: str) -> str | None:

@@ -15,14 +15,11 @@ from reports.provenance import provenance
 from reports.sections import parameters
 
 
-def study_document(
-    design: Design, sections: Sequence[doc.Section], *, title: str, subtitle: str, kind: str
-) -> Document:
+def study_document(design: Design, sections: Sequence[doc.Section], **about: str) -> Document:
+    """Put the document together; ``about``: title, subtitle and kind, as of `reports.document.document`."""
     head, origin = design_head(design), provenance(design_hash(design))
     parts = [*sections, parameters.provenance(head, origin)]
-    return doc.document(
-        title=title, subtitle=subtitle, design=head, provenance=origin, sections=parts, kind=kind
-    )
+    return doc.document(design=head, provenance=origin, sections=parts, **about)
 
 
 def notices(missing: Sequence[Missing], id: str) -> list[doc.Section]:

@@ -149,7 +149,6 @@ def verdict_lines(verdict: Mapping[str, Any]) -> list[tuple[str, Role]]:
         count = Tally(**counts)
         words = count.words(WORDS.get(what, what))
         lines.append((words if count.total else f"the design states {words}", count.role))
-    sections: list[tuple[str, Role]] = [
-        (f"{word}: {'; '.join(verdict[key])}", colour) for key, word, colour in _SECTIONS if verdict.get(key)
-    ]
-    return sorted([*lines, *sections], key=lambda line: ROLES.index(line[1]))
+    for key, word, colour in _SECTIONS:
+        lines += [(f"{word}: {'; '.join(verdict[key])}", colour)] if verdict.get(key) else []
+    return sorted(lines, key=lambda line: ROLES.index(line[1]))

@@ -7,7 +7,8 @@ known at a frequency fills a slot of ``parts``: gain, turn and their rates of ev
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
+KERNELS = True
+
 
 REAL, IMAGINARY, OFF_AXIS, WEIGHT, TURNING, FACTOR = range(6)
 LOG_GAIN, PHASE, DELAY, SLACK = range(4)
@@ -17,13 +18,11 @@ EPS = 2.220446049250313e-16
 STEP = 1e-5  # relative: near enough for the loop itself to go on
 
 
-@kernel
 def slot(m):
     """Length of a slot."""
     return 4 * m + 5
 
 
-@kernel
 def evaluated(m, factors, w, parts, at):
     """Fill the slot that begins at ``at``."""
     delay = factors[FACTOR * m + DELAY]
@@ -47,7 +46,6 @@ def evaluated(m, factors, w, parts, at):
     )  # fmt: skip
 
 
-@kernel
 def _sizes(m, factors, parts, kind, left, right):
     """Sum of the sizes of what makes up a kind at both slots."""
     total = 0.0
@@ -57,7 +55,6 @@ def _sizes(m, factors, parts, kind, left, right):
     return total
 
 
-@kernel
 def bounded(m, factors, parts, left, right, bounds):
     """Least and most of log gain, phase and their rates between two slots, between places.
 
@@ -85,19 +82,16 @@ def bounded(m, factors, parts, left, right, bounds):
         bounds[MOST + kind] = min(bounds[MOST + kind], min(first + up, last + down))
 
 
-@kernel
 def one_way(bounds, kind):
     """Whether gain (0) or phase (1) only rises or only falls."""
     return bounds[LEAST_RATE + kind] > 0.0 or bounds[MOST_RATE + kind] < 0.0
 
 
-@kernel
 def halved(low, high):
     """Where to part an interval."""
     return math.sqrt(low * high) if high > 4.0 * low and low > 0.0 else 0.5 * (low + high)
 
 
-@kernel
 def root(m, factors, kind, level, parts, left, right, at):
     """Where gain (0) or phase (1), monotone between two slots, takes a level: Newton held by bisection."""
     low, high = parts[left + 4 * m + 4], parts[right + 4 * m + 4]

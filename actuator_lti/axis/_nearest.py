@@ -9,10 +9,10 @@ method on its slope, and is an end of intervals.
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._factors import DELAY, EPS, FACTOR, MOST, REAL, WEIGHT, bounded, evaluated, halved, slot
 from ._search import DEEPEST, DONE, KNOWN, NARROWEST, half_turns
+
+KERNELS = True
 
 MEETS, UNSETTLED = 3, 4  # status, beside those of the search
 FINEST = 1e-8  # relative: how much lower another place may be without being found
@@ -21,7 +21,6 @@ NEWTON_STEPS = 20
 NEWTON_STEP = 1e-13
 
 
-@kernel
 def _distance(form, gain, phase):
     """The quotient of the form at log gain and phase."""
     size = math.exp(gain)
@@ -30,7 +29,6 @@ def _distance(form, gain, phase):
     return above / math.hypot(form[2] * re + form[3], form[2] * im)
 
 
-@kernel
 def _second(m, factors, parts, at):
     """Second derivative of log L by w in a slot."""
     re, im = 0.0, 0.0
@@ -41,7 +39,6 @@ def _second(m, factors, parts, at):
     return re, im
 
 
-@kernel
 def _third(m, factors, parts, left, right):
     """A bound of the third derivative of log L between two slots."""
     total = 0.0
@@ -55,7 +52,6 @@ def _third(m, factors, parts, left, right):
     return 2.0 * total
 
 
-@kernel
 def _newton(m, factors, form, parts, at):
     """The step of Newton's method on the slope of the squared distance, from a slot.
 
@@ -83,7 +79,6 @@ def _newton(m, factors, form, parts, at):
     return max(min(step, w), -0.5 * w)
 
 
-@kernel
 def _polished(m, factors, form, start, value, parts, at):
     """The smallest distance next to a place, and where; never farther than there."""
     best, place, w = value, start, start
@@ -99,7 +94,6 @@ def _polished(m, factors, form, start, value, parts, at):
     return best, place
 
 
-@kernel
 def _below(m, factors, form, value, w):
     """(u, v, x): another place is nearer where u abs(L)^2 + v Re L + x < 0, but for rounding of the phase."""
     rounding = 4.0 * EPS * factors[FACTOR * m + DELAY] * w if w < math.inf else 0.0
@@ -112,7 +106,6 @@ def _below(m, factors, form, value, w):
     )
 
 
-@kernel
 def _may_reach(u, v, x, least, least_phase, most, most_phase):
     """Whether gain and phase allow f = u abs(L)^2 + v Re L + x < 0."""
     cosine = -1.0
@@ -125,7 +118,6 @@ def _may_reach(u, v, x, least, least_phase, most, most_phase):
     return not min(smallest, (u * middle + across) * middle) + x > 0.0
 
 
-@kernel
 def _end(m, u, v, x, parts, at):
     """f at a slot, and its slope."""
     to = at + 4 * m
@@ -135,7 +127,6 @@ def _end(m, u, v, x, parts, at):
     return u * size * size + v * re + x, slope
 
 
-@kernel
 def _bends_in(m, factors, u, v, x, parts, left, right, middle):
     """Whether f may fall below zero, by how it bends between two slots, with one in their middle.
 
@@ -170,7 +161,6 @@ def _bends_in(m, factors, u, v, x, parts, left, right, middle):
     return not max(first - down * down / (2.0 * bend), last - up * up / (2.0 * bend)) > 0.0
 
 
-@kernel
 def _within(m, factors, form, best, parts, bounds):
     """Settle the interval between the first two slots; the status. ``best`` is value and place."""
     size = slot(m)
@@ -205,7 +195,6 @@ def _within(m, factors, form, best, parts, bounds):
     return DONE
 
 
-@kernel
 def nearest(m, factors, count, known, form, best, parts, bounds):
     """The smallest distance over ``count`` known intervals, if it is less than ``best``; the status."""
     size, given = slot(m), best[0]

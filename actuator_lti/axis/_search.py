@@ -7,9 +7,9 @@ one way.
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._factors import FACTOR, MOST, SLACK, bounded, evaluated, halved, one_way, root, slot
+
+KERNELS = True
 
 DONE, FULL, TOO_NEAR = range(3)  # status
 INTERVALS, GAINS, REALS, FAR, TURNS, RATE, WHERE, LEAVING, FOUND = range(9)  # places in ``found``
@@ -21,19 +21,16 @@ FAR_LOG = 23.025850929940457  # 200 dB
 ON_AXIS = 1e-9  # rad
 
 
-@kernel
 def half_turns(phase):
     """How many odd multiples of pi lie below."""
     return float(math.floor((phase + math.pi) / (2.0 * math.pi)))
 
 
-@kernel
 def _far(bounds):
     """Whether the gain stays beyond 200 dB, up or down: its crossings of the real axis are only counted."""
     return bounds[MOST] < -FAR_LOG or bounds[0] > FAR_LOG
 
 
-@kernel
 def _clear(kind, level, listed_to, slack, low, bounds):
     if kind != CIRCLE:
         return one_way(bounds, kind) or bounds[kind] > level or bounds[MOST + kind] < level
@@ -48,7 +45,6 @@ def _clear(kind, level, listed_to, slack, low, bounds):
     return half_turns(bounds[1] - slack) == half_turns(bounds[MOST + 1] + slack)
 
 
-@kernel
 def _turns_before(phase, found):
     """Half turns below a phase; one that hardly leaves the real axis of zero frequency has left it."""
     if found[LEAVING] > 0.0 and abs(math.sin(phase)) < ON_AXIS:
@@ -56,7 +52,6 @@ def _turns_before(phase, found):
     return half_turns(phase)
 
 
-@kernel
 def _levels(m, factors, kind, level, parts, right, room, gains, found):
     """Keep the one place of the interval at which gain or phase passes a level."""
     first, last = parts[4 * m + kind] > level, parts[right + 4 * m + kind] > level
@@ -70,7 +65,6 @@ def _levels(m, factors, kind, level, parts, right, room, gains, found):
     return DONE
 
 
-@kernel
 def _turned(m, factors, listed_to, parts, right, bounds, room, reals, found):
     """Keep every place of the interval at which the phase passes an odd multiple of pi, or count them."""
     low = parts[4 * m + 4]
@@ -98,7 +92,6 @@ def _turned(m, factors, listed_to, parts, right, bounds, room, reals, found):
     return DONE
 
 
-@kernel
 def _kept(m, parts, right, bounds, known, found):
     at = KNOWN * int(found[INTERVALS])
     known[at], known[at + 1], known[at + 2] = parts[4 * m + 4], parts[4 * m], parts[4 * m + 1]
@@ -109,7 +102,6 @@ def _kept(m, parts, right, bounds, known, found):
     found[INTERVALS] += 1.0
 
 
-@kernel
 def search(
     m, factors, kind, level, listed_to, count, edges, room, known, gains, reals, found,
     parts, bounds,

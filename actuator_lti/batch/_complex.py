@@ -3,16 +3,14 @@
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
+KERNELS = True
 
 
-@kernel
 def times(ar, ai, br, bi):
     """Product of two complex numbers."""
     return ar * br - ai * bi, ar * bi + ai * br
 
 
-@kernel
 def over(ar, ai, br, bi):
     """Quotient a/b (Smith 1962: no overflow on the way)."""
     if abs(br) >= abs(bi):
@@ -24,19 +22,16 @@ def over(ar, ai, br, bi):
     return (ar * ratio + ai) / below, (ai * ratio - ar) / below
 
 
-@kernel
 def size_at(row, k):
     """Modulus of the k-th number of a row of pairs."""
     return math.hypot(row[2 * k], row[2 * k + 1])
 
 
-@kernel
 def distance_at(row, k):
     """|1 + z| of the k-th number of a row of pairs."""
     return math.hypot(1.0 + row[2 * k], row[2 * k + 1])
 
 
-@kernel
 def copied(count, source, first, to, begin):
     """Copy some numbers of a row from one place to a place of another."""
     for i in range(count):

@@ -7,15 +7,14 @@ deflation, as in EISPACK's hqr (Wilkinson and Reinsch, Handbook II/14).
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._linalg import balance, hessenberg
+
+KERNELS = True
 
 EPS = 2.220446049250313e-16
 MOST_ROUNDS = 300  # for an eigenvalue: the roots of a periodic loop lie on circles, which takes more
 
 
-@kernel
 def _split(n, a, last):
     """First row of the block that ends at ``last``, where a subdiagonal is zero but for rounding."""
     low = last
@@ -30,7 +29,6 @@ def _split(n, a, last):
     return low
 
 
-@kernel
 def _pair(n, a, last, shift, wr, wi):
     """Both eigenvalues of the 2 by 2 block that ends at ``last``."""
     x, y = a[last * n + last], a[(last - 1) * n + last - 1]
@@ -49,7 +47,6 @@ def _pair(n, a, last, shift, wr, wi):
         wi[last - 1], wi[last] = z, -z
 
 
-@kernel
 def _start(n, a, low, last, x, y, w):
     """Where the double step begins, and the first column of its reflection."""
     m = last - 2
@@ -72,7 +69,6 @@ def _start(n, a, low, last, x, y, w):
     return m, p, q, r
 
 
-@kernel
 def _double_step(n, a, low, last, x, y, w):
     """One double QR step on the rows low to last."""
     m, p, q, r = _start(n, a, low, last, x, y, w)
@@ -114,7 +110,6 @@ def _double_step(n, a, low, last, x, y, w):
             a[i * n + k] -= t
 
 
-@kernel
 def eigenvalues(n, a, lent, lent_too, wr, wi):
     """Eigenvalues of a (overwritten): real parts, imaginary parts; 1, or 0 where they do not converge.
 

@@ -3,8 +3,6 @@
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._complex import distance_at, over, size_at
 from ._response import (
     BANDWIDTH,
@@ -22,6 +20,8 @@ from ._response import (
     root,
 )
 
+KERNELS = True
+
 LISTED = 6  # crossovers of each kind that are kept
 FARTHEST = 1e10  # gain margin of 200 dB: what lies beyond, up or down, is not listed
 HIDDEN = 1e-10  # distance from 1 within which an eigenvalue is the angle's, which an inner loop does not see
@@ -35,7 +35,6 @@ FIRST_PHASE = FIRST_GAIN + 2 * LISTED  # pairs (angle per sample, gain margin as
 COLUMNS = FIRST_PHASE + 2 * LISTED
 
 
-@kernel
 def _list(row, counter, first, x, value):
     """Add a crossover to its list; the count goes on past what is kept."""
     k = int(row[counter])
@@ -44,21 +43,18 @@ def _list(row, counter, first, x, value):
     row[counter] = float(k + 1)
 
 
-@kernel
 def _list_negative(row, x, real):
     """Add a crossing of the negative real axis, where its gain margin lies within 200 dB."""
     if real < -1.0 / FARTHEST and real > -FARTHEST:
         _list(row, PHASE_CROSSOVERS, FIRST_PHASE, x, -1.0 / real)
 
 
-@kernel
 def _slope_at(mode, k, xs, rs, ss):
     """Derivative of the gain's logarithm, or of the sine of the phase, at a scanned point."""
     gain, turn = over(ss[2 * k], ss[2 * k + 1], rs[2 * k], rs[2 * k + 1])
     return gain if mode == GAIN else turn * rs[2 * k] / size_at(rs, k)
 
 
-@kernel
 def _hidden(mode, k, f1, f2, xs, rs, ss):
     """Whether the cubic through both ends, of one sign, comes near zero between them."""
     width = xs[k + 1] - xs[k]
@@ -80,14 +76,12 @@ def _hidden(mode, k, f1, f2, xs, rs, ss):
     return lowest < 0.1
 
 
-@kernel
 def _value(mode, x, n, h, b, c, work, state, exchanged):
     """Gain or phase at an angle."""
     rr, ri = response_at(n, h, b, c, x, work, state, exchanged)
     return quantity(mode, rr, ri, 0.0, 0.0, 1.0, 0.0, 0.0)
 
 
-@kernel
 def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     """The angle between two scanned points where the quantity of a mode is extreme, by golden section."""
     shrink = 0.6180339887498949
@@ -111,7 +105,6 @@ def _turning_point(mode, k, xs, rs, ss, n, h, b, c, work, state, exchanged):
     return left if f_left < f_right else right
 
 
-@kernel
 def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
     """Refine one bracketed gain or phase crossover and list it."""
     x, rr, ri = root(mode, 1.0, 0.0, x1, f1, x2, f2, n, h, b, c, work, state, exchanged)
@@ -121,7 +114,6 @@ def _crossing(mode, x1, f1, x2, f2, row, n, h, b, c, work, state, exchanged):
         _list_negative(row, x, rr)
 
 
-@kernel
 def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged):
     """List every gain (or phase) crossover between the scanned points."""
     f2 = quantity_at(mode, 0, xs, rs, ss, 1.0, 0.0)
@@ -143,7 +135,6 @@ def crossovers(mode, count, xs, rs, ss, row, n, h, b, c, work, state, exchanged)
                 _crossing(mode, x, f, xs[k + 1], f2, row, n, h, b, c, work, state, exchanged)
 
 
-@kernel
 def ends(response_dc, response_nyquist, count, xs, rs, row):
     """A loop that is negative real at DC or at Nyquist crosses the negative axis there.
 
@@ -158,14 +149,12 @@ def ends(response_dc, response_nyquist, count, xs, rs, row):
         _list_negative(row, math.pi, response_nyquist)
 
 
-@kernel
 def _keep_modulus(size, x, row):
     """Put down |1 + L| at an angle where it is the smallest so far."""
     if size < row[MODULUS]:
         row[MODULUS], row[MODULUS_X] = size, x
 
 
-@kernel
 def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, state, exchanged):
     """The smallest |1 + L| and where."""
     row[MODULUS], row[MODULUS_X] = distance_at(rs, 0), xs[0]
@@ -193,21 +182,18 @@ def modulus(count, xs, rs, ss, nyquist_r, nyquist_i, row, n, h, b, c, work, stat
             f1 = f
 
 
-@kernel
 def _rise(x, n, h, b, c, work, state, exchanged):
     """How |1 + L| rises at an angle, by its sign."""
     rr, ri, slope_r, slope_i = evaluate(n, h, b, c, x, work, state, exchanged)
     return quantity(SENSITIVITY, rr, ri, slope_r, slope_i, 1.0, x, 0.0)
 
 
-@kernel
 def closed_size(rr, ri, x, lead):
     """|T| of a response."""
     closed_r, closed_i = closed_loop(rr, ri, x, lead)
     return math.hypot(closed_r, closed_i)
 
 
-@kernel
 def falls_after(after, mode, count, xs, rs, ss, level, lead):
     """The next interval of the scan in which a quantity falls through zero; the last point: there is none."""
     k = after + 1
@@ -221,7 +207,6 @@ def falls_after(after, mode, count, xs, rs, ss, level, lead):
     return k
 
 
-@kernel
 def zero_in(k, mode, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged):
     """The angle in an interval of the scan where a quantity is zero, and L there."""
     f1 = quantity_at(mode, k, xs, rs, ss, level, lead)
@@ -229,7 +214,6 @@ def zero_in(k, mode, xs, rs, ss, level, lead, n, h, b, c, work, state, exchanged
     return root(mode, level, lead, xs[k], f1, xs[k + 1], f2, n, h, b, c, work, state, exchanged)
 
 
-@kernel
 def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
     """The largest |T| and where; at the first point where T only falls."""
     best = 0.0
@@ -251,7 +235,6 @@ def resonance(count, xs, rs, ss, lead, row, n, h, b, c, work, state, exchanged):
         k = falls_after(k, RESONANCE, count, xs, rs, ss, 1.0, lead)
 
 
-@kernel
 def bandwidths(count, xs, rs, ss, dc, lead, row, n, h, b, c, work, state, exchanged):
     """First fall of |T| below |T(0)|/sqrt 2, and first passage of its phase through -90 degrees."""
     level = abs(dc)

@@ -8,12 +8,12 @@ of two after Parlett and Reinsch (1969).
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
+KERNELS = True
+
 
 LOG_2 = 0.6931471805599453
 
 
-@kernel
 def balance(n, a, b, c):
     """Scale the states by powers of two until rows and columns of a weigh the same."""
     for _round in range(30):
@@ -41,7 +41,6 @@ def balance(n, a, b, c):
             return
 
 
-@kernel
 def _reflect(n, a, b, c, k, v, beta):
     """Apply I - beta v v' to a from both sides, to b from the left, to c from the right; v zero up to k."""
     for j in range(n):
@@ -65,7 +64,6 @@ def _reflect(n, a, b, c, k, v, beta):
         c[i] -= beta * total_c * v[i]
 
 
-@kernel
 def hessenberg(n, a, b, c, v):
     """Bring a to upper Hessenberg form by Householder reflections, b and c in the same coordinates."""
     for k in range(n - 2):

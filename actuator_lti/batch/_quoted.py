@@ -4,10 +4,11 @@
 import math
 
 from actuator_lti.asked.quantities import MOST_RESONANCE_DB
-from actuator_lti.compiled.kernel import kernel
 
 from . import _figures as fig
 from ._complex import copied
+
+KERNELS = True
 
 LOG_10 = 2.302585092994046
 (
@@ -17,12 +18,10 @@ LOG_10 = 2.302585092994046
 QUOTED = 12
 
 
-@kernel
 def _decibel(ratio):
     return 20.0 * math.log(ratio) / LOG_10
 
 
-@kernel
 def _margins(row, period, out):
     """Gain and phase margin nearest to zero, and the delay margin."""
     out[GAIN_MARGIN], out[PHASE_MARGIN], out[DELAY_MARGIN] = math.inf, math.inf, math.inf
@@ -40,7 +39,6 @@ def _margins(row, period, out):
         out[DELAY_MARGIN] = 0.0
 
 
-@kernel
 def quoted(row, period, out):
     """Write the figures to quote, in dB, deg, s, Hz and percent, in the order of `LOOP_QUANTITIES`."""
     _margins(row, period, out)
@@ -63,7 +61,6 @@ def quoted(row, period, out):
             out[k] = math.nan
 
 
-@kernel
 def many_quoted(count, rows, periods, out, row, own):
     """The same of many rows one after the other; ``row`` and ``own`` lend their space."""
     for k in range(count):

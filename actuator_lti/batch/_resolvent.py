@@ -7,17 +7,16 @@ states are not mixed as a Hessenberg form would: the zeros of A keep them apart.
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._complex import over
 from ._figures import HIDDEN
 from ._response import substituted
+
+KERNELS = True
 
 EPS = 2.220446049250313e-16
 NO_PIVOT = 1e-30  # far below the rounding of any entry that balancing leaves
 
 
-@kernel
 def _largest_first(n, k, work, state):
     """Bring the largest element of column k, from row k on, to row k."""
     best, largest = k, -1.0
@@ -33,7 +32,6 @@ def _largest_first(n, k, work, state):
         state[2 * k + j], state[2 * best + j] = state[2 * best + j], state[2 * k + j]
 
 
-@kernel
 def _cleared(n, k, work, state):
     """Take row k out of the rows below it."""
     for i in range(k + 1, n):
@@ -50,7 +48,6 @@ def _cleared(n, k, work, state):
         state[2 * i + 1] -= factor_r * here_i + factor_i * here_r
 
 
-@kernel
 def states_at(n, a, b, c, transposed, x, work, state):
     """(z I - A)^-1 b at an angle per sample, as pairs in ``state``, and c times it; or of A transposed."""
     sine = math.sin(0.5 * x)
@@ -67,7 +64,6 @@ def states_at(n, a, b, c, transposed, x, work, state):
     return substituted(n, c, work, state)
 
 
-@kernel
 def _pivoted(n, k, system, first, right):
     """Exchange rows so that the largest pivot stands in row k; one of zero counts as rounding."""
     best = k
@@ -82,7 +78,6 @@ def _pivoted(n, k, system, first, right):
         system[first + k * n + k] = NO_PIVOT
 
 
-@kernel
 def _solved(n, system, transposed, right):
     """Solve the system at the start of a row, or its transpose, behind it; ``right`` becomes the solution."""
     first = n * n
@@ -104,7 +99,6 @@ def _solved(n, system, transposed, right):
         i -= 1
 
 
-@kernel
 def _null_vector(n, system, transposed, vector):
     """What the system, all but singular, takes to nothing; its largest element is one."""
     for i in range(n):
@@ -118,7 +112,6 @@ def _null_vector(n, system, transposed, vector):
             vector[i] /= largest
 
 
-@kernel
 def system_at_dc(n, a, b, c, closed, poles, first, system, left, right):
     """Write I - A + closed b c without the modes at DC that do not show.
 
@@ -139,7 +132,6 @@ def system_at_dc(n, a, b, c, closed, poles, first, system, left, right):
                     system[i * n + j] += right[i] * left[j]
 
 
-@kernel
 def level_at_dc(n, a, b, c, closed, poles, first, system, left, right):
     """c (I - A + closed b c)^-1 b without the modes at DC that do not show: T, or L where ``closed`` is 0."""
     system_at_dc(n, a, b, c, closed, poles, first, system, left, right)
@@ -152,7 +144,6 @@ def level_at_dc(n, a, b, c, closed, poles, first, system, left, right):
     return total
 
 
-@kernel
 def rounding_at_dc(n, a, b, c, system, left, right):
     """How far 8 ulp of the entries move what `level_at_dc` has left in its rows, at most."""
     for i in range(n):

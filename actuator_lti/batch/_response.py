@@ -8,9 +8,9 @@ Rows are flat; complex numbers are pairs (real part, imaginary part), in rows on
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._complex import over, times
+
+KERNELS = True
 
 GAIN, PHASE, SENSITIVITY, BANDWIDTH, QUARTER, RESONANCE = range(6)
 LOST = 1e-12  # of the largest |L| above 0.3 rad: less is rounding, as of a zero at Nyquist
@@ -19,7 +19,6 @@ CAPACITY = 1200  # points of a scanned response
 DEEPEST = 48  # halvings on the way to one point
 
 
-@kernel
 def _exchanged(n, k, h, b, delta_r, delta_i, work, state):
     """One step of the elimination of z I - A where row k + 1, real but for its diagonal, comes first."""
     upper, lower, row = 2 * (k * n + k), 2 * ((k + 1) * n + k), (k + 1) * n + k
@@ -41,7 +40,6 @@ def _exchanged(n, k, h, b, delta_r, delta_i, work, state):
     return factor_r, factor_i
 
 
-@kernel
 def _in_place(n, k, h, b, delta_r, delta_i, work, state):
     """The same without an exchange: row k + 1 less a multiple of row k."""
     upper, lower, row = 2 * (k * n + k), 2 * ((k + 1) * n + k), (k + 1) * n + k
@@ -61,7 +59,6 @@ def _in_place(n, k, h, b, delta_r, delta_i, work, state):
     return factor_r, factor_i
 
 
-@kernel
 def _eliminated(n, h, b, x, work, state, exchanged):
     """Bring z I - A to upper triangular form, b along with it; returns z - 1.
 
@@ -85,7 +82,6 @@ def _eliminated(n, h, b, x, work, state, exchanged):
     return delta_r, delta_i
 
 
-@kernel
 def substituted(n, c, work, state):
     """Back substitution in place; returns c times the solution."""
     response_r, response_i = 0.0, 0.0
@@ -105,7 +101,6 @@ def substituted(n, c, work, state):
     return response_r, response_i
 
 
-@kernel
 def _again(n, c, work, state, exchanged):
     """c (z I - A)^-1 state with the factors that the elimination left behind."""
     carry_r, carry_i = state[0], state[1]
@@ -124,14 +119,12 @@ def _again(n, c, work, state, exchanged):
     return substituted(n, c, work, state)
 
 
-@kernel
 def response_at(n, h, b, c, x, work, state, exchanged):
     """L alone at the angle x, with the bits of `evaluate`."""
     _eliminated(n, h, b, x, work, state, exchanged)
     return substituted(n, c, work, state)
 
 
-@kernel
 def evaluate(n, h, b, c, x, work, state, exchanged):
     """L and dL/dx at the angle x (rad per sample), by Gaussian elimination with row exchanges."""
     delta_r, delta_i = _eliminated(n, h, b, x, work, state, exchanged)
@@ -141,7 +134,6 @@ def evaluate(n, h, b, c, x, work, state, exchanged):
     return response_r, response_i, slope_r, slope_i
 
 
-@kernel
 def closed_loop(response_r, response_i, x, lead):
     """T = L/(1 + L) with the feed-forward in front, ``1 + lead (1 - 1/z)``; lead NaN: the response itself."""
     if math.isnan(lead):
@@ -152,7 +144,6 @@ def closed_loop(response_r, response_i, x, lead):
     return closed_r, closed_i
 
 
-@kernel
 def _resonance(response_r, response_i, slope_r, slope_i, x, lead):
     """d ln|T| / dx."""
     if math.isnan(lead):
@@ -167,7 +158,6 @@ def _resonance(response_r, response_i, slope_r, slope_i, x, lead):
     return value
 
 
-@kernel
 def quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead):
     """The function whose zero is looked for, from L and dL/dx at x."""
     if mode == GAIN:
@@ -186,13 +176,11 @@ def quantity(mode, response_r, response_i, slope_r, slope_i, level, x, lead):
     return closed_r / size  # QUARTER
 
 
-@kernel
 def quantity_at(mode, k, xs, rs, ss, level, lead):
     """The same at a scanned point."""
     return quantity(mode, rs[2 * k], rs[2 * k + 1], ss[2 * k], ss[2 * k + 1], level, xs[k], lead)
 
 
-@kernel
 def root(mode, level, lead, begin_x, begin_f, end_x, end_f, n, h, b, c, work, state, exchanged):
     """The zero between two angles (signs differ), to rounding (Chandrupatla 1997), and L there."""
     x1, f1, x2, f2 = begin_x, begin_f, end_x, end_f
@@ -229,14 +217,12 @@ def root(mode, level, lead, begin_x, begin_f, end_x, end_f, n, h, b, c, work, st
     return x, response_r, response_i
 
 
-@kernel
 def _keep(k, x, response_r, response_i, slope_r, slope_i, xs, rs, ss):
     xs[k] = x
     rs[2 * k], rs[2 * k + 1] = response_r, response_i
     ss[2 * k], ss[2 * k + 1] = slope_r, slope_i
 
 
-@kernel
 def _smooth(width, growth, turned, before_r, before_i, here_r, here_i, tolerance):
     """Whether log L is a cubic between two points, from its change and from its derivatives at both."""
     predicted_r, predicted_i = 0.5 * width * (here_r + before_r), 0.5 * width * (here_i + before_i)
@@ -245,7 +231,6 @@ def _smooth(width, growth, turned, before_r, before_i, here_r, here_i, tolerance
     return abs(growth - predicted_r) + abs(turn) < tolerance and abs(predicted_i) < 1.0
 
 
-@kernel
 def scan(n, h, b, c, grid, points, tolerance, stack, xs, rs, ss, work, state, exchanged):
     """Responses on a grid of angles, refined until log L is a cubic between neighbours; return the count.
 

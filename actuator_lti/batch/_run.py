@@ -3,15 +3,15 @@
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from . import _figures as fig
 from ._complex import copied
 from ._linalg import balance, hessenberg
 from ._resolvent import level_at_dc, rounding_at_dc
-from ._response import CAPACITY, DEEPEST, GAIN, PHASE, response_at, scan
+from ._response import GAIN, PHASE, response_at, scan
 from ._step import step_figures
 from ._withheld import rounding_decides
+
+KERNELS = True
 
 TOP = math.pi * (1.0 - 1e-7)  # last scanned angle; Nyquist itself is evaluated apart
 LOWEST = 1e-7  # first scanned angle, unless a pole is slower
@@ -21,7 +21,6 @@ NO_GAIN = 1e-6  # of the peak of |T|: less at DC (120 dB) is the rounding of a r
 LOG_10 = 2.302585092994046
 
 
-@kernel
 def _around_poles(n, poles, low, points, first):
     """Three angles around every lightly damped pole, of the open loop and of the closed one."""
     count = first
@@ -40,7 +39,6 @@ def _around_poles(n, poles, low, points, first):
     return count
 
 
-@kernel
 def _sorted(points, count):
     """Sort a short row in place (insertion), then drop what is the same but for rounding."""
     for i in range(1, count):
@@ -58,7 +56,6 @@ def _sorted(points, count):
     return kept
 
 
-@kernel
 def _grid(n, poles, points):
     """Angles to start from: seven a decade, linear above, and around every lightly damped pole."""
     low = LOWEST
@@ -77,7 +74,6 @@ def _grid(n, poles, points):
     return _sorted(points, count)
 
 
-@kernel
 def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, exchanged):
     """DC gain, resonance and bandwidths of a closed loop whose response is scanned."""
     row[fig.DC_GAIN], row[fig.FINAL] = dc, dc
@@ -87,7 +83,6 @@ def _closed_figures(count, n, a, b, c, lead, dc, row, xs, rs, ss, work, state, e
     fig.bandwidths(count, xs, rs, ss, row[fig.DC_GAIN], lead, row, n, a, b, c, work, state, exchanged)
 
 
-@kernel
 def _open_dc(dc, at_rest):
     """L at DC: infinite for an integrator, else what was found where it fits T, the more exact one.
 
@@ -101,7 +96,6 @@ def _open_dc(dc, at_rest):
     return at_rest if abs(at_rest - around) < 1e-3 * abs(around) else around
 
 
-@kernel
 def _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exchanged):
     """Crossovers and modulus margin of an open loop whose response is scanned."""
     row[fig.GAIN_CROSSOVERS], row[fig.PHASE_CROSSOVERS] = 0.0, 0.0
@@ -115,7 +109,6 @@ def _open_figures(count, n, a, b, c, at_rest, row, xs, rs, ss, work, state, exch
         row[fig.MODULUS], row[fig.MODULUS_X] = abs(1.0 + open_dc), 0.0
 
 
-@kernel
 def _radius(n, poles):
     """Largest modulus but of an eigenvalue at 1: the motor angle, which an inner loop does not see."""
     radius = 0.0
@@ -126,7 +119,6 @@ def _radius(n, poles):
     return radius
 
 
-@kernel
 def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, ss, work, state, exchanged):
     """Fill the figures of one open loop; a becomes A - I in Hessenberg form (A itself with time figures).
 
@@ -156,7 +148,6 @@ def one_loop(n, a, b, c, poles, lead, time_figures, row, points, stack, xs, rs, 
     return count
 
 
-@kernel
 def many_loops(
     count, n, A, B, C, poles, leads, time_figures, out,
     a, b, c, own, row, points, stack, xs, rs, ss, work, state, exchanged,
@@ -165,7 +156,7 @@ def many_loops(
 
     The loops lie in A, B, C and poles one after the other; those whose first pole is NaN are left as they
     are, and those whose figures rounding decides have none. The rows behind ``out`` lend their space, see
-    `room`.
+    `actuator_lti.batch.library`.
     """
     for k in range(count):
         if math.isnan(poles[4 * n * k]):
@@ -187,9 +178,3 @@ def many_loops(
                 row[j] = math.nan
             row[fig.GAIN_CROSSOVERS], row[fig.PHASE_CROSSOVERS] = 0.0, 0.0
         copied(fig.COLUMNS, row, 0, out, fig.COLUMNS * k)
-
-
-def room(n):
-    """Lengths of the rows that `many_loops` works in, from ``a`` on."""
-    loop = (n * n, n, n, 4 * n, fig.COLUMNS)
-    return (*loop, POINTS, DEEPEST, CAPACITY, 2 * CAPACITY, 2 * CAPACITY, 2 * n * n + 2 * n, 2 * n, n)

@@ -3,16 +3,15 @@
 # mypy: disallow-untyped-defs=False
 import math
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._figures import FINAL, HIDDEN, OVERSHOOT, RADIUS, RISE, SETTLING
+
+KERNELS = True
 
 LONGEST = 4_000_000  # ticks
 INSIDE = 9.0  # time constants of the slowest pole within the band: what is left is 1e-4 of it
 FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no digit (1e-11)
 
 
-@kernel
 def step_figures(n, a, b, c, lead, poles, row, state, after):
     """Rise 10-90 % and settling 2 % in ticks, overshoot in percent, of the closed loop a - b c.
 
@@ -77,7 +76,6 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
     row[SETTLING] = outside + 1.0
 
 
-@kernel
 def _ticks_until_alone(n, poles, radius):
     """Ticks until only the slowest pole is left; infinity where that is no single positive real one."""
     second = 0.0
@@ -93,7 +91,6 @@ def _ticks_until_alone(n, poles, radius):
     return float(math.ceil(-FORGOTTEN / math.log(second))) + n + 2.0
 
 
-@kernel
 def _ticks_to(rest, level, radius):
     """Ticks until the tail ``|rest| radius^k`` has fallen to a level."""
     if abs(rest) <= level:

@@ -13,12 +13,12 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
-
 from ._complex import size_at
 from ._figures import DC_GAIN, FIRST_GAIN, FIRST_PHASE, GAIN_CROSSOVERS, LISTED, PHASE_CROSSOVERS, RADIUS
 from ._linalg import balance
 from ._resolvent import EPS, states_at, system_at_dc
+
+KERNELS = True
 
 AT_BORDER = 1e-10  # of the largest pole from the unit circle, or T(0) from 1/2: rounding decides
 GROWTH = 10.0  # of an open-loop pole in one sample: below it the entries stay small
@@ -26,7 +26,6 @@ MOST_ERROR = 1e-10  # relative, of the response at a crossover: the margins are 
 BETWEEN = np.array([0.03, 0.3, 1.0, 2.5])
 
 
-@kernel
 def _is_told(n, a, b, c, x, work, state, sizes):
     """Whether L at an angle stands out from its rounding errors, see `actuator_lti.margins.trust`."""
     states_at(n, a, c, b, True, x, work, state)
@@ -43,7 +42,6 @@ def _is_told(n, a, b, c, x, work, state, sizes):
     return math.hypot(real, imaginary) * MOST_ERROR >= EPS * bound
 
 
-@kernel
 def _crossings_are_told(n, a, b, c, poles, row, work, state, sizes):
     """The same at every crossover and between; at rest without the modes that do not show, as its figures."""
     at_rest = False
@@ -67,7 +65,6 @@ def _crossings_are_told(n, a, b, c, poles, row, work, state, sizes):
     return _is_told(n, a, b, c, 0.0, work, state, sizes)
 
 
-@kernel
 def _crossover_missed(n, a, b, c, row, work, state):
     """Whether the number of gain crossovers does not fit the gain at both ends: one lies below the scan."""
     dc = row[DC_GAIN]  # |L(0)| > 1 from T(0) = L(0)/(1 + L(0)), also with a pole there
@@ -80,7 +77,6 @@ def _crossover_missed(n, a, b, c, row, work, state):
     return not abs(nyquist) > 1.0
 
 
-@kernel
 def rounding_decides(n, a, b, c, poles, row, work, state, sizes):
     """Whether rounding decides the figures in ``row`` of the open loop a, b, c, which are changed."""
     balance(n, a, b, c)

@@ -101,17 +101,10 @@ class LinearFigures:
 
 
 def linear_figures(
-    population: Population,
-    *,
-    operating_point: OperatingPoint = "sliding",
-    load_Nm: float = 0.0,
-    speed_amplitude_rad_s: float | None = None,
-    direction: int = 1,
-    time_figures: bool = True,
-    held: bool = False,
-    threads: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-) -> LinearFigures:
+    population: Population, *, operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0,
+    speed_amplitude_rad_s: float | None = None, direction: int = 1, time_figures: bool = True,
+    held: bool = False, threads: int = 1, progress: Callable[[int, int], None] | None = None
+) -> LinearFigures:  # fmt: skip
     """Figures of the sampled loops of every design of a population.
 
     The same sampled loops as `actuator_lti.assemble_loops` (form ``"sampled"``) and the same definitions
@@ -131,11 +124,9 @@ def linear_figures(
     Raises `InputError`: for loops of more states than `actuator_lti.bounds.LOOP_STATES`.
     """
     at = Operating(
-        point=operating_point,
-        load_Nm=load_Nm,
-        speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction,
-    )
+        point=operating_point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction
+    )  # fmt: skip
     out = np.full((population.count, len(LOOPS), fig.COLUMNS), np.nan)
     chunks = [
         group[first : first + _CHUNK]

@@ -6,13 +6,22 @@ import numpy as np
 
 from actuator_lti.batch._figures import COLUMNS
 from actuator_lti.batch._quoted import QUOTED
-from actuator_lti.batch._run import room
+from actuator_lti.batch._response import CAPACITY, DEEPEST
+from actuator_lti.batch._run import POINTS
 from actuator_lti.compiled.kinds import Kind
 from actuator_lti.compiled.library import Entry, Library, source_files
 from actuator_lti.types import Floats
 
 _FOLDER = Path(__file__).parent
 _ROW: Kind = "row"
+
+
+def room(n: int) -> tuple[int, ...]:
+    """Lengths of the rows that `many_loops` works in, from ``a`` on."""
+    loop = (n * n, n, n, 4 * n, COLUMNS)
+    return (*loop, POINTS, DEEPEST, CAPACITY, 2 * CAPACITY, 2 * CAPACITY, 2 * n * n + 2 * n, 2 * n, n)
+
+
 _LOOPS: tuple[Kind, ...] = ("int", "int", *(_ROW,) * 5, "int", _ROW)
 LIBRARY = Library(
     "figures",

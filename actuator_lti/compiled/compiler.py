@@ -89,13 +89,9 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
 
 
 def compile_files(
-    texts: Mapping[str, str],
-    output: str,
-    target: str,
-    extra: Sequence[str] = (),
-    *,
-    command: Sequence[str] | None = None,
-) -> bytes:
+    texts: Mapping[str, str], output: str, target: str, extra: Sequence[str] = (), *,
+    command: Sequence[str] | None = None
+) -> bytes:  # fmt: skip
     """Compile C files given as text; returns the bytes of ``output``.
 
     A Windows library has the same bytes each time where it is stripped (``-s``) of its debug file's name.

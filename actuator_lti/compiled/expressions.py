@@ -33,7 +33,6 @@ class Expressions:
         self.want, self.whole = function.want, ast.AST()
 
     def emit(self, node: ast.expr) -> Text:
-        """Text and kind of an expression."""
         text: Text = self.translated(node)
         return text
 
@@ -51,13 +50,11 @@ class Expressions:
         return bare(text) if kind == "bool" else f"{text} != 0"
 
     def as_float(self, node: ast.expr) -> str:
-        """A number as a double."""
         text, kind = self.emit(node)
         self.want(kind in ("float", "int"), node, f"a {kind} where a number is wanted")
         return widened(text, kind)
 
     def whole_number(self, node: ast.expr, what: str) -> str:
-        """A whole number."""
         text, kind = self.emit(node)
         self.want(kind == "int", node, f"{what} that is a {kind}; use int()")
         return bare(text)
@@ -116,7 +113,6 @@ class Expressions:
         return f"{text}.length" if kind == "bytes" else None
 
     def element(self, node: ast.Subscript) -> str:
-        """``row[index]``."""
         table = self._table(node.value)
         row, kind = (table, "row") if table else self.emit(node.value)
         self.want(kind in ("row", "bytes"), node, "only a row has elements")

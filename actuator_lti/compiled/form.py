@@ -32,7 +32,6 @@ class Form:
         return " && ".join(f"{self.row}[{place}] == {value!r}" for place, value in self.known.items())
 
     def look(self, row: str, place: int) -> float | None:
-        """The known number at a place of a row."""
         return self.known.get(place) if row == self.row else None
 
 
@@ -136,5 +135,4 @@ class Known(ast.NodeTransformer):
 
 
 def number(node: ast.Constant) -> Any:
-    """The number that a constant is."""
     return node.value

@@ -1,6 +1,7 @@
 """The marks of a function that is compiled: written in the subset of Python that becomes C.
 
-It runs in Python as it stands, slowly: for a debugger, and as the reference of the compiled form.
+It runs in Python as it stands, slowly: for a debugger, and as the reference of the compiled form. All
+functions of a module that says ``KERNELS = True`` are kernels.
 """
 
 from collections.abc import Callable
@@ -19,8 +20,9 @@ def _marking(mark: Mark) -> Callable[[Written], Written]:
 
 
 def is_marked(value: object, mark: Mark) -> bool:
-    """Whether something is a function with a mark."""
-    return callable(value) and getattr(value, f"is_{mark}", False)
+    """Whether something is a function with a mark, its own or that of its module."""
+    whole = mark == "kernel" and getattr(value, "__globals__", {}).get("KERNELS", False)
+    return callable(value) and (whole or getattr(value, f"is_{mark}", False))
 
 
 kernel = _marking("kernel")  # a function of the subset

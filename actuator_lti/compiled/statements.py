@@ -233,7 +233,6 @@ def overlap(targets: ast.Tuple, values: ast.Tuple) -> bool:
 
 
 def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
-    """The statements that do something."""
     first = body[0]
     described = isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant)
     return body[1:] if described else body

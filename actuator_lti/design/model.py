@@ -164,7 +164,6 @@ class Design:
         return with_law(self, stage, system, inputs, settings)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return draw("design_html", self)
 
     def __repr__(self) -> str:

@@ -211,7 +211,6 @@ class Reader:
         return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {allowed}")
 
     def words(self, field: Field, raw: Any, path: str) -> Any:
-        """Some of the words that a key may have, each once."""
         known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
         texts = all(isinstance(word, str) for word in known)
         if not known or not texts or len({*known}) != len(known):
@@ -259,7 +258,6 @@ class Reader:
         return False
 
     def kept(self, field: Field, table: Tree, value: Any, path: str, into: dict[str, model.Parameter]) -> Any:
-        """A value with its pedigree."""
         if value is UNREAD:
             return UNREAD
         unit = field.unit(self.structure)
@@ -290,7 +288,6 @@ class Reader:
         return design
 
     def tolerance(self, field: Field, raw: Any, value: float, path: str) -> model.Tolerance | None:
-        """How far a value may lie from what is written."""
         if raw is None:
             return None
         unit = field.unit(self.structure)
@@ -301,20 +298,17 @@ class Reader:
             return self.refuse(at, raw if error.where is None else raw[error.where], error.message)
 
     def numbers(self, field: Field, raw: Any, path: str) -> Any:
-        """A list of numbers."""
         if not isinstance(raw, list):
             return self.refuse(path, raw, "allowed: a list")
         read = tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
         return read if 0 < len(raw) <= MAX_LIST else self.unread(path, f"allowed: 1 to {MAX_LIST} items")
 
     def rows(self, field: Field, raw: Any, path: str) -> Any:
-        """A list of rows of numbers."""
         if not isinstance(raw, list) or not all(isinstance(row, list) for row in raw):
             return self.refuse(path, raw, "allowed: a list of rows, each a list of numbers")
         return tuple(self.numbers(field, row, f"{path}[{k}]") for k, row in enumerate(raw[:MAX_LIST], 1))
 
     def number(self, field: Field, raw: Any, path: str) -> Any:
-        """A number in SI."""
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             what = "a whole number" if field.kind == "integer" else "a number with its unit, as text"
             return self.refuse(path, raw, f"allowed: {what}{_example(field)}")
@@ -366,7 +360,6 @@ class Reader:
         return section.kind(**values)
 
     def law(self, raw: Any, path: str) -> Any:
-        """The table of a law, with what stands in its file."""
         if not isinstance(raw, dict) or "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}

@@ -22,7 +22,6 @@ _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 
 
 def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Read a settings file, see `parse_settings`."""
     return parse_settings(read_text(path, "settings file"), shown_path(path), velocity_gain_factor)
 
 
@@ -68,7 +67,6 @@ def _object_from(label: str, raw: Any) -> ControllerObject:
 
 
 def object_entry(item: ControllerObject) -> Any:
-    """The entry of one object in TOML."""
     more = {key: getattr(item, key) for key in ("name", "data_type") if getattr(item, key)}
     return {"value": item.value, **more} if more else item.value
 

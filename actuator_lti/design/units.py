@@ -141,11 +141,9 @@ class UnitValue:
 
     @property
     def angle(self) -> int:
-        """The exponent of the angle."""
         return dict(self.dimension).get("[angle]", 0)
 
     def without_angle(self) -> Dimension:
-        """The dimension as SI counts it."""
         return tuple(item for item in self.dimension if item[0] != "[angle]")
 
 
@@ -172,7 +170,6 @@ def _product(text: str, units: Units) -> Exact:
 
 @lru_cache(maxsize=1)
 def _units() -> Units:
-    """Every name without a prefix."""
     units: Units = {one: (Fraction(one), Counter()) for one in ("1", "1000")}
     for names, dimension in _BASE.items():
         units |= dict.fromkeys(names.split(), (Fraction(1), Counter({dimension: 1})))

@@ -111,7 +111,6 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
 
 
 def _bare(value: Any, unit: str) -> Any:
-    """A value without a pedigree."""
     if isinstance(value, tuple):
         return [_bare(item, unit) for item in value]
     return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)

@@ -293,15 +293,9 @@ def plot_onset(onset: Onset, *, linear_axis: bool = False, axes: Any = None) -> 
 
 
 def plot_map(
-    frequency_hz: np.ndarray,
-    amplitude_rad: np.ndarray,
-    kind: np.ndarray,
-    names: Sequence[str],
-    *,
-    onset_rad: Mapping[str, np.ndarray] | None = None,
-    linear_axis: bool = False,
-    axes: Any = None,
-) -> Axes:
+    frequency_hz: np.ndarray, amplitude_rad: np.ndarray, kind: np.ndarray, names: Sequence[str], *,
+    onset_rad: Mapping[str, np.ndarray] | None = None, linear_axis: bool = False, axes: Any = None
+) -> Axes:  # fmt: skip
     """A map of amplitude and frequency: a colour for what acts at each point, lines for the linear onset."""
     (panel,) = _panels(axes, 1)
     from matplotlib.colors import ListedColormap
@@ -332,5 +326,4 @@ def _amplitude_axes(panel: Axes, linear_axis: bool) -> float:
 
 
 def _shown_angle(linear_axis: bool) -> tuple[float, str]:
-    """What an angle or a travel is drawn times, and its unit then."""
     return (1e3, "mm") if linear_axis else (float(np.degrees(1.0)), "deg")

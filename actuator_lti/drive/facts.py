@@ -117,16 +117,13 @@ def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
 
 def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     """Slope of friction over the motor's speed, piece by piece: (speed from which it holds, slope)."""
-    pieces = friction_slopes(design, direction)
     behind, damping = design.load.friction, design.load.moment_damping_Nms_rad
     more: Any = 0.0
     if behind is not None and design.coupling is not None:
         more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     if present(damping):
         more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
-    if not present(more):
-        return pieces
-    return [(start, slope + more) for start, slope in pieces]
+    return [(start, slope + more) for start, slope in friction_slopes(design, direction)]
 
 
 def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:
@@ -176,8 +173,7 @@ def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) ->
     """First speed where ``start_value + friction(w) + more w`` rises through 0; inf where it does not."""
     result: Any = math.inf
     value = start_value
-    ends = [*(start for start, _ in slopes[1:]), None]
-    for (start, slope), end in zip(slopes, ends, strict=True):
+    for (start, slope), end in zip(slopes, [*(start for start, _ in slopes[1:]), None], strict=True):
         rise = slope + more
         rises = rise > 0.0
         root = where(rises, start - value / where(rises, rise, 1.0), math.inf)
@@ -190,7 +186,6 @@ def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) ->
 
 
 def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
-    """The figures for one direction of motion, the load against it."""
     against = resistance_Nm(design, load_Nm, direction)
     speed, cause, torque = _top_speed(design, against, _speed_slopes(design, direction))
     stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
@@ -203,12 +198,9 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     limit = design.limits.acceleration_rad_s2
     current = math.nan if kM is None else where(finite(speed), torque / kM, math.nan)
     return Capability(
-        output_rate_rad_s=speed / design.total_ratio,
-        rate_limit=cause,
-        motor_current_A=current,
-        acceleration_rad_s2=smaller(gain, limit) / design.total_ratio,
-        torque_margin=margin,
-    )
+        output_rate_rad_s=speed / design.total_ratio, rate_limit=cause, motor_current_A=current,
+        acceleration_rad_s2=smaller(gain, limit) / design.total_ratio, torque_margin=margin
+    )  # fmt: skip
 
 
 def _with_own_Nm(design: Design, load_Nm: float) -> Any:

@@ -28,7 +28,6 @@ class CommandMean:
 
     @property
     def first_zero_rad_s(self) -> float:
-        """Where its gain is zero first."""
         return 2.0 * pi / (self.samples * self.period_s)
 
     def response(self, omega_rad_s: np.ndarray) -> np.ndarray:

@@ -49,17 +49,12 @@ def shown(value: object, longest: int = 60) -> str:
     """A value as it may be printed: short, one line, no control characters."""
     if isinstance(value, dict | list):
         return f"a{'' if value else 'n empty'} {'table' if isinstance(value, dict) else 'list'}"
-    text = value if isinstance(value, str) else _written(value)
+    if isinstance(value, int) and value not in INTEGERS:  # Python does not agree to print every digit
+        return f"an integer of {value.bit_length()} bits"
+    text = value if isinstance(value, str) else repr(value)
     text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[: longest + 1])
     text = text if len(text) <= longest else text[: longest - 3] + "..."
     return f'"{text}"' if isinstance(value, str) else text
-
-
-def _written(value: object) -> str:
-    """``repr``, also of an integer with more digits than Python agrees to print."""
-    if isinstance(value, int) and value not in INTEGERS:
-        return f"an integer of {value.bit_length()} bits"
-    return repr(value)
 
 
 def shown_path(path: AnyPath) -> str:
@@ -70,7 +65,6 @@ def shown_path(path: AnyPath) -> str:
 
 
 def as_path(path: AnyPath) -> Path:
-    """A path; what is none is refused."""
     shown_path(path)
     return Path(os.fspath(path))
 
@@ -96,7 +90,6 @@ def open_regular(path: AnyPath, what: str = "file") -> BufferedReader:
 
 
 def _near(path: AnyPath) -> str:
-    """The file of nearly that name in the same folder."""
     folder, name = os.path.split(os.fsdecode(path))
     try:
         near = get_close_matches(name, os.listdir(folder or "."), 1, 0.8)
@@ -221,9 +214,8 @@ def parse_json(text: str, where: str, constant: Callable[[str], float] = _refuse
     """
     with in_file(where):
         try:
-            value = json.loads(
-                text, parse_constant=constant, parse_float=_finite, object_pairs_hook=_no_key_twice
-            )
+            hooks: Any = {"parse_float": _finite, "object_pairs_hook": _no_key_twice}
+            value = json.loads(text, parse_constant=constant, **hooks)
         except RecursionError:
             raise InputError(_too_deep("", JSON_DEPTH)) from None
         except (ValueError, OverflowError) as error:
@@ -254,7 +246,6 @@ def _refuse_long_keys(text: str) -> None:
 
 
 def _plain(text: str, longest: int = 60) -> str:
-    """A text as `shown`, without quotes."""
     return shown(text, longest)[1:-1]
 
 
@@ -296,7 +287,5 @@ def _check_text(text: str, path: str, refused: tuple[str, ...], length: Bound | 
         raise InputError(f"{_plain(path)}: {len(text)} characters; allowed: {length.allowed}")
     for character in () if text.isprintable() else text:
         if unicodedata.category(character) in refused and character not in "\n\t":
-            code = f"U+{ord(character):04X}"
-            raise InputError(
-                f"{_plain(path)} = {shown(text)}: holds the control character {code}; allowed: printable text"
-            )
+            held = f"the control character U+{ord(character):04X}"
+            raise InputError(f"{_plain(path)} = {shown(text)}: holds {held}; allowed: printable text")

@@ -66,15 +66,10 @@ class DelayBudget:
 
 
 def delay_budget(
-    design: Design | str | PathLike[str],
-    loop_name: str,
-    frequency_rad_s: float,
-    operating_point: OperatingPoint = "sliding",
-    load_Nm: float = 0.0,
-    *,
-    rotor: RotorState = "free",
-    torques_held: bool = False,
-) -> DelayBudget:
+    design: Design | str | PathLike[str], loop_name: str, frequency_rad_s: float,
+    operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0, *, rotor: RotorState = "free",
+    torques_held: bool = False
+) -> DelayBudget:  # fmt: skip
     """Degrees spent by each part of a loop at a frequency, usually its crossover.
 
     ``loop_name``: "current", "velocity" or "position", broken at its own error, inner loops closed.
@@ -112,14 +107,10 @@ def delay_budget(
         "sampling_deg": _from_low(sampled / full),
     }
     return DelayBudget(
-        loop=loop_name,
-        rotor=rotor,
-        frequency_rad_s=frequency_rad_s,
-        total_deg=sum(items.values()) + sum(steps.values()),
-        one_more_sample_deg=_from_low(later / sampled),
-        filters_deg=steps,
-        **items,
-    )
+        loop=loop_name, rotor=rotor, frequency_rad_s=frequency_rad_s,
+        total_deg=sum(items.values()) + sum(steps.values()), one_more_sample_deg=_from_low(later / sampled),
+        filters_deg=steps, **items
+    )  # fmt: skip
 
 
 def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:
@@ -146,7 +137,6 @@ def _name(k: int, item: Filter) -> str:
 
 
 def _filtered(wired: Drive, lag_s: float, filters: tuple[Filter, ...]) -> Drive:
-    """The drive with these filters only."""
     design, control = wired.design, wired.design.controller
     assert control.velocity is not None
     fewer = replace(control, velocity=replace(control.velocity, filters=filters))

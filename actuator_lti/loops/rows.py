@@ -26,7 +26,6 @@ class Row:
 
     @classmethod
     def of(cls, name: str) -> Row:
-        """The state or input itself."""
         return cls({name: 1.0})
 
     def __add__(self, other: Row) -> Row:
@@ -50,7 +49,6 @@ class Row:
 
 
 def total(rows: Iterable[Row]) -> Row:
-    """The sum of rows."""
     result = Row()
     terms = result.terms
     for row in rows:

@@ -134,7 +134,6 @@ class Compliance:
 
     @property
     def moves(self) -> bool:
-        """Whether a moment moves the output at all."""
         return bool(self.blocks[0].states)
 
     def __call__(self, z: npt.ArrayLike) -> npt.NDArray[np.complex128]:
@@ -160,7 +159,6 @@ class Compliance:
 
     @cached_property
     def _poles(self) -> npt.NDArray[np.complex128]:
-        """Poles over a period of all ticks."""
         over = np.eye(len(self.blocks[0].states))
         for block in self.blocks:
             over = block.A @ over

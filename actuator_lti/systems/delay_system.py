@@ -82,14 +82,12 @@ class DelaySystem(ControlFace):
 
     @classmethod
     def of(cls, plain: PlainDelaySystem, **names: Any) -> DelaySystem:
-        """The python-control system of matrices and names."""
         if plain.states:
             names["states"] = list(plain.states)
         return cls(**{part: getattr(plain, part) for part in _PARTS}, **names)
 
     @property
     def plain(self) -> PlainDelaySystem:
-        """The same as matrices."""
         labels = tuple(self.state_labels) if self.nstates else ()
         return PlainDelaySystem(**{part: getattr(self, part) for part in _PARTS}, states=labels)
 
@@ -122,7 +120,6 @@ class DelaySystem(ControlFace):
 
     @property
     def delay_free(self) -> bool:
-        """Whether there is no delay at all."""
         return len(self.delays_s) == 0
 
     def to_state_space(self) -> control.StateSpace:
@@ -180,11 +177,9 @@ class DelaySystem(ControlFace):
         Zx, Zp, Zu = D @ Vx, C + D @ Vp, D @ Vu
         return control.ss(
             np.block([[self.A + self.B2 @ Zx, self.B2 @ Zp], [B @ Vx, A + B @ Vp]]),
-            np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]),
-            np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
-            self.D11 + self.D12 @ Zu,
-            **({"inputs": self.input_labels, "outputs": self.output_labels} | names),
-        )
+            np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]), np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
+            self.D11 + self.D12 @ Zu, **({"inputs": self.input_labels, "outputs": self.output_labels} | names)
+        )  # fmt: skip
 
     def characteristic(self, s: Any) -> np.ndarray:
         """Characteristic quasi-polynomial det [[sI - A, -B2 E], [-C2, I - D22 E]] at complex s.
@@ -203,7 +198,6 @@ class DelaySystem(ControlFace):
         return control.lti._process_frequency_response(self, x, y, squeeze=squeeze)
 
     def dcgain(self, warn_infinite: bool = False) -> Any:
-        """Gain at s = 0 (delays play no part there)."""
         return self._dcgain(warn_infinite)
 
     def poles(self) -> np.ndarray:
@@ -223,7 +217,6 @@ class DelaySystem(ControlFace):
         return self * -1.0
 
     def __add__(self, other: Any) -> DelaySystem:
-        """Parallel connection."""
         return DelaySystem.of(in_parallel(self.plain, DelaySystem.from_system(other).plain))
 
     __radd__ = __add__
@@ -250,7 +243,6 @@ class DelaySystem(ControlFace):
         raise InputError(f"{shown(other)} / {self}: no division by a system with delays, it would look ahead")
 
     def __pow__(self, power: Any) -> DelaySystem:
-        """The system in series with itself."""
         return reduce(mul, [self] * whole_number("power", power, 0), DelaySystem.from_system(1.0))
 
     def feedback(self, other: Any = 1, sign: int = -1) -> DelaySystem:

@@ -83,7 +83,6 @@ def near_dc(p: flint.acb, loop: RationalLoop) -> bool:
 
 
 def double(value: flint.fmpq) -> float:
-    """The nearest double."""
     return int(value.p) / int(value.q)
 
 

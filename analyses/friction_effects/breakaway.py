@@ -5,15 +5,15 @@ Both by the gains of the controllers, and simulated.
 
 import math
 from dataclasses import dataclass, replace
-from math import copysign
 
 import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import holding_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, standing_gain, torque_gain_Nm_rad
+from actuator_lti.drive.steady import motor_torque_Nm, torque_gain_Nm_rad
 from analyses.finite import finite
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -25,8 +25,7 @@ class StaticThreshold:
     """Smallest step that moves the output at once, by the proportional parts of the controllers."""
 
     load_Nm: float
-    # Motor torque per position error at the output, rotor at rest, before any integrator has acted
-    torque_gain_Nm_rad: float
+    torque_gain_Nm_rad: float  # motor torque per output position error, before an integrator has acted
     # Command (peak, output side) that overcomes breakaway in each direction; 0 where the load already does,
     # ``inf`` where the drive is not strong enough
     forward_rad: float
@@ -35,12 +34,10 @@ class StaticThreshold:
     # moves the output later, see `waiting_time_s`; ``None`` where nothing integrates and the threshold is
     # final
     integral_time_s: float | None
-    # That of the position controller, where the velocity controller integrates too
-    outer_integral_time_s: float | None = None
+    outer_integral_time_s: float | None = None  # of the position controller, beside the other
 
     @property
     def smallest_rad(self) -> float:
-        """The smaller of both directions."""
         return min(self.forward_rad, self.backward_rad)
 
     def waiting_time_s(self, amplitude_rad: float) -> float:
@@ -95,8 +92,7 @@ class Threshold:
     """Threshold of motion at one load torque."""
 
     static: StaticThreshold  # What the gains predict
-    # Steps below the threshold, where a controller integrates and no kick of a step moves it at once
-    waiting: tuple[Waiting, ...]
+    waiting: tuple[Waiting, ...]  # steps below it, where a controller integrates and no kick moves it
     simulated_rad: float | None  # Smallest forward step that ever moves the output, where nothing integrates
     resolution: float  # Of ``simulated_rad``, relative
 
@@ -160,11 +156,9 @@ SLOW_RAD_S = 1e-100  # motor speed at which nothing viscous counts
 class Hysteresis:
     """One settled period of a slow triangle at the command."""
 
-    # Of the triangle; the width depends on its rate where a controller integrates
-    amplitude_rad: float
+    amplitude_rad: float  # of the triangle; the width depends on its rate where a controller integrates
     frequency_hz: float
-    # One period at updates of the position loop, thinned
-    command_rad: np.ndarray
+    command_rad: np.ndarray  # one period at updates of the position loop, thinned
     output_rad: np.ndarray
     width_rad: float  # output falling less output rising, both where the command passes zero
     linear_width_rad: float  # the same without dry friction and play: what the loop lags by at this rate
@@ -220,8 +214,8 @@ def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, 
 
 def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
     """Command less output while the drive slides through zero of the command at a rate."""
-    loop, load, sense = design.controller.position_loop, design.load, copysign(1.0, rate_rad_s)
-    fed = sense * loop.friction_feedforward * standing_gain(design) if loop.friction_feedforward else 0.0
+    loop, load, sense = design.controller.position_loop, design.load, math.copysign(1.0, rate_rad_s)
+    fed = sense * loop.friction_feedforward * torque_per_command(design) if loop.friction_feedforward else 0.0
 
     def missing(lag: float) -> float:
         moment = load_Nm + float(load.moment_Nm(-lag))

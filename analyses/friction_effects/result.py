@@ -57,12 +57,9 @@ class LimitCycles:
 
 
 def limit_cycles(
-    design: Design,
-    load_Nm: float,
-    predicted: tuple[Cycle, ...] | None = None,
-    loops: Loops | None = None,
+    design: Design, load_Nm: float, predicted: tuple[Cycle, ...] | None = None, loops: Loops | None = None,
     settlings: Iterable[Settling] | None = None,
-) -> LimitCycles:
+) -> LimitCycles:  # fmt: skip
     """Predict limit cycles, look for them in the simulator, and wait what steps end in.
 
     The steps are those that judge the whole drive, without counts and noise (`analyses.motion.settling`).
@@ -93,9 +90,8 @@ def described_cycles(design: Design, load_Nm: float) -> tuple[Cycle, ...]:
 class FrictionPoint:
     """What dry friction does at one load torque."""
 
-    # Dry friction at the motor, forward
     load_Nm: float
-    dry_torque_Nm: float
+    dry_torque_Nm: float  # at the motor, forward
     threshold: Threshold | None  # ``None`` where a forward step has none
     hysteresis: Hysteresis | None
     cycles: LimitCycles
@@ -107,9 +103,7 @@ class FrictionEffects:
 
     design: Design
     points: tuple[FrictionPoint, ...]
-    # The controller that integrates, ``"speed"`` or ``"position"``: then friction leaves no lasting error by
-    # itself; empty where none does
-    integrator: str
+    integrator: str  # ``"speed"`` or ``"position"``: leaves no lasting error; empty where none does
     reason: str = ""  # why there is nothing to show; then ``points`` is empty
 
 

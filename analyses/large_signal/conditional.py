@@ -53,11 +53,9 @@ class Prediction:
 
     point: str  # break point in front of the limit (all other loops closed)
     limit: float  # in the unit of the point
-    # What limits there: ``"current limit"``, ``"voltage limit"``, ``"voltage limit as a current, U/R"``
-    limiter: str
+    limiter: str  # what limits there, in words, as "voltage limit as a current, U/R"
     gain_lower: float  # lower gain margin, factor (below 1)
-    # In front of the limit, peak, in the unit of the point: the border between dying out and growing
-    amplitude: float
+    amplitude: float  # in front of the limit, peak, in the unit of the point; beyond it grows
     frequency_hz: float
     output_rad: float  # amplitude of the output angle that goes with it
     antiwindup: bool  # whether the controller in front stops its integral while the limit acts
@@ -69,13 +67,10 @@ class Conditional:
 
     margins: dict[str, ExactMargins]  # at every break point
     predictions: tuple[Prediction, ...]
-    # Largest step of the output that still settles; ``None`` where all steps up to full deflection do, 0
-    # where not even the smallest tried does
-    threshold_rad: float | None
+    threshold_rad: float | None  # largest step that settles; ``None``: all to full deflection; 0: none
     next_rad: float | None  # smallest step tried that does not
     full_deflection_rad: float
-    # Frequency, and amplitude of the output error, while the step at the threshold hovers there
-    oscillation_hz: float | None
+    oscillation_hz: float | None  # of the output error, while the step at the threshold hovers there
     oscillation_rad: float | None
     limiter: str = ""  # the limit that acts longest at the end of the smallest step that does not settle
     limiter_share: float = 0.0  # of the ticks at that end
@@ -95,9 +90,7 @@ class Conditional:
 
 def saturation_gain(ratio: float) -> float:
     """Describing function of saturation, of amplitude over limit; 1 up to the limit."""
-    if ratio <= 1.0:
-        return 1.0
-    return 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
+    return 1.0 if ratio <= 1.0 else 2.0 / pi * (asin(1.0 / ratio) + sqrt(1.0 - 1.0 / ratio**2) / ratio)
 
 
 def saturation_ratio(gain: float) -> float:
@@ -120,15 +113,11 @@ def conditional_stability(design: Design, loops: Loops) -> Conditional:
     threshold, following = step_threshold(design)
     hertz, amplitude = _hovering(design, threshold) if threshold else (None, None)
     return Conditional(
-        margins=margins,
-        predictions=tuple(one for one in predictions if one is not None),
-        threshold_rad=threshold,
-        next_rad=following,
-        full_deflection_rad=design.validation.full_deflection_rad,
-        oscillation_hz=hertz,
-        oscillation_rad=amplitude,
-        **({} if following is None else _end(design, following)),
-    )
+        margins=margins, predictions=tuple(one for one in predictions if one is not None),
+        threshold_rad=threshold, next_rad=following,
+        full_deflection_rad=design.validation.full_deflection_rad, oscillation_hz=hertz,
+        oscillation_rad=amplitude, **({} if following is None else _end(design, following)),
+    )  # fmt: skip
 
 
 def _limits(design: Design) -> list[tuple[str, float, str]]:
@@ -197,7 +186,7 @@ def step_threshold(design: Design) -> tuple[float | None, float | None]:
     before. The first is 0 where not even the smallest tried settles; both ``None`` where all do.
     """
     full = design.validation.full_deflection_rad
-    low, high = _first_unsettled(design, full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS))
+    low, high = _first_unsettled(design, full * np.geomspace(SMALLEST_PART, LARGEST_PART, STEPS), None)
     if low == 0.0:
         low, high = _first_unsettled(design, full * np.geomspace(LEAST_PART, SMALLEST_PART, STEPS), high)
     while high is not None and low > 0.0 and high - low > CLOSE * high:
@@ -205,9 +194,7 @@ def step_threshold(design: Design) -> tuple[float | None, float | None]:
     return (None, None) if high is None else (low, high)
 
 
-def _first_unsettled(
-    design: Design, sizes_rad: Floats, beyond: float | None = None
-) -> tuple[float, float | None]:
+def _first_unsettled(design: Design, sizes_rad: Floats, beyond: float | None) -> tuple[float, float | None]:
     """The size before the first that does not settle (0: none), and that one, else ``beyond``."""
     low = 0.0
     for size in sizes_rad.tolist():
@@ -262,9 +249,8 @@ def _end(design: Design, size_rad: float) -> dict[str, Any]:
     used = run.window_limit_fraction if run.ok[0] else run.limit_fraction  # it may not get so far
     shares = {name: float(used(name)[0]) for name in _limits_of(rest)}
     limiter = max(shares, key=lambda name: shares[name])
-    ending = ENDINGS[rest.verdict]
-    share = shares[limiter]
-    return {"limiter": limiter, "limiter_share": share, "ending": ending, "end_rad": rest.amplitude}
+    longest = {"limiter": limiter, "limiter_share": shares[limiter]}
+    return {**longest, "ending": ENDINGS[rest.verdict], "end_rad": rest.amplitude}
 
 
 def _halves(design: Design, size_rad: float, duration_s: float, most_ticks: int = 8 * MOST_WORK) -> Rows:

@@ -45,9 +45,8 @@ UPDATES = 400  # of the position loop in a window
 class RestSweep(Compared):
     """Response from rest, one entry a frequency."""
 
-    # Shape (K,): command at the output shaft, peak
     frequency_hz: Floats
-    amplitude_rad: Floats
+    amplitude_rad: Floats  # shape (K,): command at the output shaft, peak
     # Shape (K,): output over command: simulated; sliding loop; describing function at ``speed_rad_s`` (NaN
     # where nothing moves)
     measured: Complexes
@@ -62,13 +61,9 @@ class RestSweep(Compared):
 
 
 def sweep_from_rest(
-    design: Design,
-    frequency_hz: npt.ArrayLike,
-    amplitude_rad: npt.ArrayLike,
-    settle_ticks: int,
-    *,
+    design: Design, frequency_hz: npt.ArrayLike, amplitude_rad: npt.ArrayLike, settle_ticks: int, *,
     described: bool = True,
-) -> RestSweep:
+) -> RestSweep:  # fmt: skip
     """Command sines from rest and compare with the describing function of dry friction, where ``described``.
 
     The amplitude is that of the command at the output, one for all or one a frequency, shape (K,).
@@ -93,17 +88,12 @@ def sweep_from_rest(
     for k in np.flatnonzero(moving & described):
         expected[k] = _linear(design, hertz[k : k + 1], float(speed[k]))[0]
     return RestSweep(
-        frequency_hz=hertz,
-        amplitude_rad=amplitude,
-        measured=measured,
-        sliding=_linear(design, hertz, None),
-        described=expected,
-        speed_rad_s=speed,
-        stick_fraction=result.window_stick_fraction,
+        frequency_hz=hertz, amplitude_rad=amplitude, measured=measured, sliding=_linear(design, hertz, None),
+        described=expected, speed_rad_s=speed, stick_fraction=result.window_stick_fraction,
         distortion=result.distortion("motor_speed_rad_s"),
         unsteadiness=result.unsteadiness("output_angle_rad"),
         limiter=tuple(LIMITERS[np.argmax(row)] if row.any() else "" for row in limiter_fractions(result)),
-    )
+    )  # fmt: skip
 
 
 def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> Complexes:
@@ -122,8 +112,7 @@ def _linear(design: Design, frequency_hz: Floats, speed_rad_s: float | None) -> 
 def free_amplitude(design: Design, loops: Loops, frequency_hz: Floats, part: float) -> Floats:
     """Command amplitude: a part of full deflection, at most half of what reaches a limit."""
     full = design.validation.full_deflection_rad
-    border = onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad
-    return np.minimum(part * full, 0.5 * border)
+    return np.minimum(part * full, 0.5 * onset(loops, 2.0 * np.pi * frequency_hz).amplitude_rad)
 
 
 SIZES = {"small": 0.02, "medium": 0.2, "large": 1.0}  # of full deflection, speed, current
@@ -140,8 +129,7 @@ class AmplitudeMargin:
     """Where an oscillation lasts after a release from one deviation."""
 
     loop: str
-    # ``"gain"`` or ``"delay"``; ``"small"``, ``"medium"`` or ``"large"``
-    kind: str
+    kind: str  # ``"gain"`` or ``"delay"``
     size: str
     part: float  # of the full deflection, speed or current
     friction_on: bool
@@ -150,13 +138,10 @@ class AmplitudeMargin:
     value: float | None
     furthest: float
     period_s: float
-    # Limit that acts longest while the oscillation lasts, just past the value; empty where none does
-    limiter: str = ""
-    # Amplitude of that oscillation at the output, rad (m on a linear axis); NaN without a value
-    output: float = nan
+    limiter: str = ""  # that acts longest while it lasts, just past the value; empty where none does
+    output: float = nan  # of that oscillation at the output, rad (linear axis: m); NaN without a value
     axis: str = "rotary"
-    # Whether fewer than `VALUES` were asked, nearer to the linear margin: those take over `MOST_TICKS`
-    coarser: bool = False
+    coarser: bool = False  # fewer than `VALUES` were asked: those take over `MOST_TICKS`
     too_long: bool = False  # whether none was asked, as they take over `TOO_MANY` ticks
 
 

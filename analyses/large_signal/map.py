@@ -47,14 +47,10 @@ class AmplitudeMap(Compared):
     load_Nm: float
     amplitude_rad: np.ndarray  # shape (a,): peak command at the output shaft (linear axis: m)
     frequency_hz: np.ndarray  # shape (f,)
-    # Shape (a, f): index into `CAUSES` and `WAVEFORMS`; criteria in `analyses.large_signal.classify`
-    cause: np.ndarray
+    cause: np.ndarray  # shape (a, f): index into `CAUSES`
     waveform: np.ndarray
-    # Shape (a, f, limiters): fraction of the last window in which speed, acceleration, current and voltage
-    # limits act
-    limiter_fraction: np.ndarray
-    # Shape (a, f): of the output in the last window
-    stick_fraction: np.ndarray
+    limiter_fraction: np.ndarray  # shape (a, f, limiters): of the last window in which each acts
+    stick_fraction: np.ndarray  # shape (a, f), as what follows: of the output in the last window
     distortion: np.ndarray
     unsteadiness: np.ndarray
     response: np.ndarray  # shape (a, f): fundamental of the output over the command
@@ -63,8 +59,7 @@ class AmplitudeMap(Compared):
     # against the tones, which acts later than they are simulated (`slow_protection`)
     onset_rad: Mapping[str, np.ndarray]
     ticks: int  # simulated in all
-    # Whether the grid is coarser than asked for, as that would take more than `MOST_TICKS`
-    coarser: bool = False
+    coarser: bool = False  # than asked for, as that would take more than `MOST_TICKS`
 
     @property
     def gain_db(self) -> np.ndarray:
@@ -107,13 +102,9 @@ class AmplitudeMap(Compared):
 
 
 def amplitude_map(
-    design: AnyDesign,
-    loops: Loops,
-    *,
-    load_Nm: float = 0.0,
-    friction_on: bool = True,
+    design: AnyDesign, loops: Loops, *, load_Nm: float = 0.0, friction_on: bool = True,
     counts: tuple[int, int] = (AMPLITUDES, FREQUENCIES),
-) -> AmplitudeMap:
+) -> AmplitudeMap:  # fmt: skip
     """Simulate sines over amplitude and frequency and say what each shows.
 
     ``loops`` are sampled and sliding, of this design; ``counts`` are fewer where they would take more than
@@ -147,21 +138,16 @@ def amplitude_map(
         cause[off[not_linear(free, linear[off], amplitude[off])]] = CAUSES.index("other")
     shape = (len(levels), len(omega))
     return AmplitudeMap(
-        load_Nm=load_Nm,
-        amplitude_rad=levels,
-        frequency_hz=omega / (2.0 * np.pi),
-        cause=cause.reshape(shape),
+        load_Nm=load_Nm, amplitude_rad=levels, frequency_hz=omega / (2.0 * np.pi), cause=cause.reshape(shape),
         waveform=waveforms(result).reshape(shape),
         limiter_fraction=limiter_fractions(result).reshape((*shape, -1)),
         stick_fraction=result.window_stick_fraction.reshape(shape),
         distortion=result.distortion("output_angle_rad").reshape(shape),
         unsteadiness=result.unsteadiness("output_angle_rad").reshape(shape),
-        response=(result.phasor("output_angle_rad") / amplitude).reshape(shape),
-        linear=start.output,
+        response=(result.phasor("output_angle_rad") / amplitude).reshape(shape), linear=start.output,
         onset_rad={name: a for name, a in border.each_rad.items() if name not in slow},
-        ticks=int(result.column("ticks").sum()),
-        coarser=counts != given,
-    )
+        ticks=int(result.column("ticks").sum()), coarser=counts != given,
+    )  # fmt: skip
 
 
 def slow_protection(design: Design, loops: Loops) -> list[str]:
@@ -184,11 +170,9 @@ class AmplitudeBode(Compared):
     frequency_hz: np.ndarray  # shape (f,)
     fractions: tuple[float, ...]  # Of full deflection; those of the design that the map has
     amplitude_rad: np.ndarray  # shape (k,)
-    # Shape (k, f): Of the fundamental; -inf and NaN where nothing moves, NaN where it did not settle
-    gain_db: np.ndarray
+    gain_db: np.ndarray  # shape (k, f): -inf and NaN where nothing moves, NaN where it did not settle
     phase_deg: np.ndarray
-    # Shape (f,)
-    linear_db: np.ndarray
+    linear_db: np.ndarray  # shape (f,)
     linear_deg: np.ndarray
     all_amplitude_rad: np.ndarray  # shape (a,): Every amplitude of the map
     # Shape (a,): First crossing; between two frequencies of the map the linear response, and what the
@@ -200,8 +184,7 @@ class AmplitudeBode(Compared):
     # Shape (a, 2): Between which frequencies of the map the gain first falls through -3 dB, as far as steady
     # points tell: from 0 where the first of them is below already, to inf where none is
     minus3db_range_hz: np.ndarray
-    # Shape (a,): Whether the gain is below -3 dB at the whole frequency already
-    below_from_start: np.ndarray
+    below_from_start: np.ndarray  # shape (a,): below -3 dB at the whole frequency already
     linear_minus3db_hz: float | None
     linear_minus90deg_hz: float | None
     level_db: float = MINUS_3DB
@@ -233,23 +216,14 @@ def amplitude_bode(design: Design, loops: Loops, amplitude_map: AmplitudeMap) ->
     first_3 = np.array([_crossing(fine, between(row, fine_db), level) for row in gain])
     first_90 = np.array([_crossing(fine, between(row, fine_deg), -90.0) for row in phase])
     return AmplitudeBode(
-        load_Nm=amplitude_map.load_Nm,
-        frequency_hz=hz,
-        fractions=tuple(on_it),
-        amplitude_rad=amplitude_map.amplitude_rad[places],
-        gain_db=gain[places],
-        phase_deg=phase[places],
-        linear_db=fine_db[::FINE],
-        linear_deg=fine_deg[::FINE],
-        all_amplitude_rad=amplitude_map.amplitude_rad,
-        minus3db_hz=first_3,
-        minus90deg_hz=first_90,
+        load_Nm=amplitude_map.load_Nm, frequency_hz=hz, fractions=tuple(on_it),
+        amplitude_rad=amplitude_map.amplitude_rad[places], gain_db=gain[places], phase_deg=phase[places],
+        linear_db=fine_db[::FINE], linear_deg=fine_deg[::FINE], all_amplitude_rad=amplitude_map.amplitude_rad,
+        minus3db_hz=first_3, minus90deg_hz=first_90,
         minus3db_range_hz=np.array([crossing_range(hz, row, level) for row in gain]),
-        below_from_start=gain[:, 0] < level,
-        linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
-        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)),
-        level_db=level,
-    )
+        below_from_start=gain[:, 0] < level, linear_minus3db_hz=finite(_crossing(fine, fine_db, level)),
+        linear_minus90deg_hz=finite(_crossing(fine, fine_deg, -90.0)), level_db=level,
+    )  # fmt: skip
 
 
 def _crossing(hz: np.ndarray, values: np.ndarray, level: float) -> float:

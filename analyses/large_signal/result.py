@@ -47,14 +47,11 @@ class LimitShift:
     # or where nothing limits
     linear_rad: np.ndarray
     simulated_rad: np.ndarray
-    # Empty where there is none
-    linear_limiter: tuple[str, ...]
+    linear_limiter: tuple[str, ...]  # empty where there is none
     simulated_limiter: tuple[str, ...]
     resolution: float  # relative width of the last interval of the bisection
-    # Shape (f,): of mean and filter of the command, which the amplitudes are behind
-    command_gain: np.ndarray | float = 1.0
-    # Whether there are fewer frequencies than asked for, as those would take more than `MOST_TICKS`
-    coarser: bool = False
+    command_gain: np.ndarray | float = 1.0  # shape (f,): of mean and filter of the command in front
+    coarser: bool = False  # fewer frequencies than asked for, as those would take more than `MOST_TICKS`
 
     @property
     def ratio(self) -> np.ndarray:
@@ -142,8 +139,7 @@ class LargeSignals:
 
     design: Design
     map: AmplitudeMap  # with friction, no load
-    # How far dry friction moves the linear limit; ``None`` without it, and where the loop is unstable
-    shift: LimitShift | None
+    shift: LimitShift | None  # of the linear limit by dry friction; ``None`` without it, or unstable
     bode: AmplitudeBode
     sawtooth: Sawtooth
 

@@ -24,8 +24,7 @@ class SawtoothRun:
     """The last periods at one load torque; output side, motor speed and current at the motor."""
 
     load_Nm: float
-    # Thinned for drawing; the rates are those of the output (motor over N)
-    time_s: np.ndarray
+    time_s: np.ndarray  # thinned for drawing; rates are those of the output (motor over N)
     reference_rad: np.ndarray
     output_rad: np.ndarray
     output_rate_rad_s: np.ndarray
@@ -42,12 +41,10 @@ class SawtoothRun:
 
     @property
     def gain_error(self) -> float:
-        """Relative error of the fundamental gain against the formula."""
         return self.gain / self.formula.gain - 1.0
 
     @property
     def lag_error_deg(self) -> float:
-        """Difference of the lag from the formula."""
         return self.lag_deg - self.formula.lag_deg
 
 
@@ -55,20 +52,15 @@ class SawtoothRun:
 class Sawtooth:
     """A sine command that the output can follow only at its top speed."""
 
-    # Of the command
-    amplitude_rad: float
+    amplitude_rad: float  # of the command
     frequency_hz: float
     rate_limit_rad_s: float  # R at the output
     gain_over_frequency: float = 0.0  # Kv/w: the formulas hold where this is large
-    # Part of a period that the reversal 2 R/a takes at the drive's largest acceleration, in degrees: the
-    # formulas reverse at once, so this much lag may come on top
-    reversal_deg: float = 0.0
+    reversal_deg: float = 0.0  # of a period, in which the drive turns round; the formulas do so at once
     has_current: bool = False
     runs: tuple[SawtoothRun, ...] = ()  # one a load torque
     reason: str = ""  # why there is none; then ``runs`` is empty
-    # Steady rate of the output at the slowest load: below R by the droop of a P velocity loop, which the
-    # formulas do not know
-    slowest_rad_s: float = math.inf
+    slowest_rad_s: float = math.inf  # at the slowest load; below R by the droop of a P velocity loop
 
     @property
     def droops(self) -> bool:
@@ -153,17 +145,10 @@ def _run(design: Design, amplitude: float, at: Tone, load_Nm: float, rate: float
     shown = slice(-PERIODS_SHOWN * period, None, max(1, PERIODS_SHOWN * period // POINTS))
     time = run.time_s[shown]
     return SawtoothRun(
-        load_Nm=load_Nm,
-        time_s=time - time[0],
-        reference_rad=run.reference_rad[shown],
-        output_rad=run.output_angle_rad[shown],
-        output_rate_rad_s=run.motor_speed_rad_s[shown] / N,
-        speed_command_rad_s=run.speed_command_rad_s[shown] / N,
-        current_A=run.current_A[shown],
-        gain=fundamental / amplitude,
-        lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0),
-        peak_rad=peak,
+        load_Nm=load_Nm, time_s=time - time[0], reference_rad=run.reference_rad[shown],
+        output_rad=run.output_angle_rad[shown], output_rate_rad_s=run.motor_speed_rad_s[shown] / N,
+        speed_command_rad_s=run.speed_command_rad_s[shown] / N, current_A=run.current_A[shown],
+        gain=fundamental / amplitude, lag_deg=float(-np.degrees(np.angle(phasor)) % 360.0), peak_rad=peak,
         distortion=math.sqrt(max(rms**2 - fundamental**2 / 2.0, 0.0)) / (fundamental / math.sqrt(2.0)),
-        crest=peak / rms,
-        formula=formula,
-    )
+        crest=peak / rms, formula=formula,
+    )  # fmt: skip

@@ -63,8 +63,7 @@ LONGEST_PERIODS = 20_000
 class LinearSteadyState:
     """The whole sampled loop under ``sin(w t)`` at the command, friction sliding without its dry part."""
 
-    # Shape (K,): command to output angle: the fundamental over all ticks, the mean of a limited jerk included
-    output: np.ndarray
+    output: np.ndarray  # shape (K,): command to output angle, fundamental over all ticks, mean included
     states: dict[str, np.ndarray]  # shape (K,): by column of the rows: value at t = 0 is the imaginary part
     stable: bool
     settling_ticks: int  # ticks in which the slowest mode falls to 1e-9
@@ -145,7 +144,6 @@ class Tone:
 
     @property
     def omega_rad_s(self) -> float:
-        """Angular frequency."""
         return 2.0 * math.pi * self.frequency_hz
 
 
@@ -170,8 +168,7 @@ def frequency_range_hz(design: Design, loops: Loops) -> tuple[float, float]:
     """Give the range around the bandwidth of the position loop in which large signals are looked at."""
     nyquist = 0.5 / (design.controller.position_loop.every * design.controller.period_s)
     grid = np.geomspace(nyquist * 1e-5, nyquist * 0.999, 400)
-    magnitude = np.abs(response_at(loops.plain_response, 2.0 * np.pi * grid))
-    below = np.flatnonzero(magnitude < math.sqrt(0.5))
+    below = np.flatnonzero(np.abs(response_at(loops.plain_response, 2.0 * np.pi * grid)) < math.sqrt(0.5))
     bandwidth = float(grid[below[0]]) if below.size else nyquist
     return bandwidth / 10.0**DECADES_BELOW, min(bandwidth * FACTOR_ABOVE, HIGHEST * nyquist)
 
@@ -220,18 +217,10 @@ TANH_TOLERANCE = 1e-5  # of the smoothing speed, a tick: far below what a fundam
 
 
 def run_tones(
-    design: Design,
-    tones: tuple[Tone, ...],
-    which: np.ndarray,
-    amplitude_rad: np.ndarray,
-    start: LinearSteadyState,
-    start_amplitude_rad: np.ndarray,
-    *,
-    load_Nm: float = 0.0,
-    friction_on: bool = True,
-    harmonics: int = HARMONICS,
-    insist: bool = False,
-) -> BatchResult:
+    design: Design, tones: tuple[Tone, ...], which: np.ndarray, amplitude_rad: np.ndarray,
+    start: LinearSteadyState, start_amplitude_rad: np.ndarray, *, load_Nm: float = 0.0,
+    friction_on: bool = True, harmonics: int = HARMONICS, insist: bool = False,
+) -> BatchResult:  # fmt: skip
     """Simulate one sine a run, tone ``which[r]``, from the linear steady state at ``start_amplitude_rad``.
 
     That is at most the onset of limiting; both amplitudes are the command's, at the output shaft.  ``insist``

@@ -28,13 +28,11 @@ class CodeCheck:
 
     @property
     def failed(self) -> tuple[Row, ...]:
-        """Predictions that the compiled code does not meet."""
         return tuple(entry for entry in self.entries if entry.verdict is Verdict.NOT_MET)
 
     def largest(self, *quantities: str) -> Row | None:
         """The entry of these quantities with the largest difference; ``None`` where none is measured."""
-        known = [e for e in self.entries if e.name in quantities]
-        return max(known, key=lambda e: e.error, default=None)
+        return max((e for e in self.entries if e.name in quantities), key=lambda e: e.error, default=None)
 
 
 def check_code(design: Design) -> CodeCheck:

@@ -72,10 +72,8 @@ class LoopFigures:
     held: LoopFigures | None = None
     by_hold: bool = False  # unstable only as a torque over the angle is held over a tick
     locked: LoopFigures | None = None  # of a current loop with a free rotor, where it was asked for: locked
-    # What comes before ``plain_response`` on the way from the user's command: the mean of a limited jerk
-    mean: CommandMean | None = None
-    # Of a position loop with a mean or a filter of the command: with bandwidth and step behind them
-    reference: LoopFigures | None = None
+    mean: CommandMean | None = None  # of a limited jerk, between the user's command and ``plain_response``
+    reference: LoopFigures | None = None  # of a position loop with a mean or filter: behind them
 
     def asked(self, requirement: Requirement) -> LoopFigures:
         """The figures that a requirement means: of which current loop, of which response."""
@@ -97,7 +95,6 @@ class LoopFigures:
 
     @property
     def by_itself(self) -> str:
-        """What is said of a loop that is unstable by itself."""
         return f"{OPEN[self.loop.name]}, as {ACTIVE if self.by_hold else AWAY}"
 
     @property
@@ -107,7 +104,6 @@ class LoopFigures:
 
     @cached_property
     def response(self) -> Any:
-        """What bandwidth and step are taken of, as a python-control system."""
         return as_control(self.plain_response)
 
     @property
@@ -117,19 +113,13 @@ class LoopFigures:
 
     @property
     def stable(self) -> bool:
-        """Whether the closed loop is known to be stable."""
         return self.margins.stable is True
 
 
 def loop_figures(
-    loop: Loop,
-    response: Any = None,
-    *,
-    bandwidth: bool = True,
-    step: bool = True,
-    certify: bool = False,
+    loop: Loop, response: Any = None, *, bandwidth: bool = True, step: bool = True, certify: bool = False,
     mean: CommandMean | None = None,
-) -> LoopFigures:
+) -> LoopFigures:  # fmt: skip
     """Compute all figures of a loop; ``certify``: its margins by exact arithmetic, see `stability_margins`.
 
     Bandwidth and step (that of a continuous loop with delays takes its time) are those of ``response``, else
@@ -167,13 +157,9 @@ def _answering(
         return own if mean is None else commanded_step(response, own, mean)
 
     return replace(
-        figures,
-        plain_response=response,
-        bandwidth=_if_there_is(band, notes) if bandwidth else None,
-        step=_if_there_is(steps, notes) if step else None,
-        notes=tuple(dict.fromkeys(notes)),
-        mean=mean,
-    )
+        figures, plain_response=response, bandwidth=_if_there_is(band, notes) if bandwidth else None,
+        step=_if_there_is(steps, notes) if step else None, notes=tuple(dict.fromkeys(notes)), mean=mean,
+    )  # fmt: skip
 
 
 def _far_from_asked(name: str, dc_gain: float) -> list[str]:
@@ -196,13 +182,9 @@ def _if_there_is(call: Callable[[], Figure], notes: list[str]) -> Figure | None:
 
 
 def all_loop_figures(
-    loops: Loops,
-    *,
-    step: bool = True,
-    refused: list[str] | None = None,
-    certify: bool = False,
+    loops: Loops, *, step: bool = True, refused: list[str] | None = None, certify: bool = False,
     locked: bool | None = None,
-) -> dict[str, LoopFigures]:
+) -> dict[str, LoopFigures]:  # fmt: skip
     """Compute the figures of every loop that the design has, innermost first, by name; see `loop_figures`.
 
     A loop whose margins cannot be found is left out, and the reason added to ``refused`` where that is given.
@@ -293,7 +275,6 @@ def _differing(margins: StabilityMargins, other: StabilityMargins) -> str:
 
 
 def _locked(loops: Loops, *, step: bool, certify: bool) -> LoopFigures:
-    """The current loop with the rotor locked."""
     fixed = other_loops(loops, loops.design, rotor="locked").present["current"]
     return loop_figures(fixed, step=step, certify=certify)
 

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing.faces import draw
-from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, slope_at
+from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, slope_at, turned
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import ExactMargins, Loops, assemble_loops, exact_margins
 from actuator_lti.loops.assemble import loops_at
@@ -60,11 +60,12 @@ class OperatingPointFigures:
     slope_Nms_rad: float  # slope of the friction torque over the motor speed
     figures: Mapping[str, LoopFigures]
     load_unit: str = "N m"
+    design: Design | None = None  # where it is not the design itself: another angle, or in motion
 
     @property
     def place(self) -> str:
         """Label and load in words; empty where the dry part slides, as the loops are judged."""
-        if self.kind == "sliding":
+        if self.label == SLIDING:
             return ""
         return self.label if self.load_Nm is None else f"{self.label}, load {self.load_Nm:g} {self.load_unit}"
 
@@ -75,8 +76,7 @@ class LoopSurvey:
 
     design: Design
     loops: Loops  # sampled, sliding, no load
-    # By form, then by loop; step figures of the sampled form only
-    forms: Mapping[str, Mapping[str, LoopFigures]]
+    forms: Mapping[str, Mapping[str, LoopFigures]]  # by form, then by loop; step figures of the sampled
     break_points: Mapping[str, BreakPoint]
     operating_points: tuple[OperatingPointFigures, ...]
     budgets: Mapping[str, DelayBudget]  # at the lowest gain crossover of each loop that has one
@@ -147,17 +147,14 @@ def survey_loops(design: AnyDesign, progress: Progress = None) -> LoopSurvey:
 
 
 def _other_form(design: Design, form: Form, refused: list[str]) -> Mapping[str, LoopFigures]:
-    """Measure the loops in a form other than the sampled one."""
     return all_loop_figures(assemble_loops(design, form=form), step=False, refused=refused, certify=True)
 
 
 def _break_points(loops: Loops) -> dict[str, BreakPoint]:
-    """Measure the loop at every break point."""
     return {name: _break_point(loops, name) for name in loops.break_points}
 
 
 def _break_point(loops: Loops, name: str) -> BreakPoint:
-    """Measure the loop at one break point."""
     loop = loops.break_points[name]
     exact, states = exact_margins(loops, name) if loop.periodic else None, len(loop.plain_open.A)
     if exact is not None and states > MOST_STATES:
@@ -172,7 +169,9 @@ def _break_point(loops: Loops, name: str) -> BreakPoint:
 def operating_points(
     design: Design, refused: list[str], load_Nm: float = 0.0, *, described: bool = True, certify: bool = True
 ) -> tuple[OperatingPointFigures, ...]:
-    """Measure the loops at each operating point that the drive has: sliding, driving, driven, gap, rest.
+    """Measure the loops at each operating point that the drive has.
+
+    Sliding, on a crest and in a notch of what a motion averages, driving, driven, in the gap, at rest.
 
     ``refused`` gets the loops whose margins are not found, and why; ``load_Nm``: at the output, of the points
     that are not told at a load: it chooses the piece of a spring that bends; ``described``: friction
@@ -180,14 +179,19 @@ def operating_points(
     """
 
     def point(
-        label: str, load: float | None, kind: OperatingPoint, speed: float | None = None
+        label: str,
+        load: float | None,
+        kind: OperatingPoint,
+        speed: float | None = None,
+        there: Design | None = None,
     ) -> OperatingPointFigures:
         at = Operating(point=kind, load_Nm=load_Nm if load is None else load, speed_amplitude_rad_s=speed)
-        slope, loops = slope_at(design, at), loops_at(design, at)
+        slope, loops = slope_at(design, at), loops_at(there or design, at)
         figures = all_loop_figures(loops, step=False, refused=refused, certify=certify, locked=False)
-        return OperatingPointFigures(kind, label, load, slope, figures, design.load_unit)
+        return OperatingPointFigures(kind, label, load, slope, figures, design.load_unit, there)
 
-    points = [point("sliding", None, "sliding")]
+    points = [point(SLIDING, None, "sliding")]
+    points += [point(label, None, "sliding", there=there) for label, there in turned(design)]
     if design.coupling is not None and design.friction.load_coefficient:
         points.append(point("load driven by the motor", None, "driving"))
         points.append(point("motor driven by the load", None, "driven"))
@@ -203,7 +207,7 @@ def operating_points(
     return tuple(points)
 
 
-AT_REST = "at rest"
+SLIDING, AT_REST = "sliding", "at rest"
 
 
 def at_rest(design: Design) -> str:

@@ -30,18 +30,15 @@ _SAME_TIME = 1e-9
 class OuterLoop:
     """A linear system around a drive."""
 
-    # What it is, what it reads, what it gives
-    name: str
+    name: str  # what it is; what it reads and gives
     input: str
     output: str
     system: control.StateSpace  # one input, one output; ``dt`` 0 where continuous
-    # How often a continuous system is read, its output held in between; ``None`` where it is not said
-    sampling_period_s: float | None = None
+    sampling_period_s: float | None = None  # of a continuous system, its output held; ``None``: not said
     sign: int = -1  # with which the output is added to the command
 
     @property
     def continuous(self) -> bool:
-        """Whether the system is continuous."""
         return self.system.dt == 0
 
 

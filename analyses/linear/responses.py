@@ -28,7 +28,6 @@ class Curve:
 
     @property
     def frequency_hz(self) -> np.ndarray:
-        """The grid in Hz."""
         return self.omega_rad_s / (2.0 * np.pi)
 
     @property

@@ -25,18 +25,13 @@ class Manoeuvre:
 
     name: str
     load_Nm: float
-    # Motor speed and motor torque along it, thinned for drawing
-    speed_rad_s: np.ndarray
+    speed_rad_s: np.ndarray  # of the motor along it, thinned for drawing, as the torque
     torque_Nm: np.ndarray
-    # ``None`` for an ideal source, which has no current
-    rms_current_A: float | None
+    rms_current_A: float | None  # ``None`` for an ideal source, which has no current
     peak_current_A: float | None
-    # Of the motor
-    rms_torque_Nm: float
+    rms_torque_Nm: float  # of the motor
     peak_torque_Nm: float
-    # Share of the time in which the manoeuvre may run, resting in between, for the rms current to stay at the
-    # continuous current: ``(I_cont/I_rms)^2``, at most 1
-    duty: float | None
+    duty: float | None  # `thermal_duty`, of one that repeats
     limits: dict[str, float]  # fraction of the time in which each limit acts, where it does
     periodic: bool  # whether it repeats: only then rms and duty say what can be kept up
 
@@ -86,7 +81,6 @@ def manoeuvres(
 def _manoeuvre(
     design: Design, name: str, command: commands.Command, time: float, load_Nm: float, period: float | None
 ) -> Manoeuvre:
-    """Simulate, and read speeds, torques and currents."""
     time = min(time, LONGEST_TICKS * design.controller.period_s)
     run = simulate(design, command, time, load_Nm, raise_on_failure=False)
     count = run.time_s.size if period is None else min(round(period / run.period_s), run.time_s.size)
@@ -96,18 +90,13 @@ def _manoeuvre(
     thin = _thinned(speed, torque)
     rms = None if current is None else _rms(current)
     return Manoeuvre(
-        name=name,
-        load_Nm=load_Nm,
-        speed_rad_s=speed[thin],
-        torque_Nm=torque[thin],
-        rms_current_A=rms,
-        peak_current_A=None if current is None else float(current.max()),
-        rms_torque_Nm=_rms(torque),
+        name=name, load_Nm=load_Nm, speed_rad_s=speed[thin], torque_Nm=torque[thin], rms_current_A=rms,
+        peak_current_A=None if current is None else float(current.max()), rms_torque_Nm=_rms(torque),
         peak_torque_Nm=float(np.max(np.abs(torque))),
         duty=thermal_duty(design, rms) if period is not None else None,
         limits={key: use.fraction for key, use in run.limits.items() if use.active},
         periodic=period is not None,
-    )
+    )  # fmt: skip
 
 
 def _rms(values: np.ndarray) -> float:
@@ -118,8 +107,7 @@ def _thinned(speed: np.ndarray, torque: np.ndarray) -> np.ndarray:
     """Choose points that lie evenly along the path in the plane, so that fast parts keep their shape."""
     spans = (max(float(np.ptp(speed)), 1e-300), max(float(np.ptp(torque)), 1e-300))
     way = np.append(0.0, np.cumsum(np.hypot(np.diff(speed) / spans[0], np.diff(torque) / spans[1])))
-    places = np.searchsorted(way, np.linspace(0.0, way[-1], POINTS))
-    return np.unique(np.minimum(places, len(way) - 1))
+    return np.unique(np.minimum(np.searchsorted(way, np.linspace(0.0, way[-1], POINTS)), len(way) - 1))
 
 
 @dataclass(frozen=True)
@@ -204,8 +192,7 @@ class Capability:
     # Steady rate when the command runs away from the output; ``None`` where the rate has no bound, or was not
     # reached in the time that a run may take
     simulated_rate_rad_s: float | None
-    # Largest mean acceleration over a stretch of the start, from rest
-    simulated_acceleration_rad_s2: float | None
+    simulated_acceleration_rad_s2: float | None  # largest mean over a stretch of the start
     simulated_current_A: float | None  # mean motor current at the steady rate
     current_ratio: float | None  # that current over the continuous current
     duty: float | None  # share of the time in which that current may flow (`thermal_duty`)

@@ -108,7 +108,7 @@ def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
         if after < min(before, 0.0):
             return False
     found = linear_figures(Population(design, {move.path: both}, 2), time_figures=True, held=True)
-    columns = loop_columns(found)
+    columns = loop_columns(found, design)
     for item in by_loop(design):
         if item.quantity in LOOP_QUANTITIES and item.loop in found.loops and in_populations(item, design):
             before, after = judge(item, design, columns).passed

@@ -23,12 +23,10 @@ LONGEST_TICKS = 60_000
 class StepTime:
     """A step of the command, output side; ``None`` where a level was not reached in time."""
 
-    # Fraction of full deflection, and the step itself
     load_Nm: float
-    fraction: float
+    fraction: float  # of full deflection
     amplitude_rad: float
-    # 10 to 90 %; beyond the target; into 2 % for good
-    rise_time_s: float | None
+    rise_time_s: float | None  # 10 to 90 %
     overshoot_percent: float
     settling_time_s: float | None
     peak_rate_rad_s: float  # largest rate of the output

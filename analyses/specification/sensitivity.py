@@ -24,15 +24,12 @@ SWING = 0.1
 class Sensitivity:
     """One parameter and one figure."""
 
-    # Dotted key; column such as ``"position.phase_margin"``
-    path: str
+    path: str  # dotted key
     figure: str
     per_percent: float  # change of the figure per +1 % of the parameter (central difference of 0.1 %)
-    # Ends of the parameter, SI
-    low_value: float
+    low_value: float  # one end of the parameter, SI
     high_value: float
-    # The figure there; NaN where it does not exist
-    low: float
+    low: float  # the figure there; NaN where it does not exist
     high: float
 
     @property

@@ -23,15 +23,13 @@ from analyses.linear.loop_survey import BreakPoint, LoopSurvey, OperatingPointFi
 class View:
     """The margins of a loop from one side."""
 
-    # Which operating point or corner, or that all loops are closed; empty for the loop as it is judged
-    place: str
+    place: str  # operating point, corner or that all loops are closed; empty: as it is judged
     loop: str  # its name; empty at a break point
     rotor: str  # of a current loop: ``"free"`` or ``"locked"``
     stable: bool | None
     figures: Mapping[str, float]  # by the names of `CUSTOMARY`; ``inf`` where nothing limits
     cut: str = ""  # the break point, with all other loops closed
-    # The operating point
-    kind: OperatingPoint = "sliding"
+    kind: OperatingPoint = "sliding"  # the operating point
     load_Nm: float = 0.0
     design: Design | None = None  # where it is not the nominal one: that of a corner
     found: LoopFigures | None = None  # the loop as it is there
@@ -69,7 +67,8 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
         yield _at_break_point(name, point)
     for one in survey.operating_points:
         if one.kind != "describing-function":
-            yield from _loops(one.place, one.figures, kind=one.kind, load_Nm=one.load_Nm or 0.0)
+            at = {"kind": one.kind, "load_Nm": one.load_Nm or 0.0, "design": one.design}
+            yield from _loops(one.place, one.figures, **at)
     for corner in corners.corners[1:] if corners else ():
         place = corner.name.replace("worst ", "tolerances of the worst ", 1)
         yield from _loops(place, corner.figures, design=corner.design)

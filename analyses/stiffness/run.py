@@ -5,6 +5,7 @@ It is put to the simulator: by its own derivative, and by a moment injected at t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from math import ceil, sqrt
 from typing import Literal
@@ -12,12 +13,13 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, LoadFriction
 from actuator_lti.drive.operating import Operating, stiffness_there
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import stiffness as linear
+from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import HELD, LoopSetup
 from nonlinear.bench.operating_motion import on_the_bench, standing
@@ -105,8 +107,18 @@ class Stiffness:
         lost = self.lost_motion
         return None if lost is None or lost.seen_rad is None else abs(lost.seen_rad / lost.foreseen_rad - 1.0)
 
+    @cached_property
+    def requirements(self) -> tuple[RequirementVerdict, ...]:
+        """Those of the design on stiffness and lost motion."""
+        return judged_by(self.design, "stiffness", self)
+
     @property
     def verdict(self) -> Verdict:
+        """The checks and the requirements together."""
+        return (Tally.of([self.checked]) + tally(self.requirements)).verdict
+
+    @property
+    def checked(self) -> Verdict:
         """Whether every check agrees to `AGREED`, and lost motion to `READ`; not proven without a check."""
         if not self.checks:
             return Verdict.NOT_PROVEN

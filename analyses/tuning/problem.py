@@ -138,7 +138,7 @@ class Problem:
         timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
         population = self._looked_at(gains, corners, self.factors if factors is None else factors)
         linear = _linear_figures(population, timed)
-        columns = loop_columns(linear)
+        columns = loop_columns(linear, self.design)
         for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
             if name in DRIVE_QUANTITIES:
                 columns[drive_column(name, load)] = drive_figures(population, name, load)

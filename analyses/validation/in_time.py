@@ -1,10 +1,11 @@
-"""Linear predictions shown in time: one small step, and runs beside each margin that grow or die out.
+"""Linear predictions shown in time: one small step, runs beside each margin, sines injected into each loop.
 
 The step is injected at the place on the operating motion; the simulated answer is held against the linear one
 at every sample.  Beside a gain margin K the drive is started on the critical mode of its own tangent, at
 K (1 - BESIDE) and K (1 + BESIDE), multiplied at the place: with v the mode and w its left eigenvector,
 ``w^H (s - s_calm)`` is multiplied by the predicted eigenvalue in every period, exactly.  No window is
-searched, nothing waited for.
+searched, nothing waited for.  A sine begins in the steady state that it has by the tangent, its fundamentals
+correlated over whole periods: what a frequency-response analyser on the bench would see.
 """
 
 from collections.abc import Callable
@@ -57,9 +58,8 @@ class MarginRun:
     factor: float  # what the mode is predicted to be multiplied by over the run
     found: float  # over predicted
     error: float  # of what was found, by what two sizes of the run differ in and the tangent's stated error
-    # Amplitude of the mode, from 1
     time_s: Floats
-    amplitude: Floats
+    amplitude: Floats  # of the mode, from 1
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,6 @@ def step_shown(bench: Bench, name: str) -> StepShown | None:
 
 
 def _linear_step(closed: PlainSystem, samples: int) -> Floats:
-    """Unit step response at its samples."""
     x, out = np.zeros(len(closed.A)), np.empty(samples)
     for k in range(samples):
         out[k] = float(closed.C[0] @ x + closed.D[0, 0])
@@ -211,3 +210,56 @@ def _mode(A: Floats, pole: complex) -> tuple[Complexes, Complexes]:
     k = int(np.argmin(np.abs(values - pole)))
     w, v = left[:, k].conj() / scale, right[:, k] * scale
     return w / (w @ v), v
+
+
+FREQUENCIES = 24
+LOWEST, HIGHEST = 2e-3, 0.9  # of Nyquist
+SAMPLES = 240  # of a run, about
+
+
+@dataclass(frozen=True)
+class BenchSweep:
+    """An injected sweep of one loop at K frequencies."""
+
+    loop: str
+    frequency_hz: Floats
+    open_loop: Complexes  # measured; NaN where every size met an event
+    linear: Complexes
+
+
+def bench_sweep(bench: Bench, place: Place) -> BenchSweep:
+    setup, hold_s = bench.setup(place.name), place.tangent.hold_s
+    shares = np.geomspace(LOWEST, HIGHEST, FREQUENCIES)
+    turns = sorted({_turns(share) for share in shares}, key=lambda turn: turn[0] / turn[1])
+    angles = np.array([2.0 * np.pi * cycles / samples for cycles, samples in turns])
+    found = [_found(setup, place, angle, samples) for angle, (_, samples) in zip(angles, turns, strict=True)]
+    linear = np.asarray(bench.loop(place.name).plain_open(np.exp(1j * angles)), complex)
+    return BenchSweep(place.name, angles / (2.0 * np.pi * hold_s), np.array(found), linear)
+
+
+def _turns(share: float) -> tuple[int, int]:
+    """Whole cycles and samples of a run at about a share of Nyquist."""
+    cycles = max(1, round(0.5 * share * SAMPLES))
+    return cycles, ceil(2.0 * cycles / share)
+
+
+def _found(setup: LoopSetup, place: Place, angle: float, samples: int) -> complex:
+    """The open loop at an angle a sample, by a cosine."""
+    t, rows = place.tangent, setup.rows()
+    turn, updates = np.exp(1j * angle * np.arange(samples)), t.B.shape[1]
+    around = np.exp(1j * angle * updates) * np.eye(len(t.A)) - t.A
+    begin = np.linalg.solve(around, t.B @ np.exp(1j * angle * np.arange(updates))).real
+
+    def course(size: float) -> Complexes | None:
+        rows.sine(setup.point, size, angle / (2.0 * np.pi * t.hold_s), 0.5 * np.pi)
+        drive = rows.running()
+        drive.s[t.places] += size * begin
+        back = drive.returned(drive.advance(samples * setup.hold_ticks, setup.hold_ticks), setup.point)
+        return -2.0 / samples * (back @ turn.conj())[None] if drive.happened == (0.0, 0.0) else None
+
+    size = abs(complex(t.closed(np.exp(1j * angle))))
+    try:
+        closed = complex(agreed(course, setup, WITHIN / SURE**2 * size)[0][0])
+    except NumericalError:
+        return complex(np.nan, np.nan)
+    return closed / (1.0 - closed)

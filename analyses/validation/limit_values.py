@@ -32,7 +32,6 @@ LIFTED = Limits(voltage_V=inf)
 
 
 def only(**limits: Any) -> Limits:
-    """These limits, the others lifted."""
     return replace(LIFTED, **limits)
 
 
@@ -63,7 +62,6 @@ class Pair:
 
 
 def limit_rows(pair: Pair) -> Iterator[Row]:
-    """All of them."""
     yield from _limited(pair, rate=False)
     yield from _limited(pair, rate=True)
     for stage in ("current", "velocity"):

@@ -118,7 +118,6 @@ class Bench:
             yield self.place(name)
 
     def place(self, name: str) -> Place:
-        """One place, its tangent measured."""
         setup = self.setup(name)
         found = self._tangent(name, setup)
         if name in self.figures:

@@ -14,8 +14,7 @@ from analyses.limit_cycles.counts import Counts
 from analyses.linear.loop_figures import LoopFigures
 from analyses.motion.settling import Settling, ending_of, noticed, verdict_of, waiver_of_rest
 from analyses.specification import Specification
-from analyses.validation.bench_sweep import BenchSweep
-from analyses.validation.in_time import MarginShown, StepShown
+from analyses.validation.in_time import BenchSweep, MarginShown, StepShown
 from analyses.validation.row import Row
 
 REST = {
@@ -30,16 +29,13 @@ class Validation:
     """Everything the nonlinear simulator says of a design's predictions."""
 
     design: Design
-    # Every check: small signals by the tangent, the runs in time, the numbers of the design
-    rows: tuple[Row, ...]
+    rows: tuple[Row, ...]  # every check: tangent, runs in time, numbers of the design
     figures: Mapping[str, LoopFigures]  # linear loops, as they are tested (the current's with a locked rotor)
-    # The same as `analyses.margins` judges them: sliding, of the current with the rotor free
-    loops: Mapping[str, LoopFigures] = field(default_factory=dict)
+    loops: Mapping[str, LoopFigures] = field(default_factory=dict)  # the same as `margins` judges them
     steps: Mapping[str, StepShown] = field(default_factory=dict)
     margins: Mapping[str, MarginShown] = field(default_factory=dict)  # runs on either side of the gain margin
     sweeps: Mapping[str, BenchSweep] = field(default_factory=dict)
-    # Findings: what large signals, friction and counts do
-    amplitude_margins: tuple[AmplitudeMargin, ...] = ()
+    amplitude_margins: tuple[AmplitudeMargin, ...] = ()  # findings from here on
     conditional: Conditional | None = None
     rest_sweep: RestSweep | None = None
     counts: tuple[Counts, ...] = ()
@@ -47,13 +43,11 @@ class Validation:
     large_signals: LargeSignals | None = None
     friction: FrictionEffects | None = None
     specification: Specification | None = None
-    # Loops that are stable with the friction that is left out where the drive is tested, and only with it
-    held_by_friction: tuple[str, ...] = ()
+    held_by_friction: tuple[str, ...] = ()  # stable only with friction that is left out where it is tested
     notes: tuple[str, ...] = ()  # what could not be done, and why
 
     @property
     def tally(self) -> Tally:
-        """The rows counted."""
         waived = [self.waived(f"{row.loop}/{row.name}") for row in self.rows]
         return Tally.of((row.verdict for row in self.rows), waived)
 
@@ -63,7 +57,6 @@ class Validation:
 
     @property
     def not_met(self) -> tuple[Row, ...]:
-        """Predictions that the simulator contradicts."""
         return tuple(row for row in self.rows if row.verdict is Verdict.NOT_MET)
 
     @property
@@ -125,9 +118,7 @@ class Validation:
             return Verdict.NOT_MET
         doubts = [not self.waived(f"stable-{name}") for name in self.undecided]
         doubts.append(self.rest is Verdict.NOT_PROVEN and waiver_of_rest(self.design) is None)
-        if not self.rows or any(doubts):
-            return Verdict.NOT_PROVEN
-        return self.tally.verdict
+        return Verdict.NOT_PROVEN if not self.rows or any(doubts) else self.tally.verdict
 
     @property
     def passed(self) -> bool:
@@ -142,7 +133,6 @@ class Validation:
 
     @property
     def words(self) -> str:
-        """Its sentences in one line."""
         return "; ".join(self.sentences())
 
     def __str__(self) -> str:

@@ -15,11 +15,9 @@ class Row:
     name: str  # quantity: "response", "gain_margin", "breakaway_torque", ...
     loop: str  # stage, break point, "command", "load", or "drive"
     unit: str = ""  # of the predicted and found value
-    # ``None`` where the row judges more than one number (a response); ``because`` says which was worst
-    predicted: float | None = None
+    predicted: float | None = None  # ``None`` where several numbers are judged (a response)
     found: float | None = None
-    # Difference, and the largest that is agreement; in ``unit``, relative where both values are ``None``
-    error: float = 0.0
+    error: float = 0.0  # difference; in ``unit``, relative where both values are ``None``
     allowed: float = 0.0
     verdict: Verdict = Verdict.MET  # not proven: the simulator's own accuracy does not suffice
     because: str = ""
@@ -38,15 +36,9 @@ class Row:
 
 
 def judged(
-    name: str,
-    loop: str,
-    predicted: float | None,
-    found: float | None,
-    allowed: float,
-    *,
-    resolved: bool = True,
-    **words: str,
-) -> Row:
+    name: str, loop: str, predicted: float | None, found: float | None, allowed: float, *,
+    resolved: bool = True, **words: str,
+) -> Row:  # fmt: skip
     """Judge one number: both there and within ``allowed``, or both absent.
 
     ``resolved`` says whether the measurement is good enough to tell a wrong prediction; ``words`` are unit,

@@ -21,9 +21,7 @@ FINDINGS: tuple[Finding, ...] = get_args(Finding)
 class Settings:
     """What a validation looks at beside its checks; the defaults are those of the report."""
 
-    # What the drive itself does: whether it comes to rest, and what large commands make of it. The verdict is
-    # that of the checks and of these
-    own: bool = True
+    own: bool = True  # whether it comes to rest, and what large commands make of it; in the verdict
     findings: tuple[Finding, ...] = FINDINGS
     rest_frequencies: int = 16  # of the sweep from rest
     map_counts: tuple[int, int] = (17, 28)  # amplitudes and frequencies of the large-signal map
@@ -51,5 +49,4 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, *, quick: bool = False, large: bool = False) -> Settings:
-        """The settings of `analyses.validation.validate`."""
         return Settings() if large and not quick else QUICK

@@ -47,8 +47,7 @@ class Place:
     condition: str  # the motion that it is tested on, in words
     tangent: Tangent
     predicted: Callable[[Complexes], Complexes]  # T at points z of the place's own rate
-    # Of the closed loop over one base period; of a loop or a break point
-    poles: Complexes = field(default_factory=lambda: np.empty(0, complex))
+    poles: Complexes = field(default_factory=lambda: np.empty(0, complex))  # over one base period
     figures: LoopFigures | None = None  # of a loop; its margins are judged where it is not periodic
     exact: ExactMargins | None = None  # of a break point with all loops closed
     critical: Callable[[float], Complexes] | None = None  # eigenvalues over one base period at a gain
@@ -80,7 +79,6 @@ class Place:
 
 
 def small_signal(place: Place) -> list[Row]:
-    """All rows of one place."""
     rows = [_response(place)]
     if place.poles.size:
         rows.append(_poles(place))
@@ -160,8 +158,7 @@ class _Crossing:
     gain: float
     angle: float
     outward: float  # how far outside the circle it lies for a relative change of the gain of 1
-    # Of the gain, relative: from the stated error of the pole, where that of the response does not count
-    error: float | None = None
+    error: float | None = None  # of the gain, relative, where not that of the response
 
 
 def _crossing(t: Tangent, gain: float, angle: float) -> _Crossing | None:
@@ -288,7 +285,6 @@ def _delay_row(place: Place, delay_s: float) -> Row:
 
 
 def nearest_pole(A: Floats, pole: complex) -> complex:
-    """The eigenvalue nearest to a pole."""
     poles = np.linalg.eigvals(balanced(A)[0])
     return complex(poles[int(np.argmin(np.abs(poles - pole)))])
 

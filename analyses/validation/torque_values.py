@@ -30,7 +30,6 @@ FAR = 4.0  # times a threshold: where it is looked for then
 
 
 def torque_rows(design: Design, model: Design) -> Iterator[Row]:
-    """All rows of the mechanics."""
     yield from _inertias(design, model)
     yield from _steady(design, model)
     if design.friction.law == "coulomb":
@@ -43,15 +42,11 @@ def torque_rows(design: Design, model: Design) -> Iterator[Row]:
 def mechanics(design: Design) -> Design:
     """A drive whose command is the torque at the motor shaft."""
     return replace(
-        design,
-        motor=Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0),
+        design, motor=Motor(rotor_inertia_kgm2=design.motor.rotor_inertia_kgm2, source_gain_Nm_V=1.0),
         controller=Controller(period_s=design.controller.period_s, computing_delay_s=0.0),
-        limits=Limits(voltage_V=float("inf")),
-        command=Command(),
-        supply=None,
-        instruments=Instruments(),
+        limits=Limits(voltage_V=float("inf")), command=Command(), supply=None, instruments=Instruments(),
         encoder=replace(design.encoder, counts_per_rev=None, speed="ideal"),
-    )
+    )  # fmt: skip
 
 
 def edge(passed: Callable[[float], bool], predicted: float, beside: float, far: float) -> float | None:
@@ -80,8 +75,7 @@ def loads_of(design: Design) -> tuple[float, ...]:
 
 def _inertias(design: Design, model: Design) -> Iterator[Row]:
     """What a torque accelerates, without friction and with the coupling in its gap."""
-    free = replace(mechanics(design), load=design.load.bare())
-    rows = Rows.of(free, friction_on=False)
+    rows = Rows.of(replace(mechanics(design), load=design.load.bare()), friction_on=False)
     rows["viscous"] = rows["viscous_reverse"] = rows["load_viscous"] = 0.0
     rows["coupling_damping"], rows["half_play"] = 0.0, 1e9
     torque = design.inertia_kgm2
@@ -107,8 +101,7 @@ def speeds_of(design: Design, direction: int) -> list[float]:
     fast = FAST * top if isfinite(top) else 1.0
     points = [point.speed_rad_s for point in design.friction.map(direction)]
     if points:
-        middles = [0.5 * (a + b) for a, b in pairwise(points)]
-        return [*middles, 1.5 * points[-1] or fast]
+        return [*(0.5 * (a + b) for a, b in pairwise(points)), 1.5 * points[-1] or fast]
     bent = [design.friction.smoothing_speed_rad_s] if design.friction.law == "tanh" else []
     return [fast, SLOW * fast, *bent]
 

@@ -26,9 +26,8 @@ from analyses.limit_cycles.counts import counts_of
 from analyses.linear.loop_figures import all_loop_figures, loop_figures
 from analyses.motion.settling import settlings_of
 from analyses.specification import specification
-from analyses.validation.bench_sweep import bench_sweep
 from analyses.validation.design_values import design_value_rows
-from analyses.validation.in_time import margin_shown, step_shown
+from analyses.validation.in_time import bench_sweep, margin_shown, step_shown
 from analyses.validation.places import Bench
 from analyses.validation.result import Validation
 from analyses.validation.row import Row
@@ -44,12 +43,9 @@ NO_POSITION = "a drive without a position loop: its loops are judged, motion fro
 
 
 def validate(
-    design: AnyDesign,
-    settings: Settings | None = None,
-    progress: Progress = None,
-    *,
+    design: AnyDesign, settings: Settings | None = None, progress: Progress = None, *,
     model: Design | None = None,
-) -> Validation:
+) -> Validation:  # fmt: skip
     """Check every prediction of a design by the nonlinear simulator.
 
     ``settings``: which findings are looked for beside the checks; by default all.
@@ -84,7 +80,6 @@ class _Work:
     done: int = 0
 
     def run(self) -> Validation:
-        """Checks first, then what is large."""
         self.total = len(self.bench.names) + 9
         rows, places = self._small_signals()
         stable = [name for name, own in self.bench.figures.items() if own.stable]
@@ -180,7 +175,6 @@ class _Work:
         return rows, places
 
     def _onsets(self) -> list[Row]:
-        """What stands in front of each limiter under a command."""
         return [row for place in self.bench.onsets() for row in small_signal(place)]
 
     def _held_by_friction(self) -> tuple[str, ...]:

@@ -5,8 +5,9 @@ an instrument that adds a signal, multiplies the gain, delays, and notes before 
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
+
+KERNELS = True
 
 CONDITIONAL, CLAMPED, BACK_CALCULATION = range(3)
 PROBE_U = layout.PROBES + layout.POINT_VOLTAGE * layout.PROBE_SIZE
@@ -16,7 +17,6 @@ PROBE_Y = layout.PROBES + layout.POINT_OUTPUT * layout.PROBE_SIZE
 IDEAL, DIFFERENCE, TRACKING = range(3)
 
 
-@kernel
 def chain(p, at, count, s, to, x):
     """Pass x through ``count`` sections (direct form II transposed).
 
@@ -31,7 +31,6 @@ def chain(p, at, count, s, to, x):
     return x
 
 
-@kernel
 def settle(p, at, count, s, to, x):
     """Set the states of a chain to those of a constant input x; returns its output."""
     for n in range(count):
@@ -44,13 +43,11 @@ def settle(p, at, count, s, to, x):
     return x
 
 
-@kernel
 def clamp(value, limit):
     """Value held within +-limit."""
     return min(max(value, -limit), limit)
 
 
-@kernel
 def pi(e, integral, gain, step, limit):
     """PI with conditional integration: output, new integral, and 1 where the limit acts.
 
@@ -67,7 +64,6 @@ def pi(e, integral, gain, step, limit):
     return clamp(gain * e + integral, limit), integral, 1.0
 
 
-@kernel
 def regulator(e, integral, gain, step, extra, limit, law, tracking):
     """PI with a feed-forward ``extra`` and any anti-windup law; the same three numbers as `pi`.
 
@@ -95,7 +91,6 @@ def regulator(e, integral, gain, step, extra, limit, law, tracking):
     return clamp(gain * e + integral + extra, limit), integral, 1.0
 
 
-@kernel
 def probe(p, s, io, point, value):
     """Signal after the probe at ``point``: gain times the delayed value plus the injected signal.
 
@@ -120,7 +115,6 @@ def probe(p, s, io, point, value):
     return p[at + layout.PROBE_GAIN] * passed + io[layout.IN_PROBE + point]
 
 
-@kernel
 def fill_ring(p, s, point, value):
     """Take every past value at a point as ``value``."""
     size = int(p[layout.PROBE_RING])
@@ -129,13 +123,11 @@ def fill_ring(p, s, point, value):
         s[ring + j] = value
 
 
-@kernel
 def counted(value, scale):
     """Angle as counted: the count below (floor), or the angle itself without an encoder grid."""
     return float(math.floor(value * scale)) / scale if scale > 0.0 else value
 
 
-@kernel
 def measured_speed(p, s, io, w, th):
     """Speed by the encoder's method, then its first-order filter, then the speed filters."""
     x, angle, source = w, th, int(p[layout.SPEED_SOURCE])
@@ -162,7 +154,6 @@ def measured_speed(p, s, io, w, th):
     return chain(p, layout.SPEED_CHAIN, int(p[layout.SPEED_FILTERS]), s, layout.S_SPEED_CHAIN, filtered)
 
 
-@kernel
 def own_output(p, s, io, command, error, angle, output):
     """The law's output; leaves its inputs, in the order of `LAW_INPUTS`, in the work space."""
     e, x = int(p[layout.AT_WORK]), int(p[layout.AT_OWN])
@@ -177,7 +168,6 @@ def own_output(p, s, io, command, error, angle, output):
     return p[layout.OWN_GAIN] * v
 
 
-@kernel
 def own_states(p, s, excess):
     """Step the states on, after `own_output`; ``excess`` is u - v."""
     n, e, x = int(p[layout.OWN_STATES]), int(p[layout.AT_WORK]), int(p[layout.AT_OWN])

@@ -3,7 +3,6 @@
 It is a function of its own: with measurements written into ``io`` it runs without the motor's model.
 """
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.blocks import (
     PROBE_Y,
@@ -26,8 +25,9 @@ from nonlinear._kernels.position import (
     sloped,
 )
 
+KERNELS = True
 
-@kernel
+
 def overload(p, s, i):
     """The overload (I2t) state, and the current limit of this tick."""
     x, share = s[layout.S_OVERLOAD], i / p[layout.CONTINUOUS_CURRENT]
@@ -41,7 +41,6 @@ def overload(p, s, i):
     s[layout.S_CURRENT_LIMIT] = lower if s[layout.S_OVERLOADED] > 0.0 else p[layout.CURRENT_LIMIT]
 
 
-@kernel
 def outer(p, s, io, th):
     """Update the outermost stage."""
     if p[layout.RARE_COMMAND] > 0.0:
@@ -54,7 +53,6 @@ def outer(p, s, io, th):
     put_outer(p, s, io, out, flags)
 
 
-@kernel
 def torque_path(p, s, e, limit):
     """Velocity controller with feed-forward: clamp with the anti-windup, filters, clamp again."""
     out, integral, hit = regulator(
@@ -75,7 +73,6 @@ def torque_path(p, s, e, limit):
     return out
 
 
-@kernel
 def own_inner(p, s, io, th, command, measured, extra, limit):
     """A law of one's own of the velocity or the current: its output, before and behind the clamp."""
     angle = counted(th, p[layout.OWN_COUNTS])
@@ -84,7 +81,6 @@ def own_inner(p, s, io, th, command, measured, extra, limit):
     return v, clamp(v, limit)
 
 
-@kernel
 def own_velocity(p, s, io, th, measured, limit):
     """Velocity stage with a law of one's own: its output behind clamp and slope limit."""
     extra = s[layout.S_TORQUE_FEEDFORWARD]
@@ -98,7 +94,6 @@ def own_velocity(p, s, io, th, measured, limit):
     return out
 
 
-@kernel
 def velocity(p, s, io, w, th):
     """Update the velocity stage."""
     measured = w
@@ -128,7 +123,6 @@ def velocity(p, s, io, w, th):
         put_voltage(p, s, io, out)
 
 
-@kernel
 def current_rare(p, s, io, i, w, th):
     """Current controller with feed-forward, another anti-windup or an overload limit; its output."""
     wanted = clamp(s[layout.S_CURRENT_REFERENCE], s[layout.S_CURRENT_LIMIT])
@@ -154,7 +148,6 @@ def current_rare(p, s, io, i, w, th):
     return out
 
 
-@kernel
 def current(p, s, io, i, w, th):
     """Update the current stage: every tick."""
     if p[layout.RARE_CURRENT] > 0.0:
@@ -168,7 +161,6 @@ def current(p, s, io, i, w, th):
     put_voltage(p, s, io, out)
 
 
-@kernel
 def control(p, s, io, i, w, th):
     """One tick of the controller; leaves the voltage in the state."""
     if p[layout.OVERLOAD] > 0.0:
@@ -189,7 +181,6 @@ def control(p, s, io, i, w, th):
         current(p, s, io, i, w, th)
 
 
-@kernel
 def control_tick(p, s, io):
     """The controller alone, on what ``io[IN_CURRENT]`` and the next four inputs hold; returns the voltage."""
     if p[layout.SUPPLY] > 0.0:

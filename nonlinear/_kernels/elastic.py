@@ -11,7 +11,7 @@ parting are dissipation, and none of them falls.
 
 import math
 
-from actuator_lti.compiled.kernel import kernel, seldom
+from actuator_lti.compiled.kernel import seldom
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_modes import (
@@ -34,12 +34,13 @@ from nonlinear._kernels.elastic_series import (
 )
 from nonlinear._kernels.energy import NODES, WEIGHTS
 
+KERNELS = True
+
 FINITE = 1e15
 LARGEST = 1e300
 SURE = 1.001  # rounding does not decide what a bound allows
 
 
-@kernel
 def add_energies(p, s, h):
     """Add the energies over the first h of the interval whose series is filled."""
     for j in range(NODES.shape[0]):
@@ -47,7 +48,6 @@ def add_energies(p, s, h):
         add_powers(p, s, h * WEIGHTS[j], i, w, W, d)
 
 
-@kernel
 def add_powers(p, s, weight, i, w, W, d):
     """Add weight times the power of every line in one state."""
     e = layout.S_ENERGY
@@ -78,7 +78,6 @@ def add_powers(p, s, weight, i, w, W, d):
     s[e + layout.ENERGY_LOAD] -= weight * (outside * w + outside_load * W)
 
 
-@kernel
 def add_motor_friction(p, s, weight, w, torque):
     """Motor friction; a self-locking stage keeps what it does not hand on to the coupling."""
     e, direction, place = layout.S_ENERGY, s[layout.S_DIRECTION], map_place(p, s)
@@ -96,7 +95,6 @@ def add_motor_friction(p, s, weight, w, torque):
     s[e + layout.ENERGY_OFFSET] += weight * p[layout.OFFSET] * w
 
 
-@kernel
 def elastic_motion(p, s, part, held, M, extra):
     """Advance the plant by one held segment; returns a status of ``layout``.
 
@@ -115,7 +113,6 @@ def elastic_motion(p, s, part, held, M, extra):
     return walk(p, s, whole)
 
 
-@kernel
 def put_torques(p, s):
     """Held torques on both sides in the present mode."""
     x = at.ES_INPUT
@@ -125,7 +122,6 @@ def put_torques(p, s):
     s[x + at.IN_LOAD] = s[x + at.IN_M] / p[at.EL_RATIO_BEHIND] + s[at.ES_LOAD_TORQUE]
 
 
-@kernel
 def pace(p, s):
     """Square of the norm of x' in the units of energy, which bounds every derivative of a guard."""
     di, dw, dW, dd = elastic_slopes(p, s)
@@ -134,7 +130,6 @@ def pace(p, s):
     return di * di + dw * dw + dW * dW + dd * dd
 
 
-@kernel
 def guards_hold(p, s, chord, i, w, W, d):
     """Whether no guard can cross on the way to a state; notes how much room there is behind it."""
     room = LARGEST
@@ -150,7 +145,6 @@ def guards_hold(p, s, chord, i, w, W, d):
     return True
 
 
-@kernel
 def row_of(p, o, i, w, W, d, u, a, b):
     """One row of a transition: what state and held inputs make of a number."""
     return (
@@ -158,7 +152,6 @@ def row_of(p, o, i, w, W, d, u, a, b):
     )
 
 
-@kernel
 def stride(p, s, number, h):
     """Take one precomputed step if no guard can cross in it: 0, 1 the segments, 2 + j the step Ts/2^j.
 
@@ -185,7 +178,6 @@ def stride(p, s, number, h):
     return True
 
 
-@kernel
 def put_state(p, s, i, w, W, d, turned):
     """Write the state; the load's angle is what the motor's angle and the twist leave, or stays at rest."""
     s[layout.S_CURRENT], s[layout.S_SPEED], s[at.ES_LOAD_SPEED], s[at.ES_TWIST] = i, w, W, d
@@ -196,7 +188,6 @@ def put_state(p, s, i, w, W, d, turned):
 
 
 @seldom
-@kernel
 def walk(p, s, whole):
     """Advance with every event located."""
     levels, energy = int(p[at.EL_LEVELS]), p[layout.WITH_ENERGY] > 0.0
@@ -239,7 +230,6 @@ def walk(p, s, whole):
     return layout.OK
 
 
-@kernel
 def first_event(p, s, h):
     """Time and number of the first event of the interval whose series is filled; h and 0 if none."""
     best, event = h, at.NO_EVENT

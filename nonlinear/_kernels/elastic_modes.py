@@ -6,21 +6,20 @@ expression and its negation, so that rounding cannot let both be false.
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_series import rounding_of, slopes_of
 from nonlinear._kernels.elastic_steps import COEFFICIENTS, COLUMNS, ROWS
 
+KERNELS = True
 
-@kernel
+
 def contact_side(s):
     """1 or -1 while the coupling transmits torque on that side, else 0."""
     code = s[at.ES_CONTACT]
     return code if abs(code) == 1.0 else 0.0
 
 
-@kernel
 def spring_of(p, s, side):
     """Stiffness of the piece that holds, and where its line passes zero: T_s = k (delta - rest)."""
     bend = s[at.ES_BEND]
@@ -29,7 +28,6 @@ def spring_of(p, s, side):
     return p[place + at.SPRING_STIFFNESS], sign * p[place + at.SPRING_HALF]
 
 
-@kernel
 def spring_expression(p, s, side):
     """side T_s as if in contact: side (k (delta - rest) + c delta')."""
     rate = s[layout.S_SPEED] / p[layout.RATIO_TO_COUPLING] - s[at.ES_LOAD_SPEED]
@@ -37,14 +35,12 @@ def spring_expression(p, s, side):
     return side * (k * (s[at.ES_TWIST] - rest)) + side * p[layout.COUPLING_DAMPING] * rate
 
 
-@kernel
 def map_place(p, s):
     """Place of the segment of the friction map that holds."""
     side = 0 if s[layout.S_DIRECTION] >= 0.0 else at.MAP_SIDE
     return at.EL_MAP + side + int(s[at.ES_SEGMENT]) * at.MAP_SEGMENT
 
 
-@kernel
 def mode_number(p, s):
     """Number of the mode in the block of parameters."""
     motor = 0
@@ -58,7 +54,6 @@ def mode_number(p, s):
     return (2 + 4 * int(p[at.EL_SPRINGS])) * motor + 2 * contact + load
 
 
-@kernel
 def enter_mode(p, s):
     """Write what follows from the discrete state: place of the mode, constant torques, guards."""
     mode = at.EL_MODES + mode_number(p, s) * int(p[at.EL_MODE_SIZE])
@@ -83,7 +78,6 @@ def enter_mode(p, s):
         put_room(p, s, mode, at.ES_GUARD + j * at.GUARD_SIZE)
 
 
-@kernel
 def new_guard(s, event):
     """Append an empty guard; returns its place."""
     count = int(s[at.ES_GUARDS])
@@ -95,14 +89,12 @@ def new_guard(s, event):
     return g
 
 
-@kernel
 def twist_guard(s, sign, side, twist, event):
     """sign (side delta - twist) > 0."""
     g = new_guard(s, event)
     s[g + at.G_D], s[g + at.G_ONE] = sign * side, -sign * twist
 
 
-@kernel
 def spring_guard(p, s, sign, side, event):
     """sign side (k (delta - rest) + c delta') > 0."""
     g = new_guard(s, event)
@@ -112,7 +104,6 @@ def spring_guard(p, s, sign, side, event):
     s[g + at.G_D], s[g + at.G_ONE] = sign * side * k, -sign * side * k * rest
 
 
-@kernel
 def bend_guards(p, s):
     """The twist stays on its piece of the spring, on either side; with play zero lies in the gap."""
     last, bend = int(p[at.EL_SPRINGS]) - 1, int(s[at.ES_BEND])
@@ -126,7 +117,6 @@ def bend_guards(p, s):
         twist_guard(s, 1.0, 1.0, twist, at.BEND_MINUS)
 
 
-@kernel
 def contact_guards(p, s):
     """Guards of contact, of the gap, and of the time between parting and the gap."""
     code, half = s[at.ES_CONTACT], p[layout.HALF_PLAY]
@@ -147,7 +137,6 @@ def contact_guards(p, s):
         spring_guard(p, s, 1.0, code, at.PART)
 
 
-@kernel
 def motor_guards(p, s):
     """Slip: the speed stays on its segment.  Rest: the drive torque stays within the breakaway level."""
     direction = s[layout.S_DIRECTION]
@@ -164,7 +153,6 @@ def motor_guards(p, s):
         s[g + at.G_W], s[g + at.G_ONE] = -direction, p[place + at.MAP_SEGMENT + at.MAP_SPEED]
 
 
-@kernel
 def motor_rest_guard(p, s, sign, event):
     """ratio (T0 + CM' |T_s|) - sign (kM i - offset - T_s/N_c + ...) > 0, with w = 0 in T_s."""
     g = new_guard(s, event)
@@ -185,7 +173,6 @@ def motor_rest_guard(p, s, sign, event):
     s[g + at.G_EXTRA] = -sign
 
 
-@kernel
 def load_guards(p, s):
     """Slip: W keeps its sign.  Rest: |T_s + M_ext/N_r - offset_l| within its breakaway level."""
     direction = s[at.ES_LOAD]
@@ -197,7 +184,6 @@ def load_guards(p, s):
     load_rest_guard(p, s, -1.0, at.LOAD_DOWN)
 
 
-@kernel
 def load_rest_guard(p, s, sign, event):
     """ratio_l C0_l - sign (T_s + M_ext/N_r - offset_l) > 0, with W = 0 in T_s."""
     g = new_guard(s, event)
@@ -210,7 +196,6 @@ def load_rest_guard(p, s, sign, event):
     s[g + at.G_M] = -sign / p[at.EL_RATIO_BEHIND]
 
 
-@kernel
 def put_curvature(p, s, mode, g):
     """Bound of |g''| over the norm of x': the norm of G A dual to that of the energy."""
     total = 0.0
@@ -224,7 +209,6 @@ def put_curvature(p, s, mode, g):
     s[g + at.G_CURVE] = math.sqrt(total)
 
 
-@kernel
 def put_room(p, s, mode, g):
     """How far the state may go for each unit of the guard's value; 0 where inputs move the guard at once.
 
@@ -240,7 +224,6 @@ def put_room(p, s, mode, g):
     s[g + at.G_ROOM] = 1.0 / steep if moved == 0.0 and steep > 0.0 else 0.0
 
 
-@kernel
 def guard_offset(s, g):
     """The part of a guard that does not depend on the state."""
     value = s[g + at.G_ONE]
@@ -250,14 +233,12 @@ def guard_offset(s, g):
     return value + s[g + at.G_EXTRA] * s[at.ES_INPUT + at.IN_EXTRA]
 
 
-@kernel
 def guard_state(s, g):
     """The part of a guard that is linear in (i, w, W, delta)."""
     value = s[g + at.G_I] * s[layout.S_CURRENT] + s[g + at.G_W] * s[layout.S_SPEED]
     return value + (s[g + at.G_V] * s[at.ES_LOAD_SPEED] + s[g + at.G_D] * s[at.ES_TWIST])
 
 
-@kernel
 def fails(p, s, event):
     """Whether the guard of an event is broken by more than the rounding of a short interval."""
     h = math.ldexp(p[layout.PERIOD], -int(p[at.EL_LEVELS]))
@@ -269,7 +250,6 @@ def fails(p, s, event):
     return False
 
 
-@kernel
 def elastic_slopes(p, s):
     """(i', w', W', delta') in the present mode under the inputs that were held last."""
     x, w, W = at.ES_INPUT, s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
@@ -277,7 +257,6 @@ def elastic_slopes(p, s):
     return slopes_of(p, int(s[at.ES_MODE]), s[layout.S_CURRENT], w, W, s[at.ES_TWIST], u, torque, load)
 
 
-@kernel
 def find_mode(p, s):
     """The discrete state that belongs to speeds and twist: at t_0, and after a change of parameters."""
     w, W = s[layout.S_SPEED], s[at.ES_LOAD_SPEED]
@@ -293,7 +272,6 @@ def find_mode(p, s):
     enter_mode(p, s)
 
 
-@kernel
 def start_contact(p, s):
     """Piece of the spring and contact as the state says."""
     s[at.ES_BEND], s[at.ES_CONTACT] = 0.0, at.GAP
@@ -309,7 +287,6 @@ def start_contact(p, s):
         s[at.ES_CONTACT] = -1.0 if spring_expression(p, s, -1.0) > 0.0 else -2.0
 
 
-@kernel
 def put_output(p, s):
     """Angle and speed of the output shaft; of a rigid drive, those of the motor."""
     if p[layout.RIGID] > 0.0:
@@ -322,7 +299,6 @@ def put_output(p, s):
         s[layout.S_OUTPUT_SPEED] /= p[at.EL_RATIO_BEHIND]
 
 
-@kernel
 def change_contact(p, s, event):
     """The coupling meets, parts, its torque changes sign, or its spring bends."""
     code = s[at.ES_CONTACT]
@@ -342,7 +318,6 @@ def change_contact(p, s, event):
         s[at.ES_CONTACT] = 2.0 * side if waits else side
 
 
-@kernel
 def land(p, s, speed, slip, up):
     """A side's speed has come to zero: rest if its torque is within its level, else reversal.
 
@@ -355,7 +330,6 @@ def land(p, s, speed, slip, up):
         s[slip] = -direction
 
 
-@kernel
 def change_mode(p, s, event):
     """What an event does to the discrete state; only the speed that stops is set, to exactly 0."""
     if event <= at.BEND_MINUS:

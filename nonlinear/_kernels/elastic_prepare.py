@@ -8,17 +8,17 @@ transitions over both held segments and over Ts/2^j.  The row is as long as the 
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_steps import double_step, growth_of, keep_step, norm_of, put_short_step
+
+KERNELS = True
 
 SHORT = 0.5  # norm of A times the shortest interval
 MOST_LEVELS = 30
 LARGEST_POWER = 700.0  # of e in double precision
 
 
-@kernel
 def prepare_elastic_sizes(p):
     """Shares of torque, friction segments, how often the period is halved, and the length of the row.
 
@@ -43,7 +43,6 @@ def prepare_elastic_sizes(p):
     p[layout.PARAMETER_SIZE] = float(at.EL_MODES + modes * size)
 
 
-@kernel
 def prepare_elastic(p, s):
     """Fill the modes, after `prepare_elastic_sizes` and `prepare`; ``s`` lends its work space."""
     if p[layout.RIGID] <= 0.0:
@@ -56,7 +55,6 @@ def prepare_elastic(p, s):
         put_steps(p, m, s, int(p[layout.AT_WORK]))
 
 
-@kernel
 def put_shares(p):
     """How torques pass the gears, and whether anything happens at zero speed of either side."""
     behind = p[layout.RATIO] / p[layout.RATIO_TO_COUPLING]
@@ -76,7 +74,6 @@ def put_shares(p):
     p[at.EL_LOAD_SMOOTH] = 1.0 if p[layout.LOAD_DRY] == 0.0 else 0.0
 
 
-@kernel
 def put_springs(p):
     """The pieces of the spring: stiffness, twist at which its line passes zero, twist at which it begins."""
     k, torque, begins, place = p[layout.STIFFNESS], 0.0, p[layout.HALF_PLAY], at.EL_SPRING
@@ -92,7 +89,6 @@ def put_springs(p):
             p[at.EL_SPRINGS] += 1.0
 
 
-@kernel
 def put_segments(p, side):
     """The motor's friction for w > 0 (side 0) or w < 0 as lines T = level + slope |w|: begins, level, slope.
 
@@ -113,7 +109,6 @@ def put_segments(p, side):
         place += at.MAP_SEGMENT
 
 
-@kernel
 def mode_count(p):
     """Number of modes: motor at rest or on a segment of either side, gap or contact on either side with a
     piece of the spring, load at rest or not.
@@ -122,7 +117,6 @@ def mode_count(p):
     return (2 + 4 * int(p[at.EL_SPRINGS])) * motors
 
 
-@kernel
 def motor_of(p, motor):
     """Direction of the motor (0 at rest) and slope of its friction, by number: rest, forward, reverse."""
     forward = int(p[at.EL_SEGMENTS])
@@ -133,7 +127,6 @@ def motor_of(p, motor):
     return -1.0, p[at.EL_MAP + at.MAP_SIDE + (motor - 1 - forward) * at.MAP_SEGMENT + at.MAP_SLOPE]
 
 
-@kernel
 def put_mode(p, number, m):
     """Coefficients and weights of a mode at ``p[m]``, numbered as in `elastic_modes.mode_number`."""
     for j in range(at.MODE_REACH):
@@ -156,7 +149,6 @@ def put_mode(p, number, m):
     put_weights(p, m, spring)
 
 
-@kernel
 def put_motor(p, m, direction, slope, share, k, c):
     """The current of a motor that has one; a slipping motor under its friction and the coupling."""
     J, L, source = p[layout.MOTOR_INERTIA], p[layout.INDUCTANCE], p[layout.SOURCE] > 0.0
@@ -171,7 +163,6 @@ def put_motor(p, m, direction, slope, share, k, c):
     p[m + at.A_WD] = -share * k / J
 
 
-@kernel
 def put_load_side(p, m, motor_slips, load_slips, share, k, c):
     """Twist and load speed."""
     N_c, J = p[layout.RATIO_TO_COUPLING], p[layout.LOAD_INERTIA]
@@ -185,7 +176,6 @@ def put_load_side(p, m, motor_slips, load_slips, share, k, c):
         p[m + at.A_WV], p[m + at.A_VW] = share * c / p[layout.MOTOR_INERTIA], c / (N_c * J)
 
 
-@kernel
 def put_weights(p, m, k):
     """Square roots of L, J_m, J_l, k: in these units a passive plant does not grow.
 
@@ -199,7 +189,6 @@ def put_weights(p, m, k):
     p[weight + 3] = 0.0 if free else math.sqrt(k)
 
 
-@kernel
 def put_bounds(p, m, growth):
     """Growth of the energy's norm over the shortest interval; how far |x'| = 1 goes in h, h exp(growth h)."""
     levels = int(p[at.EL_LEVELS])
@@ -210,7 +199,6 @@ def put_bounds(p, m, growth):
         p[m + at.MODE_REACH + j] = h * math.exp(min(growth * h, LARGEST_POWER))
 
 
-@kernel
 def put_steps(p, m, s, work):
     """Transitions over both held segments, and over Ts/2^j from the shortest up."""
     levels = int(p[at.EL_LEVELS])

@@ -5,16 +5,16 @@ polynomial there; a bound of its second derivative decides whether it can cross,
 two crossings that cancel cannot be missed.
 """
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
 from nonlinear._kernels import layout
+
+KERNELS = True
 
 NEVER = -1.0  # no fall
 AT_ONCE = -2.0  # the guard does not hold at the start, nor does it become positive
 ROUNDING = 2e-15
 
 
-@kernel
 def slopes_of(p, m, i, w, W, d, u, torque, load):
     """(i', w', W', delta') of a state in the mode at ``m``, under these inputs."""
     di = p[m + at.A_II] * i + p[m + at.A_IW] * w + p[m + at.B_I] * u
@@ -24,7 +24,6 @@ def slopes_of(p, m, i, w, W, d, u, torque, load):
     return di, dw, dW, p[m + at.A_DW] * w + p[m + at.A_DV] * W
 
 
-@kernel
 def fill_series(p, s):
     """Taylor coefficients of (i, w, W, delta) from the present state under the held inputs."""
     m, x = int(s[at.ES_MODE]), at.ES_INPUT
@@ -39,7 +38,6 @@ def fill_series(p, s):
         u, torque, load = 0.0, 0.0, 0.0  # they act on the first derivative only
 
 
-@kernel
 def series_state(p, s, t):
     """(i, w, W, delta) at t, and the angle that the motor has turned."""
     n = int(p[at.EL_TERMS])
@@ -56,7 +54,6 @@ def series_state(p, s, t):
     return i, w, W, d, turned * t
 
 
-@kernel
 def fill_polynomial(p, s, g, offset, h):
     """Coefficients of a guard over [0, h]; returns the rounding that its value may carry there."""
     for k in range(int(p[at.EL_TERMS]) + 1):
@@ -67,7 +64,6 @@ def fill_polynomial(p, s, g, offset, h):
     return rounding_of(p, s, g, offset, h)
 
 
-@kernel
 def rounding_of(p, s, g, offset, h):
     """Rounding of a guard over [0, h]: of its terms, and of the terms of its first derivative."""
     m, x = int(s[at.ES_MODE]), at.ES_INPUT
@@ -88,7 +84,6 @@ def rounding_of(p, s, g, offset, h):
     return ROUNDING * (now + h * (gi * di + gw * dw + gv * dW + gd * dd))
 
 
-@kernel
 def value_at(s, n, t):
     """The guard's polynomial of degree n."""
     value = s[at.ES_POLYNOMIAL + n]
@@ -97,7 +92,6 @@ def value_at(s, n, t):
     return value
 
 
-@kernel
 def slope_at(s, n, t):
     """Its derivative."""
     value = n * s[at.ES_POLYNOMIAL + n]
@@ -106,7 +100,6 @@ def slope_at(s, n, t):
     return value
 
 
-@kernel
 def curvature_bound(s, n, h):
     """Bound of the second derivative over [0, h]."""
     total = 0.0
@@ -116,7 +109,6 @@ def curvature_bound(s, n, h):
     return total
 
 
-@kernel
 def shift(s, n, x):
     """Move the origin of the polynomial to x."""
     for i in range(n):
@@ -125,7 +117,6 @@ def shift(s, n, x):
             s[k] += x * s[k + 1]
 
 
-@kernel
 def first_fall(s, n, h, tolerance):
     """First time in [0, h] at which the polynomial comes down to zero; it is used up.
 
@@ -157,7 +148,6 @@ def first_fall(s, n, h, tolerance):
     return NEVER
 
 
-@kernel
 def refine_fall(s, n, end):
     """Root in [0, end], where the polynomial falls through zero once: Newton inside bisection."""
     low, high = 0.0, end

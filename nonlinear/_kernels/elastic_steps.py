@@ -10,8 +10,9 @@ so that a slow state beside stiff ones keeps its digits over thirty squarings.
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout as at
+
+KERNELS = True
 
 TERMS = 20  # of the Taylor series at norm 1/2: 0.5**20/20! = 4e-25
 SWEEPS = 12  # of Jacobi's method; it converges quadratically, in five or six
@@ -22,7 +23,6 @@ ROWS = (0, 0, 1, 1, 1, 1, 2, 2, 2, 3, 3)
 COLUMNS = (0, 1, 0, 1, 2, 3, 1, 2, 3, 1, 2)
 
 
-@kernel
 def multiply(s, a, b, out):
     """The five rows at ``a`` times the four rows of the states at ``b``, without the inputs of ``a``."""
     for r in range(5):
@@ -33,7 +33,6 @@ def multiply(s, a, b, out):
             s[out + r * at.STEP_COLUMNS + c] = total
 
 
-@kernel
 def put_short_step(p, m, h, s, d):
     """D over an h that is short against the mode, by its Taylor series; three places behind are used."""
     term, first, product = d + at.STEP_SIZE, d + 2 * at.STEP_SIZE, d + 3 * at.STEP_SIZE
@@ -53,7 +52,6 @@ def put_short_step(p, m, h, s, d):
             s[d + j] += s[term + j]
 
 
-@kernel
 def double_step(s, d):
     """D over twice the time."""
     product = d + 3 * at.STEP_SIZE
@@ -62,7 +60,6 @@ def double_step(s, d):
         s[d + j] = 2.0 * s[d + j] + s[product + j]
 
 
-@kernel
 def keep_step(p, o, s, d):
     """Write the transition I + D at ``p[o]``."""
     for j in range(at.STEP_SIZE):
@@ -71,14 +68,12 @@ def keep_step(p, o, s, d):
         p[o + r * (at.STEP_COLUMNS + 1)] += 1.0
 
 
-@kernel
 def scaled_coefficient(p, m, j):
     """Coefficient ``j`` of the matrix in the units of the energy; 0 where one side weighs nothing."""
     weight = p[m + at.MODE_WEIGHT + COLUMNS[j]]
     return p[m + at.MODE_WEIGHT + ROWS[j]] * p[m + j] / weight if weight > 0.0 else 0.0
 
 
-@kernel
 def norm_of(p, m):
     """Frobenius norm of the mode's matrix in the units of the energy."""
     total = 0.0
@@ -88,7 +83,6 @@ def norm_of(p, m):
     return math.sqrt(total)
 
 
-@kernel
 def growth_of(p, m, s, a):
     """Logarithmic norm of the mode: the largest eigenvalue of the symmetric part, 0 where negative."""
     for j in range(16):
@@ -112,7 +106,6 @@ def growth_of(p, m, s, a):
     return largest
 
 
-@kernel
 def rotate(s, a, r, c):
     """One rotation of Jacobi's method: makes the elements (r, c) and (c, r) of the matrix at ``a`` zero."""
     beside = s[a + 4 * r + c]

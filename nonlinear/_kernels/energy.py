@@ -8,16 +8,16 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.slipping import slip_at
+
+KERNELS = True
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)
 NODES, WEIGHTS = 0.5 * (_NODES + 1.0), 0.5 * _WEIGHTS
 LEDGER = layout.S_ENERGY
 
 
-@kernel
 def pieces_of(p, at, t):
     """Into how many pieces a time is cut so that each is short against every eigenvalue."""
     coupling = math.sqrt(abs(p[at + layout.M12] * p[at + layout.M21]))
@@ -25,7 +25,6 @@ def pieces_of(p, at, t):
     return int(min(1.0 + rate * t, 1e4))
 
 
-@kernel
 def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):
     """Add to the ledger what the integrals of i, i^2, i w and w^2 over a slip of ``angle`` mean."""
     Cv = p[layout.VISCOUS_REVERSE] if reverse > 0 else p[layout.VISCOUS]
@@ -41,7 +40,6 @@ def add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww):
     s[LEDGER + layout.ENERGY_LOAD] -= (Tb + p[layout.OFFSET]) * angle
 
 
-@kernel
 def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):
     """Add the energies of slipping for t from (i, w)."""
     pieces = pieces_of(p, at, t)
@@ -61,7 +59,6 @@ def energy_slip(p, s, at, reverse, t, i, w, u, T, Tb):
     add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
-@kernel
 def prepare_forms(p, s):
     """Write the integrals over each whole segment as forms of (i, w, u, T), by the same quadrature."""
     for which in range(4):
@@ -78,7 +75,6 @@ def prepare_forms(p, s):
                 add_node(p, s, at, side, (piece + NODES[j]) * h, h * WEIGHTS[j], form)
 
 
-@kernel
 def add_node(p, s, at, side, t, weight, form):
     """Add one node of the quadrature to the forms: responses of i and w at t to each of (i, w, u, T)."""
     work = int(p[layout.AT_WORK]) + layout.WORK_MORE
@@ -102,7 +98,6 @@ def add_node(p, s, at, side, t, weight, form):
             place += 1
 
 
-@kernel
 def quadratic(p, at, a, b, c, d):
     """A quadratic form of four numbers from its ten coefficients."""
     return (
@@ -113,7 +108,6 @@ def quadratic(p, at, a, b, c, d):
     )
 
 
-@kernel
 def energy_whole(p, s, which, i, w, u, T, Tb):
     """Add the energies of slipping over a whole segment; ``which`` is 2 for the reverse direction + part."""
     form, at = layout.FORMS + which * layout.FORM, layout.SLIP + which * layout.TRANSITION
@@ -125,7 +119,6 @@ def energy_whole(p, s, which, i, w, u, T, Tb):
     add_slip(p, s, reverse, u, T, Tb, angle, sum_i, sum_ii, sum_iw, sum_ww)
 
 
-@kernel
 def energy_stick(p, s, t, i, u):
     """Add the energies of a locked rotor over t: i = i1 + (i0 - i1) exp(-R t/L)."""
     if p[layout.SOURCE] > 0.0 or t <= 0.0:

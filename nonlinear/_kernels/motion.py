@@ -2,7 +2,7 @@
 
 import math
 
-from actuator_lti.compiled.kernel import kernel, seldom
+from actuator_lti.compiled.kernel import seldom
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.elastic import elastic_motion
 from nonlinear._kernels.energy import energy_stick, energy_whole
@@ -10,10 +10,11 @@ from nonlinear._kernels.segment import segment, slip_step
 from nonlinear._kernels.sense import applied_voltage, output_angle
 from nonlinear._kernels.smooth import tanh_segment
 
+KERNELS = True
+
 FINITE = 1e15
 
 
-@kernel
 def hinge_moment(p, s, io):
     """M_ext of this tick: constant, series, slope, damping, and what bends with the angle."""
     y = output_angle(p, s)
@@ -30,7 +31,6 @@ def hinge_moment(p, s, io):
     return M
 
 
-@kernel
 def shaft_torque(p, s, io):
     """Extra torque at the motor shaft: from outside, and the motor's own over its angle."""
     th, T = s[layout.S_ANGLE], io[layout.IN_TORQUE]
@@ -43,7 +43,6 @@ def shaft_torque(p, s, io):
     return T
 
 
-@kernel
 def put_load(p, s, moment, torque):
     """Note dry friction and torque at the motor under a hinge moment and an extra torque."""
     dry = p[layout.LOAD_COEFFICIENT] * abs(moment)
@@ -52,7 +51,6 @@ def put_load(p, s, moment, torque):
     s[layout.S_TORQUE] = p[layout.BACK_DRIVABLE] / p[layout.RATIO] * moment - p[layout.OFFSET] + torque
 
 
-@kernel
 def quick_slip(p, s, part, u, d):
     """Slip over a segment by its precomputed transition; 0 where the speed might cross zero within."""
     i, w = s[layout.S_CURRENT], s[layout.S_SPEED]
@@ -73,7 +71,6 @@ def quick_slip(p, s, part, u, d):
     return 1
 
 
-@kernel
 def quick_stick(p, s, part, u):
     """Rest over a whole segment; 0 where the rotor might break away within."""
     i, Tb = s[layout.S_CURRENT], s[layout.S_TORQUE]
@@ -90,7 +87,6 @@ def quick_stick(p, s, part, u):
     return 0
 
 
-@kernel
 def quick(p, s, part, u):
     """The short way over a segment in which nothing happens; 0 where it has to be looked at."""
     if p[layout.LOOK] > 0.0:
@@ -101,7 +97,6 @@ def quick(p, s, part, u):
     return quick_stick(p, s, part, u)
 
 
-@kernel
 def closely(p, s, part, u, events):
     """One segment by the general way; the events of this tick so far, -1 where there are too many."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -114,7 +109,6 @@ def closely(p, s, part, u, events):
 
 
 @seldom
-@kernel
 def count_events(s, events):
     """Add the events of a tick; -1 marks a failed one."""
     if events < 0.0:
@@ -124,7 +118,6 @@ def count_events(s, events):
     s[layout.S_MAX_EVENTS] = max(s[layout.S_MAX_EVENTS], events)
 
 
-@kernel
 def hold(p, s, io):
     """What acts on the plant over the tick that begins: the delay line and the load."""
     # the delay line holds u_k and the q + 1 before it, oldest first
@@ -137,7 +130,6 @@ def hold(p, s, io):
         put_load(p, s, io[layout.IO_MOMENT], shaft_torque(p, s, io))
 
 
-@kernel
 def motion(p, s, io):
     """Advance the plant by one tick."""
     hold(p, s, io)

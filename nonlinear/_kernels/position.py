@@ -2,7 +2,6 @@
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.blocks import (
     PROBE_I,
@@ -17,11 +16,12 @@ from nonlinear._kernels.blocks import (
     probe,
 )
 
+KERNELS = True
+
 CURRENT_RATE, FLAG_CURRENT_RATE = layout.LIMIT["current-rate"], float(layout.FLAG["current-rate"])
 STANDING = 1e-13  # change of the reference, relative, below which it stands still but for rounding
 
 
-@kernel
 def profile(p, s, wanted):
     """Follow the command with limited first and second derivative; exact where it keeps both limits itself.
 
@@ -47,7 +47,6 @@ def profile(p, s, wanted):
     return x
 
 
-@kernel
 def average(p, s, x):
     """Mean of the last n values: what an acceleration limit a becomes has a jerk of at most 2 a/(n T)."""
     n, at = int(p[layout.PROFILE_SAMPLES]), int(p[layout.AT_AVERAGE])
@@ -65,7 +64,6 @@ def average(p, s, x):
     return s[layout.S_AVERAGE_SUM] / n
 
 
-@kernel
 def shape(p, s, wanted):
     """The command behind profile and filter, at the outermost stage's period; notes the profile's flag."""
     r = wanted
@@ -79,7 +77,6 @@ def shape(p, s, wanted):
     return chain(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
 
 
-@kernel
 def sloped(p, s, v, T):
     """What the slope limit leaves of a current command that is updated every T, and its flag."""
     change = v - s[layout.S_CURRENT_BEFORE]
@@ -89,7 +86,6 @@ def sloped(p, s, v, T):
     return s[layout.S_CURRENT_BEFORE] + allowed, FLAG_CURRENT_RATE
 
 
-@kernel
 def limited(p, s, v):
     """What the limits of the next stage leave of v, and their flags; nothing is stored."""
     if p[layout.HAS_VELOCITY] > 0.0:
@@ -108,7 +104,6 @@ def limited(p, s, v):
     return out, 0.0 if out == v else float(layout.FLAG_VOLTAGE)
 
 
-@kernel
 def put_voltage(p, s, io, v):
     """Make v the voltage of this tick, through its probe."""
     s[layout.S_VOLTAGE_BEFORE] = s[layout.S_VOLTAGE] = v
@@ -117,7 +112,6 @@ def put_voltage(p, s, io, v):
         s[layout.S_VOLTAGE] = clamp(after, s[layout.S_VOLTAGE_LIMIT])
 
 
-@kernel
 def put_current(p, s, io, v):
     """Make v the current command, through its probe."""
     s[layout.S_CURRENT_BEFORE] = s[layout.S_CURRENT_REFERENCE] = v
@@ -126,7 +120,6 @@ def put_current(p, s, io, v):
         s[layout.S_CURRENT_REFERENCE] = clamp(after, s[layout.S_CURRENT_LIMIT])
 
 
-@kernel
 def put_outer(p, s, io, out, flags):
     """Hand the outermost stage's output to the stage that it drives."""
     s[layout.S_FLAGS_OUTER] = flags
@@ -141,7 +134,6 @@ def put_outer(p, s, io, out, flags):
         put_voltage(p, s, io, out)
 
 
-@kernel
 def probed_output(p, s, io, y):
     """The output angle behind its probe."""
     s[layout.S_OUTPUT_BEFORE] = y
@@ -149,7 +141,6 @@ def probed_output(p, s, io, y):
     return s[layout.S_OUTPUT_AFTER]
 
 
-@kernel
 def position_feedback(p, s, io, th):
     """The angle that the position loop sees, as an angle of the motor."""
     N = p[layout.RATIO]
@@ -160,7 +151,6 @@ def position_feedback(p, s, io, th):
     return N * probed_output(p, s, io, angle / N) if p[PROBE_Y] > 0.0 else angle
 
 
-@kernel
 def feedforward(p, s, reference):
     """Note the reference (motor side); returns k_ff dr/dt and renews the torque feed-forward."""
     last, before = s[layout.S_REFERENCE], s[layout.S_REFERENCE_BEFORE]
@@ -176,7 +166,6 @@ def feedforward(p, s, reference):
     return p[layout.FEEDFORWARD] * change / p[layout.POSITION_PERIOD]
 
 
-@kernel
 def position_law(p, s, io, reference, th):
     """P, PI or PID of position with feed-forward; returns the output behind the limits, and flags."""
     e = reference - position_feedback(p, s, io, th)
@@ -199,7 +188,6 @@ def position_law(p, s, io, reference, th):
     return kept, flags
 
 
-@kernel
 def own_position(p, s, io, reference, th):
     """A law of one's own of the position; its own angle is the one that the probe has passed."""
     angle = counted(th, p[layout.OWN_COUNTS])
@@ -215,7 +203,6 @@ def own_position(p, s, io, reference, th):
     return out, flags
 
 
-@kernel
 def outer_rare(p, s, io, th):
     """Update the outermost stage, whichever it is."""
     r = shape(p, s, io[layout.IN_COMMAND])

@@ -4,15 +4,16 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel, seldom
+from actuator_lti.compiled.kernel import seldom
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.signals import feed, fill_block
 from nonlinear._kernels.tick import step
 
+KERNELS = True
+
 LIMITER_BITS = np.array(layout.LIMITER_BITS)
 
 
-@kernel
 def record(p, io, history, rows, flag_history, row):
     """Write a row: what every run has, active probes, an elastic drive's load side, a load that varies."""
     for j in range(layout.BASE_SIGNALS):
@@ -34,7 +35,6 @@ def record(p, io, history, rows, flag_history, row):
         history[col * rows + row] = io[layout.IO_MOMENT]
 
 
-@kernel
 def clear(p, out):
     """Reset a row of results for a run."""
     for j in range(layout.OUT_SIZE):
@@ -54,7 +54,6 @@ def clear(p, out):
         out[layout.OUT_PHASOR + 2], out[layout.OUT_PHASOR + 3] = math.cos(turn), math.sin(turn)
 
 
-@kernel
 def step_figures(y, y_last, k, band, out):
     """Update rise, peak and settling of a response normalised to its target; times in ticks."""
     at = layout.OUT_STEP
@@ -71,7 +70,6 @@ def step_figures(y, y_last, k, band, out):
 
 
 @seldom
-@kernel
 def note_limits(p, flags, first, until, out):
     """Count the ticks from ``first`` to ``until`` (exclusive), in which the same limiters acted."""
     ticks = until - first
@@ -88,7 +86,6 @@ def note_limits(p, flags, first, until, out):
         out[layout.OUT_WINDOW_STICK] += window
 
 
-@kernel
 def add_to_window(p, io, k, count, out):
     """Add tick k to the last window or the one before it, by the unit phasor of the fundamental."""
     length = int(p[layout.WINDOW])
@@ -115,7 +112,6 @@ def add_to_window(p, io, k, count, out):
             re, im = re * c - im * s, re * s + im * c
 
 
-@kernel
 def reduce(p, io, k, out):
     """Add tick k to whatever is kept of the run."""
     if p[layout.STEP_TARGET] != 0.0:
@@ -132,7 +128,6 @@ def reduce(p, io, k, out):
         add_to_window(p, io, k, count, out)
 
 
-@kernel
 def run_block(p, s, io, block, first, count, history, flag_history, out):
     """Run ``count`` ticks from tick ``first`` on; returns the tick behind the last one done."""
     every, rows = int(p[layout.RECORD_EVERY]), flag_history.shape[0]
@@ -165,7 +160,6 @@ def run_block(p, s, io, block, first, count, history, flag_history, out):
     return k
 
 
-@kernel
 def run(p, s, io, block, tables, history, flag_history, out, shared):
     """Run the drive described by ``p`` from the state ``s``; returns a status number of ``layout``.
 

@@ -2,17 +2,18 @@
 
 import math
 
-from actuator_lti.compiled.kernel import kernel, seldom
+from actuator_lti.compiled.kernel import seldom
 from nonlinear._kernels import layout
 from nonlinear._kernels.energy import energy_slip, energy_stick, energy_whole
 from nonlinear._kernels.slipping import COMPLEX, derivative, first_extremum, slip_at
+
+KERNELS = True
 
 NONE_IN_SEGMENT = -1.0
 NEVER_LEFT = -2.0
 ITERATIONS = 200
 
 
-@kernel
 def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):
     """First time in (0, dt] at which s w falls to zero.
 
@@ -36,7 +37,6 @@ def first_landing(p, s, at, reverse, d, i, w, th, u, T, dt):
         end = min(first_extremum(p, at, i, w, u, T, begin + gap), dt)
 
 
-@kernel
 def refine(p, s, at, reverse, d, i, w, th, u, T, begin, end):
     """Root of w in a bracket where s w falls through zero once: Newton inside bisection."""
     low, high = begin, end
@@ -60,7 +60,6 @@ def refine(p, s, at, reverse, d, i, w, th, u, T, begin, end):
     return t
 
 
-@kernel
 def slip_step(p, o, i, w, th, u, T):
     """One precomputed transition."""
     return (
@@ -70,7 +69,6 @@ def slip_step(p, o, i, w, th, u, T):
     )
 
 
-@kernel
 def breakaway_time(p, i, level, u, Tb, dt):
     """Time at which the drive torque of the locked rotor reaches ``level``; also the current then."""
     R, L = p[layout.RESISTANCE], p[layout.INDUCTANCE]
@@ -81,7 +79,6 @@ def breakaway_time(p, i, level, u, Tb, dt):
     return min(t, dt), i_level
 
 
-@kernel
 def stick(p, i, u, Tb, Tp, Tm, dt, decay):
     """Locked rotor: time spent, current after it, direction of the breakaway (0: none).
 
@@ -107,7 +104,6 @@ def stick(p, i, u, Tb, Tp, Tm, dt, decay):
     return dt, i_end, 0.0
 
 
-@kernel
 def direction_at_rest(p, i, u, Tb, Tp, Tm, d):
     """What follows a landing of motion d: 0 rest while |drive| <= Tc breakaway, -d motion the other way."""
     drive = p[layout.TORQUE_CONSTANT] * i + p[layout.SOURCE_GAIN] * u + Tb
@@ -116,7 +112,6 @@ def direction_at_rest(p, i, u, Tb, Tp, Tm, d):
     return 0.0
 
 
-@kernel
 def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):
     """Slip in direction d until it lands or the segment ends: time spent, (i, w, th), and how it ended.
 
@@ -143,7 +138,6 @@ def slip_part(p, s, part, left, u, Tb, Tc, i, w, th, d):
 
 
 @seldom
-@kernel
 def segment(p, s, part, u, events):
     """Advance current, speed, angle and direction of the state row over one segment with all its events.
 

@@ -6,12 +6,13 @@ multiplicative generator (1988), whose products all stay below 2^53, so that flo
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.blocks import clamp
 from nonlinear._kernels.elastic_modes import elastic_slopes
 from nonlinear._kernels.slipping import derivative
 from nonlinear._kernels.smooth import tanh_torque
+
+KERNELS = True
 
 M_1, A_1 = 2147483563.0, 40014.0
 M_2, A_2 = 2147483399.0, 40692.0
@@ -19,7 +20,6 @@ TURN = 2.0 * math.pi
 WARM_UP = 16
 
 
-@kernel
 def rest(x, m):
     """Remainder of two whole numbers held in floats, x >= 0, below 2^53."""
     r = x - math.floor(x / m) * m
@@ -28,7 +28,6 @@ def rest(x, m):
     return r - m if r >= m else r
 
 
-@kernel
 def uniform(s, at):
     """Next number of the stream at ``s[at]``, above 0 and below 1."""
     s[at] = rest(A_1 * s[at], M_1)
@@ -39,7 +38,6 @@ def uniform(s, at):
     return z / M_1
 
 
-@kernel
 def normal(s, stream):
     """Next number of a stream with mean 0 and standard deviation 1 (Box and Muller)."""
     at = layout.S_NOISE + 2 * stream
@@ -47,7 +45,6 @@ def normal(s, stream):
     return radius * math.cos(TURN * uniform(s, at))
 
 
-@kernel
 def seed_streams(s, seed):
     """Start every stream; another seed starts all of them elsewhere."""
     for stream in range(4):
@@ -58,13 +55,11 @@ def seed_streams(s, seed):
             uniform(s, at)
 
 
-@kernel
 def output_angle(p, s):
     """Angle of the output shaft."""
     return s[layout.S_OUTPUT] if p[layout.ELASTIC_DRIVE] > 0.0 else s[layout.S_ANGLE] / p[layout.RATIO]
 
 
-@kernel
 def slopes(p, s):
     """(i', w') at the sampling instant under the voltage that acted last."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -81,7 +76,6 @@ def slopes(p, s):
     return derivative(p, layout.MODES + (layout.MODAL if d < 0.0 else 0), i, w, u, T)
 
 
-@kernel
 def supply(p, s):
     """Bus voltage of this tick from voltage and current of the motor (model.md section 6)."""
     U, Us, Rs = s[layout.S_VOLTAGE_LIMIT], p[layout.SUPPLY_VOLTAGE], p[layout.SUPPLY_RESISTANCE]
@@ -104,7 +98,6 @@ def supply(p, s):
     s[ledger + layout.ENERGY_CAPACITOR] += 0.5 * C * (after - U) * (after + U)
 
 
-@kernel
 def applied_voltage(p, s, io):
     """What acts on the motor: the controller's voltage, or its share of a bus voltage that varies."""
     u = s[layout.S_VOLTAGE]
@@ -113,7 +106,6 @@ def applied_voltage(p, s, io):
     return u
 
 
-@kernel
 def sense(p, s, io):
     """Write what the controller measures of current, speed and angles, and the bus voltage."""
     i, w, th, y = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE], output_angle(p, s)

@@ -5,8 +5,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel, wide
+from actuator_lti.compiled.kernel import wide
 from nonlinear._kernels import layout
+
+KERNELS = True
 
 TWO_PI = 2.0 * math.pi
 PI = Fraction("3.14159265358979323846264338327950288419716939937510582097")
@@ -22,7 +24,6 @@ TABLES = np.array(layout.TABLES)
 TO = np.array([layout.BLOCK_LOAD, layout.BLOCK_TORQUE, layout.BLOCK_SUPPLY])  # where each goes
 
 
-@kernel
 def sine(x):
     """sin x for \\|x\\| < `LARGEST`: the series of sin about the nearest multiple of pi, to 1e-18.
 
@@ -36,7 +37,6 @@ def sine(x):
     return (1.0 - 2.0 * odd * odd) * (r + r * (y * (S1 + y * (S2 + y * (S3 + y * (S4 + high))))))
 
 
-@kernel
 def triangle_wave(cycles):
     """Triangle of amplitude 1 in phase with sin(2 pi cycles)."""
     x = cycles + 0.25
@@ -44,7 +44,6 @@ def triangle_wave(cycles):
     return 4.0 * x - 1.0 if x < 0.5 else 3.0 - 4.0 * x
 
 
-@kernel
 def chirp_cycles(kind, f0, f1, span, s):
     """Cycles since the start of a linear or logarithmic chirp from f0 to f1 over ``span`` seconds."""
     x = min(s, span)
@@ -56,7 +55,6 @@ def chirp_cycles(kind, f0, f1, span, s):
     return cycles + f1 * max(s - span, 0.0)
 
 
-@kernel
 def signal(row, at, tables, k, period):
     """Value at tick k of the signal whose eight numbers begin at ``row[at]``.
 
@@ -86,7 +84,6 @@ def signal(row, at, tables, k, period):
 
 
 @wide
-@kernel
 def fill(row, at, tables, first, count, stride, period, out, to):
     """Sample a signal at ticks first, first + stride, ... of ``count``, into ``out[to]`` and behind."""
     times = int((count + stride - 1) / stride)
@@ -103,7 +100,6 @@ def fill(row, at, tables, first, count, stride, period, out, to):
         out[to + n * stride] = signal(row, at, tables, first + n * stride, period)
 
 
-@kernel
 def fill_block(p, tables, first, count, stride, block):
     """Work out all inputs of ``count`` ticks from tick ``first`` on; commands only every ``stride`` ticks."""
     period = p[layout.PERIOD]
@@ -124,7 +120,6 @@ def fill_block(p, tables, first, count, stride, block):
                 block[TO[j] + n] = tables[start + min(first + n, length - 1)]
 
 
-@kernel
 def feed(block, j, io):
     """Hand the inputs beside the command of the j-th tick of a block to the drive."""
     io[layout.IN_LOAD], io[layout.IN_TORQUE] = block[layout.BLOCK_LOAD + j], block[layout.BLOCK_TORQUE + j]

@@ -10,8 +10,9 @@ Matrices lie in a row of work space from a place ``at`` on, row by row: four of 
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
+
+KERNELS = True
 
 MATRIX = 49
 TERMS = 19  # Taylor terms at norm 1/2: 0.5**19/19! = 1.6e-23
@@ -19,7 +20,6 @@ REAL, COMPLEX, SINGLE = range(3)
 NEARLY_DOUBLE = 1e-3  # |s/m| below which the eigenvalues count as nearly double
 
 
-@kernel
 def matmul(work, a, b, out, n):
     """Product of the n by n matrices at ``a`` and ``b``, written at ``out``."""
     for r in range(n):
@@ -30,7 +30,6 @@ def matmul(work, a, b, out, n):
             work[out + r * n + c] = total
 
 
-@kernel
 def halvings_of(work, at, n):
     """How often a matrix is halved until its norm is at most 1/2."""
     norm = 0.0
@@ -46,7 +45,6 @@ def halvings_of(work, at, n):
     return halvings, scale
 
 
-@kernel
 def exponential(work, at, n):
     """exp of the n by n matrix at ``at``, which is scaled, at ``at + MATRIX``: Taylor series and squaring."""
     result, term, product = at + MATRIX, at + 2 * MATRIX, at + 3 * MATRIX
@@ -70,7 +68,6 @@ def exponential(work, at, n):
             work[result + m] = work[product + m]
 
 
-@kernel
 def plant(p, reverse, dt, work, at, n):
     """Write dt times the slipping plant at ``at``, n by n: states (i, w, th, u, T, ...), inputs held."""
     for j in range(n * n):
@@ -90,7 +87,6 @@ def plant(p, reverse, dt, work, at, n):
     work[at + 2 * n + 1] = dt
 
 
-@kernel
 def transition(p, reverse, dt, work, at, out):
     """Write the twelve coefficients of the slipping plant over dt at ``p[out]``."""
     plant(p, reverse, dt, work, at, layout.SLIP_ORDER)
@@ -104,7 +100,6 @@ def transition(p, reverse, dt, work, at, out):
         p[out + layout.C1 + r] = work[e + 5 * r + 4]
 
 
-@kernel
 def describe(p, reverse, at):
     """Write kind, mean and half difference of the eigenvalues and A at ``p[at]``."""
     J, L = p[layout.INERTIA], p[layout.INDUCTANCE]
@@ -123,7 +118,6 @@ def describe(p, reverse, at):
     p[at + layout.M21], p[at + layout.M22] = a21, a22
 
 
-@kernel
 def phi12(x):
     """(exp(x) - 1)/x and (exp(x) - 1 - x)/x^2."""
     if abs(x) < 0.5:
@@ -136,7 +130,6 @@ def phi12(x):
     return first, (first - 1.0) / x
 
 
-@kernel
 def phi12_complex(x, y):
     """The same for z = x + j y; returns the two real and imaginary parts."""
     size = x * x + y * y
@@ -156,7 +149,6 @@ def phi12_complex(x, y):
     return first_re, first_im, (re * x + im * y) / size, (im * x - re * y) / size
 
 
-@kernel
 def integrals(kind, m, s, t):
     """a(t), b(t) and their integrals (real distinct or complex eigenvalues m +- s, m +- j s)."""
     if kind == REAL:
@@ -168,7 +160,6 @@ def integrals(kind, m, s, t):
     return t * er, t * ei / s, t * t * fr, t * t * fi / s
 
 
-@kernel
 def slip_close(p, s, reverse, t, i, w, th, u, T):
     """The same for nearly double eigenvalues."""
     at = int(p[layout.AT_WORK])
@@ -182,7 +173,6 @@ def slip_close(p, s, reverse, t, i, w, th, u, T):
     )
 
 
-@kernel
 def slip_at(p, s, at, reverse, t, i, w, th, u, T):
     """State (i, w, th) after slipping for t under held u and torque T (dry friction included in T)."""
     kind = int(p[at + layout.KIND])
@@ -201,7 +191,6 @@ def slip_at(p, s, at, reverse, t, i, w, th, u, T):
     return i + a * di + b * qi, w + a * dw + b * qw, th + w * t + a2 * dw + b2 * qw
 
 
-@kernel
 def derivative(p, at, i, w, u, T):
     """(i', w') while slipping."""
     if int(p[at + layout.KIND]) == SINGLE:
@@ -211,7 +200,6 @@ def derivative(p, at, i, w, u, T):
     return di, dw
 
 
-@kernel
 def first_extremum(p, at, i, w, u, T, after):
     """First time later than ``after`` at which w' = 0; inf if there is none."""
     kind = int(p[at + layout.KIND])

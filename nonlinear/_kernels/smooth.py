@@ -20,12 +20,13 @@ that motion, so they balance to rounding whatever the step.
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.energy import NODES, WEIGHTS, add_slip, energy_whole, pieces_of
 from nonlinear._kernels.hyperbolic import tanh
 from nonlinear._kernels.segment import slip_step
 from nonlinear._kernels.slipping import MATRIX, exponential, plant, transition
+
+KERNELS = True
 
 SATURATED = 19.0
 STEP_FACTOR = 4.0  # leaves about a factor of twenty to the error seen
@@ -36,7 +37,6 @@ WEIGHT_1, WEIGHT_2, WEIGHT_3 = STAGE + 3, STAGE + 6, STAGE + 9
 FORM_II, FORM_IW, FORM_WW, FORM_NW = 7, 35, 63, 91  # after the seven of i
 
 
-@kernel
 def phi_columns(p, t, h, work, at):
     """exp of the plant over t, at ``at + MATRIX``; a chain of integrators over h feeds the torque.
 
@@ -48,7 +48,6 @@ def phi_columns(p, t, h, work, at):
     exponential(work, at, layout.TANH_ORDER)
 
 
-@kernel
 def prepare_tanh(p, s):
     """Fill the coefficients of every level for both segments, and what chooses among them."""
     p[layout.TANH_PER_SPEED] = 1.0 / p[layout.SMOOTHING]
@@ -68,7 +67,6 @@ def prepare_tanh(p, s):
             h *= 0.5
 
 
-@kernel
 def prepare_fastest(p):
     """The fastest rate of the linear plant in 1/s, and what part of an acceleration it carries."""
     damping = p[layout.VISCOUS] / p[layout.INERTIA]
@@ -80,7 +78,6 @@ def prepare_fastest(p):
         p[layout.TANH_SHAKEN] = min(1.0, (square + damping * damping) * tau * tau)
 
 
-@kernel
 def prepare_level(p, h, s, o):
     """Fill the coefficients of one step length at ``p[o]``."""
     at = int(p[layout.AT_WORK])
@@ -98,7 +95,6 @@ def prepare_level(p, h, s, o):
         p[o + WEIGHT_3 + r] = 4.0 * third - second
 
 
-@kernel
 def prepare_level_forms(p, h, s, form):
     """Write the integrals over one step as forms of (i, w, u, T, n0, nm, nc)."""
     for j in range(layout.TANH_FORM):
@@ -110,7 +106,6 @@ def prepare_level_forms(p, h, s, form):
             add_tanh_node(p, s, (piece + NODES[j]) * length, h, length * WEIGHTS[j], form)
 
 
-@kernel
 def add_tanh_node(p, s, t, h, weight, form):
     """Add one node of the quadrature to the forms of a step."""
     at = int(p[layout.AT_WORK])
@@ -145,7 +140,6 @@ def add_tanh_node(p, s, t, h, weight, form):
             place += 1
 
 
-@kernel
 def form_of_seven(p, at, a, b, c, d, e, f, g):
     """A quadratic form of seven numbers from its 28 coefficients."""
     return (
@@ -161,7 +155,6 @@ def form_of_seven(p, at, a, b, c, d, e, f, g):
     )  # fmt: skip
 
 
-@kernel
 def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):
     """Add the energies of one step under the friction torque (n0, nm, nc); ``angle`` is what it turned."""
     sum_i = p[form] * i + p[form + 1] * w + p[form + 2] * u + p[form + 3] * Tb
@@ -174,7 +167,6 @@ def energy_step(p, s, form, angle, i, w, u, Tb, n0, nm, nc):
     s[layout.S_ENERGY + layout.ENERGY_DRY] -= sum_nw
 
 
-@kernel
 def torque_at(p, w, T, Tcp, Tcm):
     """Torque of the friction beyond the forward viscous slope, with its sign in the equation of motion.
 
@@ -185,13 +177,11 @@ def torque_at(p, w, T, Tcp, Tcm):
     return -Tcm * T - (p[layout.VISCOUS_REVERSE] - p[layout.VISCOUS]) * w
 
 
-@kernel
 def tanh_torque(p, w, Tcp, Tcm):
     """The same from the speed alone."""
     return torque_at(p, w, tanh(w * p[layout.TANH_PER_SPEED]), Tcp, Tcm)
 
 
-@kernel
 def level_for(p, part, i, w, u, Tb, Tc, T, n0):
     """Number of halvings of a segment that the tolerance asks for at the tanh T, the friction torque n0."""
     if p[layout.TANH_LEVEL] >= 0.0:
@@ -219,7 +209,6 @@ def level_for(p, part, i, w, u, Tb, Tc, T, n0):
     return level
 
 
-@kernel
 def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):
     """One ETD4RK step from the friction torque n0: state after it, and the torque at its middle and end."""
     ih, wh, thh = slip_step(p, o + HALF, i, w, th, u, Tb)
@@ -239,7 +228,6 @@ def etd_step(p, o, i, w, th, u, Tb, Tcp, Tcm, n0):
     )
 
 
-@kernel
 def saturated(p, s, part, u):
     """Cross a whole segment in one exact step where tanh is 1 all the way; returns 1 where that was so."""
     i, w, far = s[layout.S_CURRENT], s[layout.S_SPEED], SATURATED * p[layout.SMOOTHING]
@@ -259,7 +247,6 @@ def saturated(p, s, part, u):
     return 1
 
 
-@kernel
 def tanh_segment(p, s, part, u):
     """Advance the state row over one segment under the smoothed law."""
     if saturated(p, s, part, u) > 0:

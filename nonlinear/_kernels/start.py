@@ -2,7 +2,6 @@
 
 import math
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear._kernels.elastic_modes import find_mode
 from nonlinear._kernels.elastic_prepare import prepare_elastic, prepare_elastic_sizes
@@ -21,8 +20,9 @@ from nonlinear._kernels.tick import (
     put_direction,
 )
 
+KERNELS = True
 
-@kernel
+
 def prepare_run_sizes(p):
     """Places of the parts of the state whose lengths differ from drive to drive, and both rows' lengths.
 
@@ -50,7 +50,6 @@ def prepare_run_sizes(p):
     p[layout.STATE_SIZE] = p[layout.AT_WORK] + layout.WORK_SIZE
 
 
-@kernel
 def prepare_periods(p):
     """Who is outermost, how often it is updated, and what that means for limits and rates."""
     every = 1.0
@@ -64,7 +63,6 @@ def prepare_periods(p):
     p[layout.SPEED_STEP] = p[layout.ACCELERATION_LIMIT] * p[layout.POSITION_PERIOD]
 
 
-@kernel
 def any_of(p, first, behind):
     """1 where one of the numbers from ``first`` up to ``behind`` is not zero."""
     found = 0.0
@@ -74,7 +72,6 @@ def any_of(p, first, behind):
     return found
 
 
-@kernel
 def prepare_gates(p):
     """One number a stage that says whether it needs more than its short form."""
     more = max(any_of(p, layout.OUTPUT_SENSOR, layout.PROFILED), p[layout.PROFILED])
@@ -101,7 +98,6 @@ def prepare_gates(p):
         prepare_own(p)
 
 
-@kernel
 def prepare_own(p):
     """What a law of one's own needs besides: its stage's longer form, the sensors, perhaps the speed."""
     stage = p[layout.OWN_STAGE]
@@ -116,7 +112,6 @@ def prepare_own(p):
         p[layout.OWN_MEASURES] = 1.0
 
 
-@kernel
 def prepare_plant(p, work):
     """Transitions over both segments and both directions, eigenvalues, decay of a locked current."""
     Ts, f = p[layout.PERIOD], p[layout.DELAY_FRACTION]
@@ -142,7 +137,6 @@ def prepare_plant(p, work):
     p[layout.LOOK] = max(ringing, max(p[layout.LAW], p[layout.ELASTIC_DRIVE]))
 
 
-@kernel
 def prepare_sizes(p):
     """Work out the lengths of both rows; of an elastic drive train also its friction segments."""
     prepare_run_sizes(p)
@@ -150,7 +144,6 @@ def prepare_sizes(p):
         prepare_elastic_sizes(p)
 
 
-@kernel
 def derive(p, s):
     """Fill all derived parameters, after `prepare_sizes`; ``s`` lends its work space."""
     prepare_periods(p)
@@ -165,7 +158,6 @@ def derive(p, s):
         prepare_elastic(p, s)
 
 
-@kernel
 def init(p, s):
     """Write the state at t_0 into ``s``, ``p[STATE_SIZE]`` numbers."""
     for j in range(int(p[layout.STATE_SIZE])):
@@ -183,7 +175,6 @@ def init(p, s):
         init_elastic(p, s)
 
 
-@kernel
 def retune(p, s):
     """Fit the state to parameters that were changed between two ticks, after `derive`."""
     put_load(p, s, s[layout.S_LOAD], 0.0)
@@ -192,7 +183,6 @@ def retune(p, s):
         find_mode(p, s)
 
 
-@kernel
 def part_of_tick(p, q, s, io, tau):
     """Sense and control at t_k and move to t_k + tau, 0 < tau < Ts; returns a status.
 

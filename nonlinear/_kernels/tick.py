@@ -4,7 +4,6 @@
 A state copied out and set again elsewhere goes on with the same bits.
 """
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import TRACKING, clamp, counted, fill_ring, settle
 from nonlinear._kernels.control import control
@@ -12,8 +11,9 @@ from nonlinear._kernels.elastic_modes import contact_side, find_mode, put_output
 from nonlinear._kernels.motion import motion
 from nonlinear._kernels.sense import applied_voltage, sense
 
+KERNELS = True
 
-@kernel
+
 def init_controller(p, s):
     """Start values of the controller, all histories those of rest or of constant speed."""
     at_output = p[layout.OUTPUT_SENSOR] > 0.0
@@ -31,7 +31,6 @@ def init_controller(p, s):
     settle(p, chain, int(p[layout.TORQUE_FILTERS]), s, layout.S_TORQUE_CHAIN, p[layout.CURRENT_COMMAND_START])
 
 
-@kernel
 def init_estimate(p, s):
     """Start values of the speed measurement: those of constant speed."""
     w, T, at_output = p[layout.SPEED_START], p[layout.VELOCITY_PERIOD], p[layout.SPEED_SENSOR] > 0.0
@@ -47,7 +46,6 @@ def init_estimate(p, s):
     s[layout.S_MEASURED_SPEED] = w
 
 
-@kernel
 def init_command(p, s):
     """Start values of profile and command filter: those of the outermost stage."""
     at_output = p[layout.OUTPUT_SENSOR] > 0.0
@@ -66,7 +64,6 @@ def init_command(p, s):
     settle(p, layout.COMMAND_CHAIN, int(p[layout.COMMAND_FILTERS]), s, layout.S_COMMAND_CHAIN, r)
 
 
-@kernel
 def init_lines(p, s):
     """Fill the delay line and the probes' rings."""
     u, y = p[layout.VOLTAGE_START], p[layout.ANGLE_START] / p[layout.RATIO]
@@ -79,7 +76,6 @@ def init_lines(p, s):
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = y
 
 
-@kernel
 def put_direction(p, s):
     """Whether and which way the motor slips at its speed; a smooth one knows no rest."""
     w = s[layout.S_SPEED]
@@ -88,7 +84,6 @@ def put_direction(p, s):
         s[layout.S_DIRECTION] = 1.0
 
 
-@kernel
 def init_elastic(p, s):
     """What an elastic drive train has besides: load side, twist, discrete state, the output's own angle."""
     s[elastic_layout.ES_TWIST], s[elastic_layout.ES_LOAD_SPEED] = (
@@ -103,7 +98,6 @@ def init_elastic(p, s):
     s[layout.S_OUTPUT_BEFORE] = s[layout.S_OUTPUT_AFTER] = s[layout.S_OUTPUT]
 
 
-@kernel
 def decide(p, s, io):
     """Sense and control at t_k, and note what there is to record."""
     i, w, th = s[layout.S_CURRENT], s[layout.S_SPEED], s[layout.S_ANGLE]
@@ -125,7 +119,6 @@ def decide(p, s, io):
         note_more(p, s, io)
 
 
-@kernel
 def note_more(p, s, io):
     """Note both sides of each probe, the current command under overload, an elastic drive's load side."""
     if p[layout.ELASTIC_DRIVE] > 0.0:
@@ -142,7 +135,6 @@ def note_more(p, s, io):
         io[at + 6], io[at + 7] = s[layout.S_OUTPUT_BEFORE], s[layout.S_OUTPUT_AFTER]
 
 
-@kernel
 def step(p, s, io):
     """One tick: sense, control, move.  ``s[S_STATUS]`` says whether it went well."""
     decide(p, s, io)
@@ -150,7 +142,6 @@ def step(p, s, io):
     s[layout.S_TICK] += 1.0
 
 
-@kernel
 def tick(p, s, io):
     """`step` to be called from outside; returns the status."""
     s[elastic_layout.ES_ROOM] = 0.0  # the state may have been changed
@@ -158,14 +149,12 @@ def tick(p, s, io):
     return int(s[layout.S_STATUS])
 
 
-@kernel
 def get(p, s, to):
     """Copy the state out."""
     for j in range(int(p[layout.STATE_SIZE])):
         to[j] = s[j]
 
 
-@kernel
 def set_state(p, s, source):
     """Copy a state in."""
     for j in range(int(p[layout.STATE_SIZE])):

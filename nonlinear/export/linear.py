@@ -12,12 +12,13 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.blocks import CLAMPED
 from nonlinear._kernels.start import derive, prepare_sizes
 from nonlinear._kernels.tick import tick
 from nonlinear.export.linear_row import at_rest, set_off
+
+KERNELS = True
 
 MOST = 48  # states of a loop
 CURRENT, VELOCITY, POSITION, COMMAND = range(4)
@@ -45,7 +46,6 @@ REMEMBERED = np.array([
 ])  # fmt: skip
 
 
-@kernel
 def cut_of(q, stage):
     """Where the loop of a stage is cut: with a law of one's own at what that gives.
 
@@ -62,26 +62,22 @@ def cut_of(q, stage):
     return stage
 
 
-@kernel
 def feeds_speed(q):
     """Whether the measured speed is fed forward to the voltage, or taken by a law of the current."""
     taken = q[layout.OWN_STAGE] == layout.OWN_CURRENT and q[layout.OWN_READS_SPEED] > 0.0
     return q[layout.HAS_CURRENT] > 0.0 and (q[layout.BACK_EMF_FEEDFORWARD] != 0.0 or taken)
 
 
-@kernel
 def speed_interval(q):
     """Ticks between two updates of the velocity stage, 1 where there is none."""
     return int(q[layout.EVERY_VELOCITY]) if q[layout.HAS_VELOCITY] > 0.0 else 1
 
 
-@kernel
 def command_interval(q):
     """Ticks between two commands of the drive."""
     return int(q[layout.EVERY_POSITION]) if q[layout.HAS_POSITION] > 0.0 else speed_interval(q)
 
 
-@kernel
 def interval(q, stage):
     """Ticks from one update of the signal at a cut to the next; 0 where the drive has no such loop."""
     current, velocity = q[layout.HAS_CURRENT] > 0.0, q[layout.HAS_VELOCITY] > 0.0
@@ -100,7 +96,6 @@ def interval(q, stage):
     return speed_interval(q) if velocity else command_interval(q)
 
 
-@kernel
 def repeats(q, stage):
     """Ticks after which the loop repeats: more than `interval` where it is periodic."""
     every = interval(q, stage)
@@ -112,7 +107,6 @@ def repeats(q, stage):
     return max(command_interval(q), max(speed, every))
 
 
-@kernel
 def added(places, count, first, length):
     """Add places one after the other to a list; how many there are then, with those past MOST."""
     for k in range(length):
@@ -121,7 +115,6 @@ def added(places, count, first, length):
     return count + length
 
 
-@kernel
 def listed(q, places):
     """Where the drive remembers something, angles first; how many there are, and how many are angles."""
     places[0] = float(REMEMBERED[0])
@@ -137,7 +130,6 @@ def listed(q, places):
     return count, angles
 
 
-@kernel
 def seen_value(q, s, io, stage):
     """What a loop returns at the tick that has just been run."""
     if stage == CURRENT:
@@ -155,7 +147,6 @@ def seen_value(q, s, io, stage):
     return s[layout.S_CURRENT_BEFORE] if stage == AT_CURRENT else s[layout.S_VOLTAGE_BEFORE]
 
 
-@kernel
 def put_inputs(q, s, io, stage, size):
     """Write the inputs of a tick: nothing, or the unit at the place where the loop is cut."""
     for k in range(layout.IN_PROBE + 4):
@@ -171,7 +162,6 @@ def put_inputs(q, s, io, stage, size):
         io[layout.IN_PROBE + POINT[stage]] = -size / q[layout.RATIO] if stage == POSITION else -size
 
 
-@kernel
 def noted(q, s, k, j, seen):
     """Put down what stands in front of each limiter at tick k, as column j."""
     at = k * SEEN * (MOST + 1) + j
@@ -187,7 +177,6 @@ def noted(q, s, k, j, seen):
         seen[at + BESIDE_VOLTAGE * (MOST + 1)] = s[layout.S_CURRENT_INTEGRATOR]
 
 
-@kernel
 def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, begin, apart, seen):
     """Run the drive as it stands over one period; returns what the loop gave, NaN where a tick failed.
 
@@ -213,14 +202,12 @@ def one_column(q, s, io, stage, every, size, places, count, angles, j, blocks, b
     return value
 
 
-@kernel
 def until_next(every, ticks):
     """Ticks until a stage runs next, so many ticks after it ran."""
     passed = ticks - every * int(ticks / every)
     return float(every - passed) if passed > 0 else 0.0
 
 
-@kernel
 def put_unit(q, s, places, j, angles, ticks):
     """Put the drive into the j-th unit state, -1: at rest; the motor's angle takes the stored ones with it.
 
@@ -237,7 +224,6 @@ def put_unit(q, s, places, j, angles, ticks):
     set_off(q, s)
 
 
-@kernel
 def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
     """A, b, c, one after the other, of the loop as run over ``every`` ticks from tick ``first``.
 
@@ -254,7 +240,6 @@ def block(q, s, io, stage, first, every, places, n, angles, blocks, at, seen):
     return 0 if math.isnan(value) else 1
 
 
-@kernel
 def cut_here(q, stage):
     """Put a probe in that lets nothing through but what is injected, or all where the loop is run closed."""
     if POINT[stage] >= 0 and (stage != CURRENT or q[layout.HAS_VELOCITY] > 0.0):
@@ -262,7 +247,6 @@ def cut_here(q, stage):
         q[at + layout.PROBE_ON], q[at + layout.PROBE_GAIN] = 1.0, 1.0 if stage == AT_LAW else 0.0
 
 
-@kernel
 def prepared(q, s, stage):
     """Make ``q`` the row of the linear drive with its loop cut, and derive it; 0 where it is too long."""
     if stage == CURRENT or stage == VELOCITY:  # no stages outside; its command is then that of the drive
@@ -280,7 +264,6 @@ def prepared(q, s, stage):
     return 1
 
 
-@kernel
 def runs_closed(stage):
     """Whether a loop is run closed: through the command of its own stage, or beside what its law gives."""
     return stage == CURRENT or stage == VELOCITY or stage == AT_LAW

@@ -15,10 +15,11 @@ from actuator_lti.batch._eigen import eigenvalues
 from actuator_lti.batch._resolvent import states_at
 from actuator_lti.batch._response import evaluate
 from actuator_lti.batch._run import one_loop
-from actuator_lti.compiled.kernel import kernel
 from nonlinear._kernels import layout
 from nonlinear.export import linear
 from nonlinear.export.linear_row import linear_row
+
+KERNELS = True
 
 MOST_PHASES = 32  # updates of the signal within one period
 MOST_STATES = 160  # of all phases together
@@ -27,7 +28,6 @@ SIGNALS = ("w_ref", "i_ref", "u")
 SHOWN = 3  # of them
 
 
-@kernel
 def phases_of(p, q, s, io, stage, blocks, places, seen):
     """A, b, c of each phase into ``blocks``; the states, or what stands in the way.
 
@@ -56,7 +56,6 @@ def phases_of(p, q, s, io, stage, blocks, places, seen):
     return n
 
 
-@kernel
 def spread(n, count, blocks, keep):
     """Mark, phase by phase, the states that the output sees and the input reaches."""
     total = n * count
@@ -88,7 +87,6 @@ def spread(n, count, blocks, keep):
     return kept
 
 
-@kernel
 def joined(n, count, kept, blocks, keep, a, b, c):
     """A, b, c of all phases as one system, over the states that are kept."""
     for k in range(kept * kept):
@@ -108,7 +106,6 @@ def joined(n, count, kept, blocks, keep, a, b, c):
                 c[int(keep[m * n + i])] = blocks[at + n * n + n + i] / count
 
 
-@kernel
 def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
     """A, b, c of a loop of the drive with the parameters p; the number of states, or what stands in the way.
 
@@ -130,7 +127,6 @@ def assembled(p, q, s, io, stage, blocks, places, keep, seen, a, b, c):
     return kept
 
 
-@kernel
 def lead_of(p):
     """Feed-forward in front of a position loop as k_ff/(Kv T), NaN where it is more than that."""
     if p[layout.ELASTIC_DRIVE] > 0.0 and p[layout.RIGID] <= 0.0 and p[layout.OUTPUT_SENSOR] <= 0.0:
@@ -145,7 +141,6 @@ def lead_of(p):
     return p[layout.FEEDFORWARD] / (p[layout.POSITION_GAIN] * period)
 
 
-@kernel
 def figures(
     n, a, b, c, lead, time_figures, row, poles, points, stack, xs, rs, ss, work, state, exchanged,
     real, imaginary,
@@ -165,7 +160,6 @@ def figures(
     )
 
 
-@kernel
 def stepped(n, h, b, c, lead, count, y, state, after):
     """Step response of a closed loop at its samples; h is A - I. Lead NaN: of A, b, c as they are."""
     fed_back = 0.0 if math.isnan(lead) else 1.0
@@ -188,7 +182,6 @@ def stepped(n, h, b, c, lead, count, y, state, after):
         y[k] = total
 
 
-@kernel
 def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
     """Response of a loop at angles per sample, as pairs."""
     for k in range(count):
@@ -196,7 +189,6 @@ def responded(n, h, b, c, count, xs, rs, work, state, exchanged):
         rs[2 * k], rs[2 * k + 1] = rr, ri
 
 
-@kernel
 def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
     """A and b of the closed drive from its command, and rows of ``seen`` (tick, signal): states, then d.
 
@@ -222,7 +214,6 @@ def limiters_assembled(p, q, s, io, blocks, places, keep, seen, a, b, c):
     return kept
 
 
-@kernel
 def signal_interval(q, signal, every):
     """Ticks between two updates of a signal in front of a limiter."""
     if signal == linear.VOLTAGE or signal == linear.BESIDE_VOLTAGE:
@@ -232,7 +223,6 @@ def signal_interval(q, signal, every):
     return every
 
 
-@kernel
 def seen_at(n, seen, signal, k, state):
     """A signal in front of a limiter at tick k, as a pair."""
     at = (k * linear.SEEN + signal) * (linear.MOST + 1)
@@ -243,7 +233,6 @@ def seen_at(n, seen, signal, k, state):
     return real, imaginary
 
 
-@kernel
 def largest_change(n, seen, signal, every, step, x, state):
     """Largest change from one update to the next; the last one before the first is a turn older."""
     largest = 0.0
@@ -261,7 +250,6 @@ def largest_change(n, seen, signal, every, step, x, state):
     return largest
 
 
-@kernel
 def limiter_sizes(q, n, a, b, seen, every, count, xs, sizes, work, state):
     """Largest magnitude, over the ticks between two commands, of each signal in front of a limiter.
 

@@ -9,11 +9,12 @@ import math
 
 import numpy as np
 
-from actuator_lti.compiled.kernel import kernel
 from actuator_lti.design.over_angle import ROUNDED
 from nonlinear._kernels import elastic_layout, layout
 from nonlinear._kernels.elastic_modes import enter_mode, put_output
 from nonlinear._kernels.start import init
+
+KERNELS = True
 
 CLEARED = np.array([
     layout.LAW, layout.DRY, layout.DRY_REVERSE, layout.OFFSET, layout.LOAD,
@@ -35,13 +36,11 @@ UNLIMITED = np.array([
 ])  # fmt: skip
 
 
-@kernel
 def averaged(p):
     """How many waves a drive has the mean of: the first of each torque, gear error and cogging, in motion."""
     return 1 if p[layout.HAS_VELOCITY] > 0.0 and p[layout.HAS_POSITION] <= 0.0 else 0
 
 
-@kernel
 def slope_at_zero(p, slope, waves, peak, order):
     """Slope of a torque over its angle at zero; what rounding leaves of it, as at a quarter turn, is none."""
     size = abs(slope)
@@ -52,7 +51,6 @@ def slope_at_zero(p, slope, waves, peak, order):
     return 0.0 if abs(slope) <= ROUNDED * size else slope
 
 
-@kernel
 def stiffness_at_zero(p):
     """Stiffness of the spring's piece on which the load's own moment at angle zero leaves the drive."""
     moment, k = 0.0, p[layout.STIFFNESS]
@@ -66,7 +64,6 @@ def stiffness_at_zero(p):
     return k
 
 
-@kernel
 def linear_row(p, q):
     """Copy the parameters of a run, without anything that is not linear; what bends becomes its slope."""
     for k in range(layout.SIZE):
@@ -90,7 +87,6 @@ def linear_row(p, q):
         q[layout.LOAD_COEFFICIENT] = 0.0
 
 
-@kernel
 def set_off(q, s):
     """Hold an elastic drive train in its linear mode, its angles those of motor and twist."""
     if q[layout.ELASTIC_DRIVE] <= 0.0:
@@ -104,7 +100,6 @@ def set_off(q, s):
     put_output(q, s)
 
 
-@kernel
 def at_rest(q, s):
     """Put the drive at its start, ready to be run as a linear map."""
     init(q, s)

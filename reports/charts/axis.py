@@ -114,8 +114,7 @@ def log_ticks(low: float, high: float, room: int = 6) -> list[tuple[float, str]]
     mantissas = (1.0,) if decades > 2.2 else (1.0, 2.0, 5.0)
     first, last = math.floor(math.log10(low) - 1e-9), math.ceil(math.log10(high) + 1e-9)
     values = [m * 10.0**k for k in range(first, last + 1) if k % every == 0 for m in mantissas]
-    inside = [v for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
-    return [(v, plain_decade(v)) for v in inside]
+    return [(v, plain_decade(v)) for v in values if low * (1 - 1e-9) <= v <= high * (1 + 1e-9)]
 
 
 def minor_ticks(axis: Axis) -> list[float]:

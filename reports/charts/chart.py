@@ -208,8 +208,7 @@ class Column:
 
     def written(self) -> Column:
         """Give what a document has to hold of it: the x axis stands in the last panel."""
-        bare = [replace(one, x=Axis()) for one in self.panels[:-1]]
-        return replace(self, panels=bare + self.panels[-1:])
+        return replace(self, panels=[replace(one, x=Axis()) for one in self.panels[:-1]] + self.panels[-1:])
 
 
 @dataclass(kw_only=True)

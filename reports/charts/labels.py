@@ -49,8 +49,7 @@ class Room:
         near = (high >= self.frame[:2]).all(axis=1) & (low <= self.frame[2:]).all(axis=1)  # roughly
         start, stop = start[near], stop[near]
         if len(start):
-            longest = float(np.max(np.abs(stop - start)))
-            parts = min(max(int(longest / 4.0), 1), 120)
+            parts = min(max(int(float(np.max(np.abs(stop - start))) / 4.0), 1), 120)
             t = np.linspace(0.0, 1.0, parts + 1)[:, None, None]
             self.ink.append((start + t * (stop - start)).reshape(-1, 2))
 

@@ -76,12 +76,10 @@ class Pen:
     def style(self, **wanted: str) -> str:
         """Write colours and widths: as style on a page, where variables count, else as attributes."""
         colours = _VARIABLES if self.page else COLOURS
-        said = [
-            (key.replace("_", "-"), colours.get(value, value)) for key, value in wanted.items() if value != ""
-        ]
+        said = {key.replace("_", "-"): colours.get(value, value) for key, value in wanted.items() if value}
         if self.page:
-            return 'style="' + ";".join(f"{key}:{value}" for key, value in said) + '"'
-        return " ".join(f'{key}="{value}"' for key, value in said)
+            return 'style="' + ";".join(f"{key}:{value}" for key, value in said.items()) + '"'
+        return " ".join(f'{key}="{value}"' for key, value in said.items())
 
     def line(self, path: str, look: Look, more: str = "") -> str:
         stroke = self.style(
@@ -94,9 +92,9 @@ class Pen:
     def filled(self, path: str, look: Look, more: str = "") -> str:
         fill = look.fill or look.colour
         opacity = "" if look.opacity == 1.0 else f"{look.opacity:g}"
-        edge = {"stroke": "none"}
-        if look.width:
-            edge = {"stroke": look.colour, "stroke_width": f"{look.width:g}"}
+        edge = (
+            {"stroke": look.colour, "stroke_width": f"{look.width:g}"} if look.width else {"stroke": "none"}
+        )
         body = f'<path{more} d="{path}" {self.style(fill=fill, fill_opacity=opacity, **edge)}/>'
         if not look.hatch:
             return body

@@ -164,8 +164,7 @@ def _keys(chart: Chart) -> dict[str, int]:
 
 def _shown(chart: Chart) -> list[tuple[str, Item]]:
     labels = chart.labels()
-    wanted = len(labels) > 1 if chart.legend is None else chart.legend
-    return labels if wanted else []
+    return labels if (len(labels) > 1 if chart.legend is None else chart.legend) else []
 
 
 def _legend(chart: Chart, prefix: str) -> str:

@@ -108,14 +108,9 @@ def _kept_gains(variants: Sequence[Any]) -> Iterable[str]:
 
 
 def answer(
-    one: Analysis,
-    subject: Design | Study | None,
-    *,
-    as_json: bool,
-    out: Path | None = None,
-    quiet: bool = False,
-    **chosen: Any,
-) -> None:
+    one: Analysis, subject: Design | Study | None, *, as_json: bool, out: Path | None = None,
+    quiet: bool = False, **chosen: Any,
+) -> None:  # fmt: skip
     from actuator_lti.design import warnings_of
     from actuator_lti.design.suspicions import beyond_largest
     from analyses.isolation import isolated
@@ -198,9 +193,6 @@ def _option(name: str, kind: Any, option: Option, default: Any) -> tuple[Any, An
     if option.argument:
         needed = Parameter.empty if default is None else default
         return Annotated[text, typer.Argument(metavar=option.metavar, help=option.words)], needed
-    made = typer.Option(
-        f"--{option.flag or flag(name)}",
-        metavar=option.metavar or "NUMBER" * is_number(kind) or None,
-        help=option.words,
-    )
+    metavar = option.metavar or "NUMBER" * is_number(kind) or None
+    made = typer.Option(f"--{option.flag or flag(name)}", metavar=metavar, help=option.words)
     return (Annotated[bool, made], default) if kind is bool else (Annotated[text | None, made], None)

@@ -27,13 +27,9 @@ PANELS = {
 
 def build() -> typer.Typer:
     app = typer.Typer(
-        name="actuator-lti",
-        add_completion=True,
-        no_args_is_help=True,
-        pretty_exceptions_enable=False,
-        rich_markup_mode="rich",
+        name="actuator-lti", no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
-    )
+    )  # fmt: skip
     app.callback()(about)
     for panel, commands in PANELS.items():
         for command in commands:
@@ -42,7 +38,6 @@ def build() -> typer.Typer:
 
 
 def built() -> Any:
-    """The command with all that are below it."""
     return bounded(typer.main.get_command(build()))
 
 
@@ -112,8 +107,7 @@ def _add(app: typer.Typer, name: str, function: Callable[..., Any], panel: str |
 
 def flowed(text: str) -> str:
     """Give a docstring as paragraphs of one line each: the terminal breaks them at its own width."""
-    paragraphs = inspect.cleandoc(text).split("\n\n")
-    return "\n\n".join(" ".join(part.split("\n")) for part in paragraphs)
+    return "\n\n".join(" ".join(part.split("\n")) for part in inspect.cleandoc(text).split("\n\n"))
 
 
 def bounded(command: Any) -> Any:

@@ -18,24 +18,15 @@ import typer
 from actuator_lti.errors import InputError, Mistakes, NumericalError, OutOfTime, UnstableError
 from reports.cli import time_limit
 
-DONE = 0
-VERDICT_FAILED = 1
-BAD_INPUT = 2
-NO_RESULT = 3
-INTERRUPTED = 130
+DONE, VERDICT_FAILED, BAD_INPUT, NO_RESULT, INTERRUPTED = 0, 1, 2, 3, 130
 
 # typer's own usage errors, whichever click it carries: BadParameter -> UsageError -> ClickException.
 _USAGE_ERRORS: type[Exception] = typer.BadParameter.__mro__[2]
 
 _LONGEST = 1000  # characters of a line on standard error
-_PLAIN = {  # what typer says, and what it means
-    "Input should be a valid number, unable to parse string as a number": (
-        "allowed: a number, such as 0.5, without its unit"
-    ),
-    "Input should be a valid integer, unable to parse string as an integer": (
-        "allowed: a whole number, such as 1000"
-    ),
-    "Value error, ": "",
+_PLAIN = {  # what typer says
+    "valid number, unable to parse string as a number": "a number, such as 0.5, without its unit",
+    "valid integer, unable to parse string as an integer": "a whole number, such as 1000",
 }
 
 
@@ -128,8 +119,8 @@ def _usage_line(error: BaseException) -> str:
     command = context.command_path if context is not None else "actuator-lti"
     message = error.format_message() if hasattr(error, "format_message") else str(error)
     for said, plain in _PLAIN.items():
-        message = message.replace(said, plain)
-    return f"{message or 'a command is missing'} (see {command} --help)"
+        message = message.replace(f"Input should be a {said}", f"allowed: {plain}")
+    return f"{message.replace('Value error, ', '') or 'a command is missing'} (see {command} --help)"
 
 
 def _quiet_pipe() -> int:
@@ -142,15 +133,12 @@ def write_crash_file(tracebacks: str) -> str:
     """Write tracebacks to a new file among the temporary ones; its path, or why there is none."""
     from reports.provenance import package_version
 
-    head = [
-        f"actuator-lti {package_version()}, Python {platform.python_version()}, {platform.platform()}",
-        f"arguments: {sys.argv[1:]!a}",
-        "",
-    ]
+    head = f"actuator-lti {package_version()}, Python {platform.python_version()}, {platform.platform()}\n"
+    head += f"arguments: {sys.argv[1:]!a}\n"
     try:
         handle, path = tempfile.mkstemp(prefix="actuator-lti-", suffix=".traceback.txt")
         with os.fdopen(handle, "w", encoding="utf-8", errors="backslashreplace") as file:
-            file.write("\n".join(head) + tracebacks)
+            file.write(head + tracebacks)
     except OSError as error:
         return f"could not be written: {error.strerror or error}"
     return path

@@ -124,6 +124,4 @@ def pdf(
         print_line(str(path))
     damaged = drain()
     if damaged:
-        raise InputError(
-            f"{damaged[0].part}: cannot be drawn from its data; {path} says so", where=str(report)
-        )
+        raise InputError(f"{damaged[0].part}: cannot be drawn from its data; {path} says so", str(report))

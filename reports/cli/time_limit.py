@@ -29,9 +29,8 @@ def start(seconds: float) -> None:
     if threading.current_thread() is threading.main_thread() and hasattr(signal, "setitimer"):
         signal.signal(signal.SIGALRM, lambda _number, _frame: _refuse(seconds))
         signal.setitimer(signal.ITIMER_REAL, seconds)
-    timer = threading.Timer(
-        min(HARD_FACTOR * seconds + HARD_EXTRA_S, threading.TIMEOUT_MAX), _end, (seconds,)
-    )
+    most = min(HARD_FACTOR * seconds + HARD_EXTRA_S, threading.TIMEOUT_MAX)
+    timer = threading.Timer(most, _end, (seconds,))
     timer.daemon = True
     timer.start()
     _timers.append(timer)

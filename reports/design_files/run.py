@@ -56,14 +56,10 @@ def _listed(design: Design) -> Listed:
     same = ("name", "title", "revision", "axis", "total_ratio")
     return Listed(
         **{name: getattr(design, name) for name in same},
-        motor="resistance and inductance" if electrical else source,
-        loops=_loops(design),
-        gears=tuple(gear.name for gear in design.gears),
-        period_s=design.controller.period_s,
-        requirements=len(design.requirements),
-        warnings=tuple(warnings_of(design)),
-        hash=design_hash(design),
-    )
+        motor="resistance and inductance" if electrical else source, loops=_loops(design),
+        gears=tuple(gear.name for gear in design.gears), period_s=design.controller.period_s,
+        requirements=len(design.requirements), warnings=tuple(warnings_of(design)), hash=design_hash(design),
+    )  # fmt: skip
 
 
 def _loops(design: Design) -> tuple[str, ...]:

@@ -260,8 +260,7 @@ def _step(old: str, new: str) -> str:
 def main_changes(comparison: Comparison) -> tuple[Change, ...]:
     """Give the changes to read first: distances to requirements, then the rest; no figure twice."""
     valued = [c for c in comparison.changes if c.kind not in ("verdict", "requirement", "check")]
-    ranked = sorted(valued, key=lambda c: (not c.worse, c.kind != "distance"))
-    return tuple(ranked[:SHOWN])
+    return tuple(sorted(valued, key=lambda c: (not c.worse, c.kind != "distance"))[:SHOWN])
 
 
 def change_words(change: Change, comparison: Comparison, verdicts: Sequence[Tree]) -> str:

@@ -74,7 +74,6 @@ def _comparison(payload: Mapping[str, Any]) -> Document:
     base, *others = map(variant, payload["study"]["designs"])
     assert base.design is not None
     title = payload["study"]["title"]
-    study = Study(payload["name"], title, "", title, base, tuple(others))
-    parts = compare_section.section(compare(study))
+    parts = compare_section.section(compare(Study(payload["name"], title, "", title, base, tuple(others))))
     subtitle = f"{base.name} and {len(others)} variants"
     return study_document(base.design, parts, title=title, subtitle=subtitle, kind="compare")

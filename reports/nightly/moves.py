@@ -141,8 +141,7 @@ def flaps(values: np.ndarray, tolerance: float) -> bool:
     if len(x) < 4:
         return False
     levels = x[np.concatenate([[True], np.abs(np.diff(x)) > tolerance])]
-    returns = np.abs(levels[2:] - levels[:-2]) <= tolerance
-    return int(np.count_nonzero(returns)) >= RETURNS
+    return int(np.count_nonzero(np.abs(levels[2:] - levels[:-2]) <= tolerance)) >= RETURNS
 
 
 def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:
@@ -157,6 +156,5 @@ def missing_nights(starts: Sequence[str]) -> tuple[tuple[int, int], ...]:
     usual = float(np.median(pauses[-60:])) if len(pauses) >= 3 else 0.0
     if usual < 3600.0:
         return ()
-    return tuple(
-        (int(i), max(1, round(pauses[i] / usual) - 1)) for i in np.flatnonzero(pauses > _GAP_FACTOR * usual)
-    )
+    long = np.flatnonzero(pauses > _GAP_FACTOR * usual)
+    return tuple((int(i), max(1, round(pauses[i] / usual) - 1)) for i in long)

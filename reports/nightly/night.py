@@ -61,15 +61,10 @@ def nightly(asked: Asked, progress: Callable[[int, int], None]) -> Overview:
 
 
 def run_night(
-    study: Study,
-    site: Path,
-    settings: Settings | None = None,
-    *,
-    progress: Callable[[int, int], None] = _nobody,
-    say: Callable[[str], None] = _nobody,
-    code: CodeVersion | None = None,
-    clock: Callable[[], str] = now,
-) -> Overview:
+    study: Study, site: Path, settings: Settings | None = None, *,
+    progress: Callable[[int, int], None] = _nobody, say: Callable[[str], None] = _nobody,
+    code: CodeVersion | None = None, clock: Callable[[], str] = now,
+) -> Overview:  # fmt: skip
     """Build all of a study, note it in the history and publish the site.
 
     Whatever ends this early leaves the site of the night before whole; what was built until then is in
@@ -86,28 +81,18 @@ def run_night(
         site_files.remove_leftovers(site, history.state)
         site_files.mark(site)
         run = history.start_run(
-            started=clock(),
-            code=version.hash,
-            code_commit=version.commit,
+            started=clock(), code=version.hash, code_commit=version.commit,
             study_commit=commit_of(study.origin) if study.origin is not None else "",
-            libraries={**version.libraries, "python": platform.python_version()},
-            host=socket.gethostname(),
-        )
-        outcomes = _outcomes(run, jobs, cache, use, progress, say)
-        history.finish_run(run, clock(), outcomes)
+            libraries={**version.libraries, "python": platform.python_version()}, host=socket.gethostname(),
+        )  # fmt: skip
+        history.finish_run(run, clock(), _outcomes(run, jobs, cache, use, progress, say))
         return site_files.publish(site, study, history, cache, keep_reports=use.keep, built=True)
 
 
 def approve(
-    study: Study,
-    site: Path,
-    *,
-    by: str,
-    reason: str,
-    names: Sequence[str] = (),
-    settings: Settings | None = None,
-    clock: Callable[[], str] = now,
-) -> Overview:
+    study: Study, site: Path, *, by: str, reason: str, names: Sequence[str] = (),
+    settings: Settings | None = None, clock: Callable[[], str] = now,
+) -> Overview:  # fmt: skip
     """Make the last night the baseline that later ones are held against, and publish the site anew.
 
     Refused without name or reason, without a night, and for a design that has no result in it.
@@ -197,18 +182,11 @@ def _reported(run: Run, job: Job, key: str, meta: Mapping[str, Any], **more: Any
     ranked = [v for v in meta["verdicts"] if left(v) < inf]
     worst: Mapping[str, Any] = min(ranked, key=left, default={"relative": None, "id": ""})
     result = Result(
-        run=run.id,
-        name=job.name,
-        kind=job.kind,
-        status="fail" if failing else "unproven" if meta["unproven"] else "pass",
-        key=key,
-        failed=meta["failed"],
-        total=meta["total"],
-        worst=worst["relative"],
-        worst_id=worst["id"],
-        message=f"not passed: {sections}" if sections else "",
-        **more,
-    )
+        run=run.id, name=job.name, kind=job.kind,
+        status="fail" if failing else "unproven" if meta["unproven"] else "pass", key=key,
+        failed=meta["failed"], total=meta["total"], worst=worst["relative"], worst_id=worst["id"],
+        message=f"not passed: {sections}" if sections else "", **more,
+    )  # fmt: skip
     settings = job.payload.get("settings") or {}
     inputs = {
         "parameters": dict(job.parameters),

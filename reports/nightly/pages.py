@@ -83,16 +83,9 @@ def design_page(night: Overview, design: DesignView, history: History, available
 
 def _render(template: str, code: str, **context: Any) -> str:
     return render(
-        template,
-        style=asset("nightly/nightly.css"),
-        code=code,
-        states=STATES,
-        night_signs=NIGHT_SIGNS,
-        told=changes,
-        visible=visible,
-        one_line=one_line,
-        **context,
-    )
+        template, style=asset("nightly/nightly.css"), code=code, states=STATES, night_signs=NIGHT_SIGNS,
+        told=changes, visible=visible, one_line=one_line, **context,
+    )  # fmt: skip
 
 
 def _nights(

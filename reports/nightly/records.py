@@ -66,8 +66,7 @@ class Result:
     worst: float | None = None
     worst_id: str = ""
     message: str = ""
-    # The night whose file holds the content, an earlier one where all is as it was then; None: no result
-    home: int | None = None
+    home: int | None = None  # the night whose file holds the content, maybe an earlier one; None: no result
     content: Content | None = None
 
 

@@ -41,11 +41,9 @@ class Job:
 
     name: str
     kind: str = "design"
-    # Plain JSON and all that the result depends on, except the code
-    payload: Mapping[str, Any] = field(default_factory=dict)
+    payload: Mapping[str, Any] = field(default_factory=dict)  # all that the result depends on, but code
     design_hash: str = ""
-    # Dotted keys with texts as written, which are shown when a figure has moved
-    parameters: Mapping[str, str] = field(default_factory=dict)
+    parameters: Mapping[str, str] = field(default_factory=dict)  # keys and texts as written
     keys: Mapping[str, str] = field(default_factory=dict)  # all others, as requirements and matrices
     revision: str = ""
 

@@ -54,8 +54,7 @@ def csv_cell(value: object) -> str:
 def csv_text(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A CSV table (RFC 4180) whose cells are safe to open in a spreadsheet."""
     buffer = io.StringIO()
-    writer = csv.writer(buffer)
-    writer.writerows([csv_cell(value) for value in row] for row in (header, *rows))
+    csv.writer(buffer).writerows([csv_cell(value) for value in row] for row in (header, *rows))
     return buffer.getvalue()
 
 

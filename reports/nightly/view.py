@@ -175,16 +175,12 @@ def overview(history: History, cache: Cache, study: Study, site: Path, *, built:
             raise vanished(one.name, site)
     before = history.night(runs[-2].id).by_name if len(runs) > 1 else {}
     return Overview(
-        study=study,
-        title=study.title or study.name,
-        site=site,
-        designs=tuple(sorted(designs, key=lambda design: design.rank)),
-        runs=tuple(runs),
+        study=study, title=study.title or study.name, site=site,
+        designs=tuple(sorted(designs, key=lambda design: design.rank)), runs=tuple(runs),
         gone=tuple(sorted(before.keys() - tonight.keys())),
-        missing=missing_nights([run.started for run in runs]),
-        interrupted=tuple(history.index.interrupted),
+        missing=missing_nights([run.started for run in runs]), interrupted=tuple(history.index.interrupted),
         memory=history.memory(),
-    )
+    )  # fmt: skip
 
 
 def _design(result: Result, between: Between, cache: Cache) -> DesignView:
@@ -197,14 +193,11 @@ def _design(result: Result, between: Between, cache: Cache) -> DesignView:
     approval = next((one for one in own if history.first(result.name, [runs[one.run]])), None)
     entry = cache.whole(result.key) if result.key else None
     return DesignView(
-        result=result,
-        meta=entry.meta if entry else {},
-        last_night=between.last_night(result, past),
-        baseline=between.baseline(result, approval),
-        approval=approval,
+        result=result, meta=entry.meta if entry else {}, last_night=between.last_night(result, past),
+        baseline=between.baseline(result, approval), approval=approval,
         strip=tuple((run, known.get(run.id, "absent")) for run in history.runs[-STRIP:]),
         status_flaps=sum(a.status != b.status for a, b in pairwise(past[-WINDOW:])) >= 3,
-    )
+    )  # fmt: skip
 
 
 def outcomes(past: list[Result]) -> dict[int, str]:

@@ -31,15 +31,10 @@ NO_MOVE = (
 
 
 def section(
-    figures: Mapping[str, LoopFigures],
-    items: Sequence[doc.VerdictItem],
-    sections: Sequence[doc.Section],
-    point: WeakPoint | None = None,
-    ranges: Mapping[str, Mapping[str, Spread]] | None = None,
-    *,
-    bounds: Corners | None = None,
-    mend: str = "",
-) -> doc.Section:
+    figures: Mapping[str, LoopFigures], items: Sequence[doc.VerdictItem], sections: Sequence[doc.Section],
+    point: WeakPoint | None = None, ranges: Mapping[str, Mapping[str, Spread]] | None = None, *,
+    bounds: Corners | None = None, mend: str = "",
+) -> doc.Section:  # fmt: skip
     """Make the first screen from the loops, the verdicts on the requirements and all other sections.
 
     ``point`` is the weakest of all views and ``mend`` the words of the move that mends it; ``ranges`` are the
@@ -96,9 +91,8 @@ def power_above(value: float) -> str:
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
-    known = [
-        item for item in items if item["limit"] is not None and (item["value"] is not None or _lost(item))
-    ]
+    limited = [item for item in items if item["limit"] is not None]
+    known = [item for item in limited if item["value"] is not None or _lost(item)]
     found: dict[tuple[str, str | None], list[float]] = {}
     for corner in bounds.corners if bounds else ():
         for one in corner.verdicts:
@@ -137,6 +131,8 @@ def _loop(
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
         own = [item for item in items if item.get("quantity") == quantity.name and item.get("loop") == name]
+        # with the rotor locked, or to the reference, it is another figure than that of the cell
+        own = [item for item in own if item["value"] in (None, quantity.read(figures.judged))]
         nearest = min(own, key=_nearness, default=None)
         over = ranges.get(quantity.name)
         cells.append(
@@ -201,7 +197,6 @@ def _pictures(figures: Mapping[str, LoopFigures], point: WeakPoint | None) -> li
     own = seen is result
     title = LOOPS[name] if own or view is None else weakest_label(view)
     bode = loop_charts.open_bode(title, seen, frequency_grid(seen), name=name if own else "", small=True)
-    step = (
-        [] if result.step is None else [loop_section.step(LOOPS[name], result, None, name=name, small=True)]
-    )
-    return [bode, *step]
+    if result.step is None:
+        return [bode]
+    return [bode, loop_section.step(LOOPS[name], result, None, name=name, small=True)]

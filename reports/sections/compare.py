@@ -145,8 +145,7 @@ def _side_by_side(
 def _verdict_cell(one: Compared, wanted: RequirementVerdict) -> doc.Cell:
     verdict = next((v for v in one.verdicts if v.figure == wanted.figure), None)
     if verdict is None or verdict.value is None:
-        unstable = verdict is not None and verdict.loop in one.unstable
-        words = "not stable" if unstable else "none"
+        words = "not stable" if verdict is not None and verdict.loop in one.unstable else "none"
         return {"text": words, "status": verdict.role if verdict else "info"}
     change = 0.0 if wanted.value is None else verdict.value - wanted.value
     factor = shown_unit(wanted.requirement.unit)[1]
@@ -215,9 +214,8 @@ def differences(comparison: Comparison) -> doc.Section:
         "explain is their interaction. Large-signal figures are not taken apart."
     )
     variants = comparison.everything.variants
-    result = (
-        f"{sum(bool(one.changed) for one in variants)} of {len(variants)} variants change a key of the base."
-    )
+    moved = sum(bool(one.changed) for one in variants)
+    result = f"{moved} of {len(variants)} variants change a key of the base."
     return doc.section("differences", "Cause of each change", blocks, result=result, intro=intro)
 
 

@@ -95,7 +95,6 @@ def designs(comparison: Comparison, note: str = _NOTE) -> doc.Block:
 
 
 def unstable_words(one: Compared) -> str:
-    """Name the loops that are not stable."""
     return ", ".join(LOOPS[name] for name in one.unstable)
 
 
@@ -117,8 +116,7 @@ def _changes(one: Compared, comparison: Comparison, sign: int) -> str:
 def _percent(part: float, *, signed: bool = False) -> str:
     if math.isinf(part):
         return "lost" if part < 0.0 else "regained"
-    sign = "+" if signed and part > 0 else ""
-    return f"{sign}{significant(100.0 * part, 2)} %"
+    return f"{'+' * (signed and part > 0)}{significant(100.0 * part, 2)} %"
 
 
 def _best(comparison: Comparison) -> doc.Block:
@@ -150,9 +148,7 @@ def _judged(comparison: Comparison, wanted: RequirementVerdict) -> list[tuple[Co
 
 
 def number(value: float | None) -> str | None:
-    if value is None:
-        return None
-    return significant(value, 4) if math.isfinite(value) else "unlimited"
+    return None if value is None else significant(value, 4) if math.isfinite(value) else "unlimited"
 
 
 MANY = 60  # designs beside the base that one page shows

@@ -92,7 +92,5 @@ def _rests(result: LimitCycles, fine: Unit) -> doc.Block:
         doc.of("rest.frequency_hz", "hz", "at", "Hz", format="sig:3"),
     ]
     note = "The drive as it is: dry friction, play, quantisation and limits at work. "
-    note += settling.FROM_THE_LARGEST
-    return doc.listing(
-        "What steps end in", result.rests, columns, note, lambda one: "warn" if one.hunting else None
-    )
+    listed = ("What steps end in", result.rests, columns, note + settling.FROM_THE_LARGEST)
+    return doc.listing(*listed, status=lambda one: "warn" if one.hunting else None)

@@ -51,9 +51,8 @@ def section(result: Failures) -> doc.Section:
 def summary(result: Failures) -> str:
     out, detection = output_unit(result.design.axis), result.asked.detection_s
     stopped = {case.name: case.to_stop_s for case in result.cases if case.to_stop_s is not None}
-    worst = min(
-        result.cases, key=lambda case: (min(stopped.get(case.name, inf), detection), -case.at_detection_rad)
-    )
+    soonest = {case.name: min(stopped.get(case.name, inf), detection) for case in result.cases}
+    worst = min(result.cases, key=lambda case: (soonest[case.name], -case.at_detection_rad))
     when, reached = seconds(detection), stopped.get(worst.name)
     if reached is not None and reached <= detection:
         words = f"reaches the stop first, {seconds(reached)} after it occurs; detection takes {when}"
@@ -63,10 +62,8 @@ def summary(result: Failures) -> str:
         words += "" if reached is None else f"; it reaches the stop after {seconds(reached)}"
     swing = noticed(result.design, result.before)
     if swing is not None and verdict_of(result.design, swing) is not Verdict.MET:
-        load = f"{result.asked.load_Nm:g} {result.design.load_unit}"
-        words += (
-            f"; before it the drive does not come to rest under {load}: {told(result.design, swing, *out)}"
-        )
+        does = f"does not come to rest under {result.asked.load_Nm:g} {result.design.load_unit}"
+        words += f"; before it the drive {does}: {told(result.design, swing, *out)}"
     return f"{NAMES[worst.name]} {words}. {requirements.told(result.requirements)}".rstrip()
 
 

@@ -244,17 +244,14 @@ def delay_budget(budgets: Mapping[str, DelayBudget]) -> doc.Section:
 def _causes(budgets: Mapping[str, DelayBudget]) -> dict[str, str]:
     """Every item that occurs, with its words: the filters between the plant and the measurement."""
     filters = dict.fromkeys(name for budget in budgets.values() for name in budget.filters_deg)
-    before = {key: CAUSES[key] for key in ("controller", "plant")}
-    return before | {name: name for name in filters} | CAUSES
+    return {key: CAUSES[key] for key in ("controller", "plant")} | {name: name for name in filters} | CAUSES
 
 
 def _budget_chart(budgets: Mapping[str, DelayBudget]) -> style.Chart:
     """Draw lag to the right and lead to the left of zero; what is left to 180 deg is phase margin."""
     made = style.Chart(width=style.WIDE, height=70.0 + 48.0 * len(budgets), legend=True)
-    panel = made.panel(
-        "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
-    )
-    parts = _causes(budgets)
+    words = "lag at the gain crossover, deg (lead left of zero; at 180 deg no phase margin is left)"
+    panel, parts = made.panel(words), _causes(budgets)
     bars = [
         {words: -one.items[key] for key, words in parts.items() if abs(one.items.get(key, 0.0)) > 0.05}
         for one in budgets.values()

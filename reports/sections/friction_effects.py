@@ -186,9 +186,8 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
         x, y = scale * loop.command_rad, scale * (loop.output_rad - loop.command_rad)
         panel.curve(np.append(x, x[0]), np.append(y, y[0]), label, **style.series(k))
     panel.rule_y(0.0)
-    caption = (
-        f"Position error over a slow triangular command; without {_cause(result)} only a small lag is left."
-    )
+    lag = f"without {_cause(result)} only a small lag is left"
+    caption = f"Position error over a slow triangular command; {lag}."
     if waits:
         title = "Wait before a small step moves the output"
         panel = chart.panel(f"step, {small}", "time to first motion, ms", "xy", title=title)
@@ -196,9 +195,8 @@ def _figure(result: FrictionEffects, fine: Unit, load: str) -> list[doc.Block]:
     for k, (label, waiting) in enumerate(waits):
         sizes = [scale * one.amplitude_rad for one in waiting]
         seen = [None if one.simulated_s is None else 1e3 * one.simulated_s for one in waiting]
-        panel.curve(
-            sizes, [1e3 * one.predicted_s for one in waiting], f"{label}: predicted", **style.series(k)
-        )
+        wanted = [1e3 * one.predicted_s for one in waiting]
+        panel.curve(sizes, wanted, f"{label}: predicted", **style.series(k))
         panel.points(sizes, seen, f"{label}: simulated", **style.marked(k))
     return [doc.figure("hysteresis", chart, caption)]
 

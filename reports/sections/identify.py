@@ -92,9 +92,8 @@ def _two_mass(result: FrequencyResult) -> doc.Section:
     """Parameters, and motor angle (and load angle) over motor torque: measured lines and the model."""
     fit, lines = result.fit, result.lines
     blocks = [identified.parameter_table("Identified two-mass drive", result.found)]
-    model = angle_responses(
-        lines.omega_rad_s, {name: fit[name] for name in NAMES}, fit.reduction, fit.reaction
-    )
+    values = {name: fit[name] for name in NAMES}
+    model = angle_responses(lines.omega_rad_s, values, fit.reduction, fit.reaction)
     hertz = lines.omega_rad_s / (2.0 * np.pi)
     for k, label in enumerate(("motor angle", "load angle")[: len(lines.names) - 1], 1):
         chart, panel = style.plot(320.0, "frequency, Hz", f"{label} over torque, rad/(N m)", "xy")
@@ -114,9 +113,8 @@ def _two_mass(result: FrequencyResult) -> doc.Section:
     words = f"Antiresonance {low:.4g} Hz, resonance {high:.4g} Hz, stiffness {stiffness}"
     words += "" if result.play is None else f", play {2e3 * result.play.half_rad:.3g} mrad"
     words += f"{identified.constant_words(fit)}."
-    return identified.judged(
-        "frequency-identification", "Two-mass drive", result, blocks, result=words, intro=intro
-    )
+    id, title = "frequency-identification", "Two-mass drive"
+    return identified.judged(id, title, result, blocks, result=words, intro=intro)
 
 
 SEEN = {"L": "open loop", "T": "closed loop L/(1+L)", "S": "sensitivity", "closed": "command to output"}
@@ -150,6 +148,5 @@ def _of_loop(result: ResponseResult) -> doc.Section:
         blocks.append(doc.figure("response", chart, caption=words, alt=f"{words}, against frequency"))
     found = (f"{parameter(name).key} {identified.value_words(fit, name, axis)}" for name in fit.names)
     values = "; ".join(found) + identified.constant_words(fit, axis)
-    return identified.judged(
-        "response-identification", "Measured response", result, blocks, result=f"{values}.", intro=intro
-    )
+    id, title = "response-identification", "Measured response"
+    return identified.judged(id, title, result, blocks, result=f"{values}.", intro=intro)

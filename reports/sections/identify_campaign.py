@@ -247,10 +247,8 @@ def region_figure(fit: SurfaceFit) -> doc.Block:
 def _ellipse(
     covariance: np.ndarray, i: int, j: int, scale: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    part = covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(part)
-    circle = style.TURN.real, style.TURN.imag
-    x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ circle
+    values, vectors = np.linalg.eigh(covariance[np.ix_([i, j], [i, j])] * np.outer(scale, scale))
+    x, y = radius * (vectors * np.sqrt(np.maximum(values, 0.0))) @ (style.TURN.real, style.TURN.imag)
     return x, y
 
 

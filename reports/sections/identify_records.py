@@ -48,9 +48,7 @@ def section(result: BenchResult) -> doc.Section:
             identified.finding_table(record.name, result.findings[record.name]),
             *[doc.text(f"{part.name}: {note}") for note in (str(record.counts), *part.notes)],
         ]
-    blocks += [
-        identified.finding_table(record.name, result.findings[record.name]) for record in result.validation
-    ]
+    blocks += [identified.finding_table(one.name, result.findings[one.name]) for one in result.validation]
     blocks += residual_blocks(model, result.residual_tests, axis)
     return identified.judged(
         "dynamic-identification", "Dynamic identification", result, blocks,
@@ -65,9 +63,8 @@ def _result(result: BenchResult, axis: str) -> str:
     labels = {name: parameter(name, axis).label.partition(",")[0].lower() for name in main[:3]}
     parts = [f"{label} {identified.value_words(model, name, axis)}" for name, label in labels.items()]
     if result.refined is not None:  # these are the design's
-        parts = [
-            f"{key} {identified.value_words(result.refined, key, axis)}" for key in result.refined.names[:3]
-        ]
+        found = result.refined
+        parts = [f"{key} {identified.value_words(found, key, axis)}" for key in found.names[:3]]
         parts[0] = f"refined by simulation: {parts[0]}"
     told = ", ".join(parts) or "the records tell neither inertia nor friction"
     words = f"{capital(told)}{identified.constant_words(model, axis)}."

@@ -39,9 +39,8 @@ def section(design: Design, border: Onset) -> doc.Section:
     blocks += [doc.listing("How far the linear model reaches", rows, columns)] if rows else []
     intro = "A linear prediction ends where a limit is reached. Which one, and when, depends on frequency."
     words = _result(rows, border, scale, unit)
-    return doc.section(
-        "limits", "Validity of the linear model", blocks, result=words, intro=intro, told="info"
-    )
+    title = "Validity of the linear model"
+    return doc.section("limits", title, blocks, result=words, intro=intro, told="info")
 
 
 def _chart(design: Design, border: Onset, scale: float, unit: str) -> style.Chart:
@@ -74,16 +73,13 @@ def _full(design: Design) -> float:
 def _result(rows: Sequence[_Linear], border: Onset, scale: float, unit: str) -> str:
     if rows:
         row = max(rows, key=lambda row: row.amplitude)
-        part = (
-            "full deflection" if row.fraction == 1.0 else f"{100.0 * row.fraction:.0f} % of full deflection"
-        )
+        part = f"{100.0 * row.fraction:.0f} % of " * (row.fraction != 1.0) + "full deflection"
+        size = f"A sine of {part} ({row.amplitude:.3g} {unit})"
         if row.hz == 0.0:
-            said = f"A sine of {part} ({row.amplitude:.3g} {unit}) is linear at no frequency looked at"
-            return f"{said}: the {_noun(row.limiter)} acts."
-        size = f"A sine of {part} ({row.amplitude:.3g} {unit}) stays linear"
+            return f"{size} is linear at no frequency looked at: the {_noun(row.limiter)} acts."
         if row.hz is None:
-            return f"{size} over the whole frequency range."
-        return f"{size} up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
+            return f"{size} stays linear over the whole frequency range."
+        return f"{size} stays linear up to {row.hz:.3g} Hz; above, the {_noun(row.limiter)} acts."
     if not np.isfinite(border.amplitude_rad).any():
         return "No limit is reached by a sine command over the whole frequency range."
     k = int(np.argmin(border.amplitude_rad))

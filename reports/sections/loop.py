@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from actuator_lti.asked.quantities import AT_A_GLANCE
+from actuator_lti.asked.quantities import AT_A_GLANCE, Quantity
 from actuator_lti.design.model import Design
 from actuator_lti.loops.commanded import sampled_step
 from actuator_lti.step import StepFigures
@@ -46,14 +46,12 @@ def section(name: str, design: Design, figures: LoopFigures) -> doc.Section:
 
 
 def _facts(figures: LoopFigures) -> doc.Block:
-    items = [
-        doc.fact(
-            of.label, margins.shown(of, figures), of.shown[0], format=of.at_a_glance, better=of.direction
-        )
-        for of in AT_A_GLANCE
-    ]
+    def item(of: Quantity) -> doc.FactItem:
+        value, unit = margins.shown(of, figures), of.shown[0]
+        return doc.fact(of.label, value, unit, format=of.at_a_glance, better=of.direction)
+
     crossover = margins.margin_row(figures)["crossover_hz"]
-    return doc.facts([*items, doc.fact("Gain crossover", crossover, "Hz", format="sig:3")])
+    return doc.facts([*map(item, AT_A_GLANCE), doc.fact("Gain crossover", crossover, "Hz", format="sig:3")])
 
 
 def result(figures: LoopFigures) -> str:

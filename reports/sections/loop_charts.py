@@ -105,27 +105,18 @@ def _phase_margins(
 
 
 def both(
-    curves: Curves,
-    nyquist_hz: float | None,
-    top: style.Panel,
-    bottom: style.Panel,
-    *,
-    span: float,
-    phase_span: float = 900.0,
-    top_room: float = 0.06,
-    marks: Sequence[float] = (),
-    phase_marks: Sequence[float] = (),
-    look: Callable[[int], style.Style] = style.series,
-) -> None:
+    curves: Curves, nyquist_hz: float | None, top: style.Panel, bottom: style.Panel, *, span: float,
+    phase_span: float = 900.0, top_room: float = 0.06, marks: Sequence[float] = (),
+    phase_marks: Sequence[float] = (), look: Callable[[int], style.Style] = style.series,
+) -> None:  # fmt: skip
     for k, (label, one) in enumerate(curves):
         top.curve(one.frequency_hz, one.magnitude_db, label, **look(k))
         bottom.curve(one.frequency_hz, one.phase_deg, label, **look(k))
     top.y.label, bottom.y.label = "magnitude, dB", "phase, deg"
     hertz = [one.frequency_hz for _, one in curves]
     style.frequency(bottom, (min(f[0] for f in hertz), max(f[-1] for f in hertz)))
-    style.phase_axis(
-        bottom, [y for _, one in curves for y in one.phase_deg], span=phase_span, marks=phase_marks
-    )
+    angles = [y for _, one in curves for y in one.phase_deg]
+    style.phase_axis(bottom, angles, span=phase_span, marks=phase_marks)
     levels = [y for _, one in curves for y in one.magnitude_db]
     style.bound(top, levels, span=span, top_room=top_room, marks=marks)
     if nyquist_hz:
@@ -191,10 +182,8 @@ def nyquist(title: str, figures: LoopFigures, grid: np.ndarray) -> doc.Block:
         panel.points([point.real], [point.imag], colour=GREEN, size=6.5, read=False)
     style.critical_point(panel)
     modulus = "withheld" if distance is None else f"{distance:.3f}"
-    caption = (
-        f"{title}, Nyquist curve near −1: it keeps a distance of {modulus} "
-        "(modulus margin, 1 over the peak of S)."
-    )
+    keeps = f"it keeps a distance of {modulus} (modulus margin, 1 over the peak of S)"
+    caption = f"{title}, Nyquist curve near −1: {keeps}."
     return doc.figure("nyquist", chart, caption, alt=f"Nyquist diagram. {caption}", layout="tall")
 
 

@@ -73,8 +73,7 @@ def _margins(of: StabilityMargins) -> doc.Block:
         (1e3 * m.seconds, m.seconds_range and 1e3 * np.array(m.seconds_range), m) for m in of.delay_margins
     ]
     found += [("Delay margin", ms, range_, "ms", m.frequency_rad_s) for ms, range_, m in delays]
-    modulus = of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s
-    found.append(("Modulus margin", *modulus))
+    found.append(("Modulus margin", of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s))
     columns = [
         doc.of(lambda one: one[0], "kind", "Measured margin"),
         doc.of(lambda one: one[1], "value", "Value", format="sig:4"),

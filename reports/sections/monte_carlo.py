@@ -39,9 +39,8 @@ def section(result: MonteCarloResult) -> doc.Section:
         f"{result.samples} designs drawn from the tolerances; sampled loops. An optimiser seeks the worst "
         "case in the whole tolerance box, as sampling alone does not find it."
     )
-    return doc.section(
-        "monte-carlo", "Tolerances", blocks, result=_result(result), intro=intro, status=result.tally.role
-    )
+    words, status = _result(result), result.tally.role
+    return doc.section("monte-carlo", "Tolerances", blocks, result=words, intro=intro, status=status)
 
 
 def brief(result: MonteCarloResult) -> Brief:
@@ -55,9 +54,8 @@ def brief(result: MonteCarloResult) -> Brief:
         if one["verdict"] != Verdict.MET:
             reasons.setdefault(why(one), []).append(one["label"].removesuffix(_MET_WITHIN))
     notes = [f"{_some(names)}: {reason}" for reason, names in reasons.items()]
-    return Brief(
-        _result(result), tables, [*notes, *result.notes, f"samples and worst designs: {result.folder}"]
-    )
+    notes += [*result.notes, f"samples and worst designs: {result.folder}"]
+    return Brief(_result(result), tables, notes)
 
 
 def _some(names: Sequence[str]) -> str:

@@ -101,9 +101,8 @@ def provenance(design: Mapping[str, Any], head: Mapping[str, Any], *, checked: b
     }
     columns = [doc.column("what", "What"), doc.column("value", "Value")]
     table = doc.table("Design, program and libraries", columns, rows.items())
-    words = (
-        f"Computed by actuator-lti {head['version']} from the design with hash {head['design_hash'][:12]}."
-    )
+    program, short_hash = f"actuator-lti {head['version']}", head["design_hash"][:12]
+    words = f"Computed by {program} from the design with hash {short_hash}."
     blocks = [doc.details("To build this report again", [table])]
     text = "No simulation stands behind this report: friction, limits and large commands are not checked."
     findings = [] if checked else [doc.Finding(severity="warn", text=text, where="provenance")]

@@ -11,6 +11,7 @@ from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short
+from reports.sections import requirements
 from reports.sections.names import output_unit, push_words
 
 STATES = {
@@ -28,6 +29,7 @@ def section(result: Stiffness) -> doc.Section:
     unit = f"{result.design.load_unit}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [
         *(*_figure(result, unit), _table(result, unit)),
+        *requirements.table(result.requirements, result.design.load_unit),
         *([_lost_motion(result)] if result.lost_motion else []),
         *([_at_rest(result, unit)] if result.at_rest else []),
         *([_checks(result, unit)] if result.checks else []),
@@ -56,7 +58,7 @@ def _result(result: Stiffness, unit: str) -> str:
         words += " (relative)"
     elif result.unproven:
         words += f"; nothing is compared: {result.unproven}"
-    return f"{words}."
+    return f"{words}. {requirements.told(result.requirements)}".rstrip()
 
 
 def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
@@ -72,8 +74,7 @@ def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
         bottom.curve(curve.frequency_hz, phase, name, **style.series(k))
     style.frequency(bottom, shown[0].frequency_hz)
     style.phase_axis(bottom, np.concatenate(phases))
-    caption = "Dynamic stiffness of the output, powered and unpowered."
-    return [doc.figure("stiffness", chart, caption)]
+    return [doc.figure("stiffness", chart, "Dynamic stiffness of the output, powered and unpowered.")]
 
 
 def _table(result: Stiffness, unit: str) -> doc.Block:
@@ -98,8 +99,7 @@ def _state(result: Stiffness, curve: StiffnessCurve) -> str:
 
 
 def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
-    loaded = any(one.load_Nm for one in result.curves)
-    return f", {curve.load_Nm:g} {result.design.load_unit}" * loaded
+    return f", {curve.load_Nm:g} {result.design.load_unit}" * any(one.load_Nm for one in result.curves)
 
 
 def _or_infinite(stiffness: float) -> float | str:

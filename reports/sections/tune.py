@@ -82,9 +82,7 @@ def changed(result: TuningResult) -> bool:
 def _amount(r: BindingRequirement) -> str:
     if r.distance is None:
         return "an unstable loop" if r.relative < 0 else "unbounded"
-    if _at_limit(r):
-        return "nothing"
-    return with_unit(abs(r.distance), r.unit, ".3g")
+    return "nothing" if _at_limit(r) else with_unit(abs(r.distance), r.unit, ".3g")
 
 
 def _at_limit(r: BindingRequirement) -> bool:

@@ -64,8 +64,7 @@ def brief(validation: Validation) -> Brief:
     more = [f"a report counts more checks than these predictions: {'; '.join(others)}"] if others else []
     said = [f"{item['label']}: {item['verdict']}. {item['reason']}" for item in items]
     large = [part["result"] for part in made if part["id"] == "conditional"]
-    grouped = by_loop(validation.rows).items()
-    tables = [_short_table(name, rows) for name, rows in grouped]
+    tables = [_short_table(name, rows) for name, rows in by_loop(validation.rows).items()]
     blocks = [*map(doc.text, said), *tables, *map(doc.text, large)]
     return Brief(validation.words, blocks, [*validation.notes, *more])
 
@@ -135,9 +134,8 @@ def verdict_items(validation: Validation) -> list[doc.VerdictItem]:
         items.append(_item("judged", "Predictions", None, "; ".join(validation.notes), value=0.0))
     for k, failure in enumerate(validation.failures):
         items.append(_item(f"drive-{k}", "Stable, and comes to rest", False, failure))
-    items += [
-        _item(f"stable-{n}", f"{loop_name(n)}: stable", None, "not known") for n in validation.undecided
-    ]
+    open_ones = ((f"stable-{name}", f"{loop_name(name)}: stable") for name in validation.undecided)
+    items += [_item(*one, None, "not known") for one in open_ones]
     if validation.rest is Verdict.NOT_PROVEN:
         waiver = waiver_of_rest(validation.design)
         items.append(_item("rest", "Comes to rest after a step", None, validation.rest_words, waiver=waiver))

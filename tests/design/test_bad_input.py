@@ -129,14 +129,11 @@ def test_correlations_that_contradict_each_other_are_refused() -> None:
     assert "contradict" in mistakes(AMBER + "".join(tables))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ("[control]", "[control.current]\ngain = '1 ohm'\n[control]", "control.current"),
-        ("[motor]", "[motor]\nresistance = '1 ohm'", "resistance = 1 ohm: not allowed beside motor.s"),
-        ("243.45 V*s/m", "1 A*s/m", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "says"), [
+    ("[control]", "[control.current]\ngain = '1 ohm'\n[control]", "control.current"),
+    ("[motor]", "[motor]\nresistance = '1 ohm'", "resistance = 1 ohm: not allowed beside motor.s"),
+    ("243.45 V*s/m", "1 A*s/m", 'control.velocity.gain = "1 A*s/m": wrong dimension'),
+])  # fmt: skip
 def test_the_stages_of_a_force_source_are_held_apart(old: str, new: str, says: str) -> None:
     assert says in mistakes(design_text("emps").replace(old, new))
 

@@ -39,7 +39,7 @@ from analyses.friction_effects import friction_effects
 from analyses.monte_carlo import monte_carlo
 from analyses.specification import specification
 from analyses.stiffness import stiffness
-from nonlinear import Drive, commands, simulate
+from nonlinear import Drive, Probe, commands, simulate
 from reports import report
 from tests.refusals import refused
 
@@ -155,6 +155,18 @@ def test_a_bad_argument_is_an_input_error_that_says_what_is_allowed(name: str) -
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 1.2, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.from_coherence(THREE, [0.5, 0.0, 0.9], 8), "(0, 1]"),
     (lambda: MeasuredResponse.with_noise(THREE, np.inf), "finite and not negative"),
+    (lambda: delay_budget("ilr33-amber", "velocity", "a"), "frequency_rad_s = 'a'"),
+    (lambda: onset(assemble_loops(DESIGN), "a"), "omega_rad_s = 'a'"),
+    (lambda: onset(assemble_loops(DESIGN), float("nan")), "omega_rad_s = nan"),
+    (lambda: onset(assemble_loops(DESIGN), 1.0, 3), "bias = 3"),
+    (lambda: onset(assemble_loops(DESIGN), 1.0, {"curent": 1.0}), "curent"),
+    (lambda: onset("ilr33-amber", 1.0), "assemble_loops"),
+    (lambda: Probe(point="u", gain="x"), "probe gain = 'x'"),
+    (lambda: simulate(DESIGN, commands.step(0.01), 0.01, progress=5), "progress = 5"),
+    (lambda: simulate(DESIGN, commands.step(0.01), 0.01, tanh_tolerance=0), "tanh_tolerance = 0"),
+    (lambda: simulate(DESIGN, commands.step(0.01), 0.01, friction_on="x"), "friction_on"),
+    (lambda: DESIGN.with_law("velocity", control.tf([1.0, 0.0], [1.0], 1e-3), ["error"]), "system: improper"),
+    (lambda: sweep(DESIGN, "limits.voltage", "10 V"), "allowed: several"),
     (lambda: DESIGN.with_law("velocity", ([],) * 4 + (1e-4,), []), "inputs = an empty list: allowed: a list"),
 ])  # fmt: skip
 def test_a_refusal_names_what_is_wrong(ask, words: str) -> None:
@@ -263,20 +275,17 @@ def test_a_changed_value_says_what_it_was_with_its_relative_tolerance_or_the_abs
     assert absolute == emps.parameters["motor.rotor_inertia"].tolerance
 
 
-@pytest.mark.parametrize(
-    ("values", "says"),
-    [
-        ({"motor.resistence": 1.0}, 'nearest known: "motor.resistance"'),
-        ({"gear.bevel.ratio": 2.0}, "has no gear.bevel"),
-        ({"gear.ratio": 2.0}, "unknown parameter"),
-        ({"friction.law": 1.0}, "unknown parameter"),
-        ({"motor.resistance": -1.0}, "above 0"),
-        ({"motor.resistance": float("nan")}, "above 0"),
-        ({"motor.resistance": True}, "a number"),
-        ({"control.velocity.every": 1.5}, "whole number"),
-        ({"motor.back_emf_constant": 0.01}, "within 10 %"),
-    ],
-)
+@pytest.mark.parametrize(("values", "says"), [
+    ({"motor.resistence": 1.0}, 'nearest known: "motor.resistance"'),
+    ({"gear.bevel.ratio": 2.0}, "has no gear.bevel"),
+    ({"gear.ratio": 2.0}, "unknown parameter"),
+    ({"friction.law": 1.0}, "unknown parameter"),
+    ({"motor.resistance": -1.0}, "above 0"),
+    ({"motor.resistance": float("nan")}, "above 0"),
+    ({"motor.resistance": True}, "a number"),
+    ({"control.velocity.every": 1.5}, "whole number"),
+    ({"motor.back_emf_constant": 0.01}, "within 10 %"),
+])  # fmt: skip
 def test_an_impossible_change_is_refused(values: dict[str, float], says: str) -> None:
     """Relations may be left unchecked for sampling, but not ranges."""
     refused(with_values, AMBER, values, match=says)
@@ -352,14 +361,9 @@ def test_results_can_be_compared_and_sent() -> None:
         assert sent["position"].open_loop(1j) == here["position"].open_loop(1j)
         path, own = sent.limiters["current"], here.limiters["current"]
         assert path.response(1.0) == own.response(1.0)
+    assert hash(pickle.loads(pickle.dumps(DESIGN))) == hash(DESIGN)  # kept in caches
     assert repr(DESIGN) == "<Design ilr33-amber: rotary, position > velocity > current>"
     assert repr(Drive(DESIGN)) == "<Drive ilr33-amber: tick 0>"
-
-
-def test_designs_can_be_sent_to_workers_and_kept_in_caches() -> None:
-    copy = pickle.loads(pickle.dumps(AMBER))
-    assert copy == AMBER
-    assert hash(copy) == hash(AMBER)
 
 
 def test_tolerances_are_listed_in_the_order_of_the_file() -> None:

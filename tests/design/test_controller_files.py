@@ -132,9 +132,7 @@ def taken(folder: Path, text: str, base: Design) -> Imported:
         (XDC_DEFAULT, "position", (0.369404,), {}, ": none"),
     ],
 )  # fmt: skip
-def test_each_makers_gains_in_the_units_of_the_model(
-    text: str, stage: str, wanted: tuple, more: dict, left: str, tmp_path: Path
-) -> None:
+def test_each_makers_gains_in_the_units_of_the_model(text, stage, wanted, more, left, tmp_path) -> None:
     result = taken(tmp_path, text, without(stage))
     expected = {key: value for key, value in zip(GAINS, wanted, strict=False) if value is not None} | more
     found = {key: parameter_value(result.design, key) for key in expected}
@@ -144,30 +142,24 @@ def test_each_makers_gains_in_the_units_of_the_model(
     assert result.notes[-1].endswith(left)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        (BY_VOLTAGE, r"by voltage; allowed: a design without \[control.current\]"),
-        (TWO_MOTORS, "several motors: motor, other; allowed: the lines of one of them"),
-        (ODRIVE.replace('{"phase_i', '{"motor_type": 2, "phase_i'), "motor_type = 2: allowed: 0"),
-        (EPOS, "no velocity loop inside its position loop"),
-        (ODRIVE.replace("20.0, ", "20.0, x", 1), "line 3"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    (BY_VOLTAGE, r"by voltage; allowed: a design without \[control.current\]"),
+    (TWO_MOTORS, "several motors: motor, other; allowed: the lines of one of them"),
+    (ODRIVE.replace('{"phase_i', '{"motor_type": 2, "phase_i'), "motor_type = 2: allowed: 0"),
+    (EPOS, "no velocity loop inside its position loop"),
+    (ODRIVE.replace("20.0, ", "20.0, x", 1), "line 3"),
+])  # fmt: skip
 def test_what_the_design_cannot_hold_is_refused(text: str, words: str, tmp_path: Path) -> None:
     refused(taken, tmp_path, text, BASE, match=words)
 
 
-@pytest.mark.parametrize(
-    ("text", "key"),
-    [
-        (ODRIVE.replace('constant": 0.04', 'constant": 0'), "velocity.gain"),
-        (ODRIVE.replace("20.0", '"inf"', 2), "position.gain"),
-        (ODRIVE.replace("20.0", "NaN", 2), "position.gain"),
-        (VESC.replace(">14<", ">0<"), "velocity.gain"),
-        (VESC.replace("0.004", "0").replace("0.008", "0"), "velocity.integral_time"),
-    ],
-)
+@pytest.mark.parametrize(("text", "key"), [
+    (ODRIVE.replace('constant": 0.04', 'constant": 0'), "velocity.gain"),
+    (ODRIVE.replace("20.0", '"inf"', 2), "position.gain"),
+    (ODRIVE.replace("20.0", "NaN", 2), "position.gain"),
+    (VESC.replace(">14<", ">0<"), "velocity.gain"),
+    (VESC.replace("0.004", "0").replace("0.008", "0"), "velocity.integral_time"),
+])  # fmt: skip
 def test_numbers_that_say_nothing_are_left_and_said(text: str, key: str, tmp_path: Path) -> None:
     """A constant of 0, an infinite gain, no poles, no gain at all: the design keeps what it has."""
     result = taken(tmp_path, text, BASE)
@@ -179,17 +171,14 @@ LIMITS = {"encoder.filter_time": "1 ms", "limits.current_rate": "1 A/s"}
 PID = {"control.position.integral_time": "1 s", "control.position.derivative_time": "1 s"}
 
 
-@pytest.mark.parametrize(
-    ("text", "stage", "key"),
-    [
-        (ODRIVE.replace("0.32", "0"), "", "control.velocity.integral_time"),
-        (EPOS.replace("780000", "0"), "velocity", "control.position.integral_time"),
-        (EPOS.replace("16000", "0"), "velocity", "control.position.derivative_time"),
-        (SIMPLEFOC.replace("0.005f", "0"), "", "encoder.filter_time"),
-        (ODRIVE.replace("10.0,", "Infinity,"), "", "limits.speed"),
-        (LIMITED.replace("1000", "0"), "", "limits.current_rate"),
-    ],
-)
+@pytest.mark.parametrize(("text", "stage", "key"), [
+    (ODRIVE.replace("0.32", "0"), "", "control.velocity.integral_time"),
+    (EPOS.replace("780000", "0"), "velocity", "control.position.integral_time"),
+    (EPOS.replace("16000", "0"), "velocity", "control.position.derivative_time"),
+    (SIMPLEFOC.replace("0.005f", "0"), "", "encoder.filter_time"),
+    (ODRIVE.replace("10.0,", "Infinity,"), "", "limits.speed"),
+    (LIMITED.replace("1000", "0"), "", "limits.current_rate"),
+])  # fmt: skip
 def test_what_the_controller_has_not_goes(text: str, stage: str, key: str, tmp_path: Path) -> None:
     """An integral gain of 0, no limit, no filter: nothing of the base stays in its place."""
     base = with_overrides(without(stage), (PID if stage else LIMITS))
@@ -245,9 +234,7 @@ def test_numbers_that_make_a_key_together_are_asked_for(tmp_path: Path) -> None:
     assert parameter_value(result.design, "encoder.counts_per_rev") == 4000
 
 
-def test_the_command_says_what_it_took_and_what_it_left(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_says_what_it_took_and_what_it_left(tmp_path, capsys) -> None:
     (tmp_path / "vesc.xml").write_text(VESC)
     out = tmp_path / "mine.toml"
     assert main(["objects", "import", str(tmp_path / "vesc.xml"), "--out", str(out)]) == 0
@@ -353,31 +340,28 @@ def test_a_row_copied_tells_no_noise(tmp_path: Path) -> None:
     assert read.noise == ""
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("f,gain,phase_deg\n1,2,3\n2,1,4", "says no unit; allowed: gain_db or gain_ratio"),
-        ("f,gain_db,phase\n1,2,-3\n2,1,-4", "allowed: phase_deg or phase_rad"),
-        ("f,gain_db\n1,2\n2,1", "no phase in the columns f, gain_db"),
-        ("f,re,im\n1,2,3\n1,2,3", "every row is at 1 Hz; allowed: two frequencies or more"),
-        ("f,re,im\n0,2,3\n1,2,3", "frequencies above 0"),
-        ("f,re,im,coherence\n1,2,3,-1.2\n2,2,3,1", "a coherence of -1.2; allowed: 0 to 1"),
-        ("f,re,im,coherence\n1,2,3,98\n2,2,3,99", "of 98; allowed: 0 to 1, a ratio and not per cent"),
-        ("f,re,im\n1,2,3\n2,2", "2 columns in line 3, 3 in the first"),
-        ("[motor]\nR = 1", "a heading such as f_hz,gain_db,phase_deg"),
-        ("# bench\nf,re,im\n1,2,3\n\n2,x,1\n3,1,1", 'line 5: "x" is no number'),
-        ("f,re,im\n-1,2,3\n1,2,3\n2,2,2", "each at a frequency above 0 Hz"),
-        ("f,gain_db,gain_db,phase_deg\n1,2,3,-4\n2,1,3,-5", "contradicts the magnitude"),
-        ("f,re,im,gain_db\n1,3,4,0\n2,3,4,0", '"gain_db" contradicts the magnitude'),
-        ("f,re,im,phase_deg\n1,3,4,-53.13\n2,3,4,-53.13", '"phase_deg" contradicts the phase'),
-        ("f_hz,omega,re,im\n1,6,3,4\n2,12,3,4", '"omega" contradicts the frequency'),
-        ("f,freq,re,im\n10,1.59155,3,4\n20,3.1831,3,4", '"freq" contradicts the frequency'),
-        ("f,re,im,std_abs\n1,3,4,1\n2,3,4,1", "deviations in abs; allowed: one over the size"),
-        ("f,re,im,std,sigma\n1,3,4,1,1\n2,3,4,1,1", "deviations in no unit and no unit"),
-        ("f,re,im\n1,0,0\n2,2,1", "a value that is 0"),
-        ("", "is empty"),
-    ],
-)
+@pytest.mark.parametrize(("text", "words"), [
+    ("f,gain,phase_deg\n1,2,3\n2,1,4", "says no unit; allowed: gain_db or gain_ratio"),
+    ("f,gain_db,phase\n1,2,-3\n2,1,-4", "allowed: phase_deg or phase_rad"),
+    ("f,gain_db\n1,2\n2,1", "no phase in the columns f, gain_db"),
+    ("f,re,im\n1,2,3\n1,2,3", "every row is at 1 Hz; allowed: two frequencies or more"),
+    ("f,re,im\n0,2,3\n1,2,3", "frequencies above 0"),
+    ("f,re,im,coherence\n1,2,3,-1.2\n2,2,3,1", "a coherence of -1.2; allowed: 0 to 1"),
+    ("f,re,im,coherence\n1,2,3,98\n2,2,3,99", "of 98; allowed: 0 to 1, a ratio and not per cent"),
+    ("f,re,im\n1,2,3\n2,2", "2 columns in line 3, 3 in the first"),
+    ("[motor]\nR = 1", "a heading such as f_hz,gain_db,phase_deg"),
+    ("# bench\nf,re,im\n1,2,3\n\n2,x,1\n3,1,1", 'line 5: "x" is no number'),
+    ("f,re,im\n-1,2,3\n1,2,3\n2,2,2", "each at a frequency above 0 Hz"),
+    ("f,gain_db,gain_db,phase_deg\n1,2,3,-4\n2,1,3,-5", "contradicts the magnitude"),
+    ("f,re,im,gain_db\n1,3,4,0\n2,3,4,0", '"gain_db" contradicts the magnitude'),
+    ("f,re,im,phase_deg\n1,3,4,-53.13\n2,3,4,-53.13", '"phase_deg" contradicts the phase'),
+    ("f_hz,omega,re,im\n1,6,3,4\n2,12,3,4", '"omega" contradicts the frequency'),
+    ("f,freq,re,im\n10,1.59155,3,4\n20,3.1831,3,4", '"freq" contradicts the frequency'),
+    ("f,re,im,std_abs\n1,3,4,1\n2,3,4,1", "deviations in abs; allowed: one over the size"),
+    ("f,re,im,std,sigma\n1,3,4,1,1\n2,3,4,1,1", "deviations in no unit and no unit"),
+    ("f,re,im\n1,0,0\n2,2,1", "a value that is 0"),
+    ("", "is empty"),
+])  # fmt: skip
 def test_what_is_no_response_is_refused(tmp_path, text, words):
     refused(recorded, tmp_path, text, words=("r.csv", words))
 
@@ -400,22 +384,19 @@ def test_a_deviation_counts_in_its_unit(tmp_path):
         np.testing.assert_allclose(read.radius, 0.02 * np.sqrt(np.log(100.0)), rtol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("1,2,-3\n2,1,-4", 'without a heading, read as frequency "f_hz" in Hz, magnitude "gain_db" in dB, '),
-        ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '"Frequency" in Hz (it says no unit), real part "re"'),
-        ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '; not read: "error"'),
-        ("omega,gain,phase_rad\n1,2,3\n2,-1,4", '"omega" in rad/s, magnitude "gain" in dB (it says no unit)'),
-        ("w,re,im,coherence\n1,2,3,.9\n2,2,3,.9", "coherence tells no noise without averages (--averages N)"),
-        ("f,re,re_std,im,,\n1,2,1,3,,\n2,-1,1,4,,", '"im"; not read: "re_std"'),
-        ("f_hz,omega,re,im\n1,6.2832,3,4\n2,12.5664,3,4", 'imaginary part "im"; not read: "omega"'),
-        ("f,w (rad/s),re,im\n1,6.2832,3,4\n2,12.5664,3,4", '; not read: "w (rad/s)"'),
-        ("f,freq,re,im\n1,6.2832,3,4\n2,12.5664,3,4", '; not read: "freq"'),
-        ("f,f_step_hz,re,im\n1,0.5,3,4\n2,1,3,4", '; not read: "f_step_hz"'),
-        ("f,re,im,gain_db\n1,3,4,13.98\n2,3,4,13.98", 'imaginary part "im"; not read: "gain_db"'),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "words"), [
+    ("1,2,-3\n2,1,-4", 'without a heading, read as frequency "f_hz" in Hz, magnitude "gain_db" in dB, '),
+    ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '"Frequency" in Hz (it says no unit), real part "re"'),
+    ("Frequency,re,im,error\n1,2,3,1\n2,-1,4,1", '; not read: "error"'),
+    ("omega,gain,phase_rad\n1,2,3\n2,-1,4", '"omega" in rad/s, magnitude "gain" in dB (it says no unit)'),
+    ("w,re,im,coherence\n1,2,3,.9\n2,2,3,.9", "coherence tells no noise without averages (--averages N)"),
+    ("f,re,re_std,im,,\n1,2,1,3,,\n2,-1,1,4,,", '"im"; not read: "re_std"'),
+    ("f_hz,omega,re,im\n1,6.2832,3,4\n2,12.5664,3,4", 'imaginary part "im"; not read: "omega"'),
+    ("f,w (rad/s),re,im\n1,6.2832,3,4\n2,12.5664,3,4", '; not read: "w (rad/s)"'),
+    ("f,freq,re,im\n1,6.2832,3,4\n2,12.5664,3,4", '; not read: "freq"'),
+    ("f,f_step_hz,re,im\n1,0.5,3,4\n2,1,3,4", '; not read: "f_step_hz"'),
+    ("f,re,im,gain_db\n1,3,4,13.98\n2,3,4,13.98", 'imaginary part "im"; not read: "gain_db"'),
+])  # fmt: skip
 def test_how_the_columns_are_taken_is_told(tmp_path, text, words):
     assert words in recorded(tmp_path, text).read_as
 

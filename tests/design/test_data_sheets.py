@@ -121,28 +121,25 @@ def test_an_undamped_spring_is_said_and_has_its_forms() -> None:
     assert forms.section(survey.forms, survey.refused)["blocks"][0]["kind"] == "figure"
 
 
-@pytest.mark.parametrize(
-    ("path", "text", "value"),
-    [
-        ("limits.peak_current", "12 A rms", 12 * sqrt(1.5)),
-        ("limits.peak_current", "12 Arms", 12 * sqrt(1.5)),
-        ("limits.peak_current", "12 A peak", 12 * sqrt(3) / 2),
-        ("limits.peak_current", "12 Apk", 12 * sqrt(3) / 2),
-        ("limits.peak_current", "12 Ap", 12 * sqrt(3) / 2),
-        ("limits.peak_current", "12 A dc", 12.0),
-        ("control.position.gain", "20 Hz", 40 * pi),
-        ("control.velocity.gain", "0.04 A rms*s/rad", 0.04 * sqrt(1.5)),
-        ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
-        ("control.current.gain", "12.5 V/A phase", 25.0),  # L w of a phase is half of L w line-line
-        ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
-        ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
-        ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
-        ("motor.torque_constant", f"{0.93 / sqrt(1.5)} Nm/A dc", 0.93),
-        ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vp/1000rpm", 59.9 * 60 / (2000 * pi)),
-        ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vpeak/1000rpm", 59.9 * 60 / (2000 * pi)),
-        ("control.period", "16 kHz", 62.5e-6),
-    ],
-)
+@pytest.mark.parametrize(("path", "text", "value"), [
+    ("limits.peak_current", "12 A rms", 12 * sqrt(1.5)),
+    ("limits.peak_current", "12 Arms", 12 * sqrt(1.5)),
+    ("limits.peak_current", "12 A peak", 12 * sqrt(3) / 2),
+    ("limits.peak_current", "12 Apk", 12 * sqrt(3) / 2),
+    ("limits.peak_current", "12 Ap", 12 * sqrt(3) / 2),
+    ("limits.peak_current", "12 A dc", 12.0),
+    ("control.position.gain", "20 Hz", 40 * pi),
+    ("control.velocity.gain", "0.04 A rms*s/rad", 0.04 * sqrt(1.5)),
+    ("control.current.gain", "25 V/Arms", 25 / sqrt(1.5)),
+    ("control.current.gain", "12.5 V/A phase", 25.0),  # L w of a phase is half of L w line-line
+    ("motor.torque_constant", "0.93 Nm/Arms", 0.93),
+    ("motor.back_emf_constant", "59.9 Vrms/1000rpm", 59.9 * 60 / (2000 * pi)),
+    ("motor.torque_constant", f"{0.93 / sqrt(2)} Nm/Apk", 0.93),
+    ("motor.torque_constant", f"{0.93 / sqrt(1.5)} Nm/A dc", 0.93),
+    ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vp/1000rpm", 59.9 * 60 / (2000 * pi)),
+    ("motor.back_emf_constant", f"{59.9 * sqrt(2)} Vpeak/1000rpm", 59.9 * 60 / (2000 * pi)),
+    ("control.period", "16 kHz", 62.5e-6),
+])  # fmt: skip
 def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value: float) -> None:
     """i = sqrt(3/2) I_rms = sqrt(3)/2 I_peak (model.md section 1); the motor as its sheet says."""
     design = with_overrides(SERVO, {path: text})
@@ -150,28 +147,22 @@ def test_amperes_rms_and_peak_are_those_of_the_model(path: str, text: str, value
     assert not any(line.startswith(path) for line in warnings_of(design))
 
 
-@pytest.mark.parametrize(
-    ("design", "path", "bad"),
-    [
-        (AMBER, "motor.torque_constant", "0.1 Nm/Apk"),
-        (AMBER, "limits.voltage", "230 V AC"),
-        (AMBER, "limits.peak_current", "5 A rms"),
-        (SERVO, "limits.voltage", "230 Vrms"),
-        (SERVO, "limits.peak_current", "5 A phase"),
-    ],
-)
+@pytest.mark.parametrize(("design", "path", "bad"), [
+    (AMBER, "motor.torque_constant", "0.1 Nm/Apk"),
+    (AMBER, "limits.voltage", "230 V AC"),
+    (AMBER, "limits.peak_current", "5 A rms"),
+    (SERVO, "limits.voltage", "230 Vrms"),
+    (SERVO, "limits.peak_current", "5 A phase"),
+])  # fmt: skip
 def test_a_convention_that_the_motor_has_not_is_refused(design: Design, path: str, bad: str) -> None:
     refused(with_overrides, design, {path: bad}, words=(f"{path} = ", "allowed: "))
 
 
-@pytest.mark.parametrize(
-    ("path", "text", "allowed"),
-    [
-        ("limits.peak_current", "12 A", r"A rms \(its data sheet's\) or A dc"),
-        ("control.velocity.gain", "0.04 A*s/rad", r"A rms\*s/rad .* or A dc\*s/rad"),
-        ("control.current.gain", "25 V/A", "V/A rms .* or V/A dc .*: V/A phase"),
-    ],
-)
+@pytest.mark.parametrize(("path", "text", "allowed"), [
+    ("limits.peak_current", "12 A", r"A rms \(its data sheet's\) or A dc"),
+    ("control.velocity.gain", "0.04 A*s/rad", r"A rms\*s/rad .* or A dc\*s/rad"),
+    ("control.current.gain", "25 V/A", "V/A rms .* or V/A dc .*: V/A phase"),
+])  # fmt: skip
 def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: str, allowed: str) -> None:
     """Read as another's they are sqrt(3/2) off; a plain number is SI, of the model, and is written so."""
     with pytest.raises(InputError, match=f"{path} = .*allowed: {allowed}"):
@@ -180,20 +171,15 @@ def test_amperes_of_an_ac_motor_that_say_nothing_are_refused(path: str, text: st
     assert parameter_value(again, path) == 30.5
 
 
-@pytest.mark.parametrize(
-    ("text", "amperes"),
-    [
-        ("2.74 Arms", 2.74 * sqrt(1.5)),
-        ("9.5 A pk", 9.5 * sqrt(3) / 2),
-        ("6.72 A rms", 6.72 * sqrt(1.5)),
-        ("5.4 A dc", 5.4),
-        ("8.2 A", None),
-    ],
-)
+@pytest.mark.parametrize(("text", "amperes"), [
+    ("2.74 Arms", 2.74 * sqrt(1.5)),
+    ("9.5 A pk", 9.5 * sqrt(3) / 2),
+    ("6.72 A rms", 6.72 * sqrt(1.5)),
+    ("5.4 A dc", 5.4),
+    ("8.2 A", None),
+])  # fmt: skip
 @pytest.mark.parametrize("quantity", ["motor_current", "duty_current"])
-def test_a_required_current_is_read_as_limits_read_theirs(
-    text: str, amperes: float | None, quantity: str
-) -> None:
+def test_a_required_current_is_read_as_limits_read_theirs(text, amperes, quantity) -> None:
     asked = f'{SERVO_TEXT}[[requirement]]\nid = "i"\nquantity = "{quantity}"\nmaximum = "{text}"\n'
     if amperes is None:
         refused(read_design_text, asked, words=("requirement.i.maximum = ", "A rms ", " or A dc "))
@@ -315,17 +301,14 @@ def test_an_unknown_share_is_a_tolerance_from_none_to_all() -> None:
     assert without.parameters["friction.dry_torque"].tolerance is None
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "key"),
-    [
-        ("137 mA", "1 A", "motor.no_load_current"),
-        ("30.2 mN*m/A", "29 mN*m/A", "motor.torque_constant"),
-        ("80 %", "60 %", "gear.first.efficiency"),
-        ("43:1", "12", "gear.first.ratio"),
-        ("back-drivable", "self-locking", "load.path"),
-        ("100 us", "90 us", "control.period"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "key"), [
+    ("137 mA", "1 A", "motor.no_load_current"),
+    ("30.2 mN*m/A", "29 mN*m/A", "motor.torque_constant"),
+    ("80 %", "60 %", "gear.first.efficiency"),
+    ("43:1", "12", "gear.first.ratio"),
+    ("back-drivable", "self-locking", "load.path"),
+    ("100 us", "90 us", "control.period"),
+])  # fmt: skip
 def test_what_a_sheet_states_is_read_again_with_what_is_changed(old: str, new: str, key: str) -> None:
     drive, other = with_overrides(sheet(), {key: new}), sheet(old, new)
     assert (drive.friction, drive.correlations) == (other.friction, other.correlations)
@@ -627,18 +610,13 @@ def test_a_velocity_gain_without_a_current_loop_is_in_volts() -> None:
 COUPLED = 'efficiency = "80 %"\n[coupling]\nstiffness = "9 N*m/rad"\nafter = "x"'
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "gain", "only"),
-    [
-        ('efficiency = "80 %"', COUPLED, "40 Hz", "coupling.after"),
-        ('ratio = "43:1"', 'ratio = "43 kg"', "40 Hz", "gear.first.ratio"),
-        ("resistance = ", "# resistance = ", "40 Hz", "motor.resistance: missing"),
-        ("", "", "0 Hz", 'control.velocity.gain = "0 Hz": allowed: above 0'),
-    ],
-)
-def test_a_stated_gain_that_cannot_be_taken_over_hides_nothing(
-    old: str, new: str, gain: str, only: str
-) -> None:
+@pytest.mark.parametrize(("old", "new", "gain", "only"), [
+    ('efficiency = "80 %"', COUPLED, "40 Hz", "coupling.after"),
+    ('ratio = "43:1"', 'ratio = "43 kg"', "40 Hz", "gear.first.ratio"),
+    ("resistance = ", "# resistance = ", "40 Hz", "motor.resistance: missing"),
+    ("", "", "0 Hz", 'control.velocity.gain = "0 Hz": allowed: above 0'),
+])  # fmt: skip
+def test_a_stated_gain_that_cannot_be_taken_over_hides_nothing(old, new, gain, only) -> None:
     text = f'{SHEET.replace(old, new, 1)}{CURRENT}gain = "{gain}"\n'
     refused(read_design_text, text, "sheet", words=only)
 

@@ -61,36 +61,33 @@ COUNTS = 'write "1024 lines" (4096 counts) or "1024 counts"'
 TF = "num = [185.0, -150.0]\nden = [1.0, -0.65]\n"
 
 
-@pytest.mark.parametrize(
-    ("more", "words", "times"),
-    [
-        (f"{LAW}[control.position.law.continuous]\nD = [3]", "law.D: missing; allowed: the law as", 1),
-        *((LAW + zero, "the law gives nothing", 1)
-          for zero in ("D = [0]", "D = [[0]]", STATE, f"{STATE}D = [0]")),
-        (LAW + TF, "tf2ss(num,den)", 2),
-        (f"{LAW}D = [1]\n[control.position.law.continuous]\n{TF}", "tf2ss(num,den)", 2),
-        (f"{LAW}D = [1]\nkp = 3", "a number of D", 1),
-        *((f'{CURRENT}[control.velocity]\ngain = "{speed}"', NO_BANDWIDTH, 1)
-          for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
-        # at 2^19 counts it is 9.179 A s/rad, not 1.1e-4
-        (f'[encoder]\ncounts_per_rev = "19 bit"\n{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"',
-         "of 524288 counts 9.179 A*s/rad", 1),
-        (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
-        # the motor's encoder counts nothing of the output
-        *((f'[encoder]\ncounts_per_rev = 4000\n{output}', "of 4000 counts", 0)
-          for output in ('[instruments]\noutput_angle_noise = "1 count"', '[command]\nrate = "4e5 counts/s"',
-                         f'{CURRENT}[control.velocity]\ngain = "1 A/(cnt/s)"\nsensor = "output"')),
-        ('[encoder]\ncounts_per_rev = 4000\n[instruments]\nangle_noise = "1 count"',
-         "of 4000 counts 0.001571 rad", 1),
-        *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
-          for word in ("ppr", "CPT", "pulses", "CPR")),
-        # makers state it at the output as often as at the motor
-        (f'{CURRENT}[control.position]\ngain = "50 Nm/rev"', "over kM, and over the ratio squared", 1),
-        ('[command]\nacceleration = "1500 1/s²"', ANGLE, 1),
-        ('[command]\nrate = "100 1/s"', ANGLE, 1),
-        ('[load]\ninertia = "3 counts"', "counts_per_rev", 0),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("more", "words", "times"), [
+    (f"{LAW}[control.position.law.continuous]\nD = [3]", "law.D: missing; allowed: the law as", 1),
+    *((LAW + zero, "the law gives nothing", 1)
+      for zero in ("D = [0]", "D = [[0]]", STATE, f"{STATE}D = [0]")),
+    (LAW + TF, "tf2ss(num,den)", 2),
+    (f"{LAW}D = [1]\n[control.position.law.continuous]\n{TF}", "tf2ss(num,den)", 2),
+    (f"{LAW}D = [1]\nkp = 3", "a number of D", 1),
+    *((f'{CURRENT}[control.velocity]\ngain = "{speed}"', NO_BANDWIDTH, 1)
+      for speed in ("2400 rpm", "40 rev/s", "250 1/s")),
+    # at 2^19 counts it is 9.179 A s/rad, not 1.1e-4
+    (f'[encoder]\ncounts_per_rev = "19 bit"\n{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"',
+     "of 524288 counts 9.179 A*s/rad", 1),
+    (f'{CURRENT}[control.velocity]\ngain = "1.1e-4 A/(cnt/s)"', "one is 2 pi/counts_per_rev rad", 1),
+    # the motor's encoder counts nothing of the output
+    *((f'[encoder]\ncounts_per_rev = 4000\n{output}', "of 4000 counts", 0)
+      for output in ('[instruments]\noutput_angle_noise = "1 count"', '[command]\nrate = "4e5 counts/s"',
+                     f'{CURRENT}[control.velocity]\ngain = "1 A/(cnt/s)"\nsensor = "output"')),
+    ('[encoder]\ncounts_per_rev = 4000\n[instruments]\nangle_noise = "1 count"',
+     "of 4000 counts 0.001571 rad", 1),
+    *((f'[encoder]\ncounts_per_rev = "1024 {word}"', COUNTS, 1)
+      for word in ("ppr", "CPT", "pulses", "CPR")),
+    # makers state it at the output as often as at the motor
+    (f'{CURRENT}[control.position]\ngain = "50 Nm/rev"', "over kM, and over the ratio squared", 1),
+    ('[command]\nacceleration = "1500 1/s²"', ANGLE, 1),
+    ('[command]\nrate = "100 1/s"', ANGLE, 1),
+    ('[load]\ninertia = "3 counts"', "counts_per_rev", 0),
+])  # fmt: skip
 def test_what_a_first_file_is_answered_with(more: str, words: str, times: int) -> None:
     """Nothing is said of sizes of matrices that are not there."""
     text = mistakes(f"{DRIVE}{more}\n")
@@ -108,20 +105,15 @@ def motor(constants: str, **values: str) -> str:
     return f"{before}{own}[[gear]]{tail}"
 
 
-@pytest.mark.parametrize(
-    ("constants", "values"),
-    [
-        ("rms-line", {"torque_constant": "0.03 Nm/Arms"}),
-        ("rms-line", {"back_emf_constant": "1.8 Vrms/krpm"}),
-        ("peak-phase", {"back_emf_constant": "100 KV"}),
-        ("peak-phase", {"torque_constant": "0.08 Nm/A"}),
-        ("dc", {"torque_constant": "0.08 Nm/A"}),
-        ("dc", {"back_emf_constant": "100 KV"}),
-    ],
-)
-def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(
-    constants: str, values: dict[str, str]
-) -> None:
+@pytest.mark.parametrize(("constants", "values"), [
+    ("rms-line", {"torque_constant": "0.03 Nm/Arms"}),
+    ("rms-line", {"back_emf_constant": "1.8 Vrms/krpm"}),
+    ("peak-phase", {"back_emf_constant": "100 KV"}),
+    ("peak-phase", {"torque_constant": "0.08 Nm/A"}),
+    ("dc", {"torque_constant": "0.08 Nm/A"}),
+    ("dc", {"back_emf_constant": "100 KV"}),
+])  # fmt: skip
+def test_a_missing_constant_is_answered_with_the_number_that_is_then_taken(constants, values) -> None:
     missing = "torque_constant" if "back_emf_constant" in values else "back_emf_constant"
     answer = " ".join(mistakes(motor(constants, **values)).split()[-2:])
     design = read_design_text(motor(constants, **values, **{missing: answer}))
@@ -179,9 +171,7 @@ STEPPER = 'with "dc" of a stepper those of a phase'
         ("dc", "1 Nm/A", "1 V*s/rad/phase", STEPPER, OF_A_PHASE),
     ],
 )
-def test_a_cause_is_told_only_where_its_ratio_is_near(
-    constants: str, kM: str, kE: str, said: str, not_said: str
-) -> None:
+def test_a_cause_is_told_only_where_its_ratio_is_near(constants, kM, kE, said, not_said) -> None:
     text = mistakes(motor(constants, torque_constant=kM, back_emf_constant=kE))
     assert (said in text, not_said in text) == (True, False)
 
@@ -200,18 +190,13 @@ def test_a_linear_motor_is_asked_for_the_period_of_its_cogging(key: str) -> None
 
 
 @pytest.mark.parametrize("stated", ["dc", "rms-line", "peak-phase"])
-@pytest.mark.parametrize(
-    ("ampere", "volt", "constants", "units"),
-    [
-        (2**0.5, 1.5**0.5, "rms-line", ("", "")),
-        (1.0, 1.0, "peak-phase", ("", "")),
-        (1.0, 3**0.5, "rms-line", (" peak", " peak")),
-        (2**0.5, 3**0.5, "rms-line", ("", " peak")),
-    ],
-)
-def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(
-    stated: str, ampere: float, volt: float, constants: str, units: tuple[str, str]
-) -> None:
+@pytest.mark.parametrize(("ampere", "volt", "constants", "units"), [
+    (2**0.5, 1.5**0.5, "rms-line", ("", "")),
+    (1.0, 1.0, "peak-phase", ("", "")),
+    (1.0, 3**0.5, "rms-line", (" peak", " peak")),
+    (2**0.5, 3**0.5, "rms-line", ("", " peak")),
+])  # fmt: skip
+def test_the_constants_that_a_sheet_has_are_told_by_their_ratio(stated, ampere, volt, constants, units):
     """A sinusoidal motor of flux constant k: torque 3/2 k a peak ampere, k volts peak of a phase per rad/s.
 
     ``ampere`` peak amperes are one of the sheet, ``volt`` of its volts are a peak volt of a phase.
@@ -239,19 +224,16 @@ def test_what_a_sheet_states_besides_follows_from_the_keys(cli, tmp_path) -> Non
     assert "Follows from the design" in cli.text("keys", "--explain", f"{tmp_path / 'first.toml'}")
 
 
-@pytest.mark.parametrize(
-    ("word", "key"),
-    [
-        ("Kt", "motor.torque_constant"),
-        ("Kv", "control.position.gain"),
-        ("kp", "control.current.gain"),
-        ("proportional gain", "control.velocity.gain"),
-        ("k1", "coupling.stiffness"),
-        ("state feedback", "control.position.law.inputs"),
-        ("swing", "requirement.quantity"),
-        ("phase_margin", "requirement.quantity"),
-    ],
-)
+@pytest.mark.parametrize(("word", "key"), [
+    ("Kt", "motor.torque_constant"),
+    ("Kv", "control.position.gain"),
+    ("kp", "control.current.gain"),
+    ("proportional gain", "control.velocity.gain"),
+    ("k1", "coupling.stiffness"),
+    ("state feedback", "control.position.law.inputs"),
+    ("swing", "requirement.quantity"),
+    ("phase_margin", "requirement.quantity"),
+])  # fmt: skip
 def test_keys_are_found_by_the_words_of_sheets_and_controllers(cli, word: str, key: str) -> None:
     assert key in [one["path"] for one in cli.data("keys", word)["keys"]]
 

@@ -103,38 +103,35 @@ def test_a_speed_drive_has_no_position_loop() -> None:
         _ = design.controller.position_loop
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({FILTER: [{"kind": "notch", "frequency": "1 kHz"}]}, r"filter\.1\.width.*missing"),
-        ({FILTER: [{**NOTCH, "order": 2}]}, r"filter\.1\.order = 2.*not allowed with kind"),
-        ({FILTER: [{**NOTCH, "frequency": "6 kHz"}]}, r"below the velocity loop's Nyquist"),
-        ({FILTER: [NOTCH] * 9}, "allowed: at most 8"),
-        ({FILTER: [{"kind": "biquad", "b": [1.0], "a": [-2.1, 1.0]}]}, "inside the unit circle"),
-        ({"encoder.speed": "tracking"}, r"needs encoder\.bandwidth"),
-        ({"encoder.speed": "tracking", "encoder.bandwidth": "2 kHz"}, "too fast for its period"),
-        ({"control.velocity.tracking_time": "1 ms"}, "back-calculation"),
-        ({"limits.peak_time": "1 s", "limits.continuous_current": "12 A"}, "peak_current above continuous"),
-        ({"supply.regenerative": False}, r"needs supply\.capacitance"),
-        ({"command.rate": "90 deg/s"}, r"faster than limits\.speed"),
-        ({"command.jerk": "1 rad/s^3"}, r"needs command\.acceleration"),
-        ({"command.filter_time": "31 us"}, r"filter_time = 31 us.*above T/pi.*3.1831e-05 s"),
-        ({"friction.point": [{"speed": "1 rad/s", "torque": "1 mN*m"}]}, "friction.dry_torque"),
-        ({"instruments.jitter": "50 us"}, "a tenth of a tick"),
-        ({"temperature.winding": "20 K"}, "degC"),
-        ({"motor.constants": "ac"}, "rms-line"),
-        ({"coupling": STIFF, "load.inertia": "0 kg*m^2"}, r"coupling\.stiffness = 100"),
-        ({"coupling": STIFF, "friction.law": "tanh"}, r"friction\.law"),
-        ({"coupling": {**STIFF, "after": "planetary"}}, "before the self-locking stage"),
-        ({"coupling": {**STIFF, "after": "bevel"}}, "is no gear; allowed: planetary, worm"),
-        ({"coupling": STIFF, "friction.load_coefficient": 0.9 / 2376}, "gives energy"),
-        ({"load.friction": {"dry_torque": "1 N*m"}}, "allowed behind a coupling"),
-        ({"coupling": {"stiffness": "1 N*m/rad"}, "load.friction": {"breakaway_ratio": 0.9}}, "at least 1"),
-        ({"motor.rotor_inertia": "3 kg"}, r"motor.rotor_inertia.*m \(p/2 pi\)\^2"),
-        ({"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"}, r'motor\.constants = "rms-line"'),
-        ({"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"}, r"60/\(2 pi\)"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "words"), [
+    ({FILTER: [{"kind": "notch", "frequency": "1 kHz"}]}, r"filter\.1\.width.*missing"),
+    ({FILTER: [{**NOTCH, "order": 2}]}, r"filter\.1\.order = 2.*not allowed with kind"),
+    ({FILTER: [{**NOTCH, "frequency": "6 kHz"}]}, r"below the velocity loop's Nyquist"),
+    ({FILTER: [NOTCH] * 9}, "allowed: at most 8"),
+    ({FILTER: [{"kind": "biquad", "b": [1.0], "a": [-2.1, 1.0]}]}, "inside the unit circle"),
+    ({"encoder.speed": "tracking"}, r"needs encoder\.bandwidth"),
+    ({"encoder.speed": "tracking", "encoder.bandwidth": "2 kHz"}, "too fast for its period"),
+    ({"control.velocity.tracking_time": "1 ms"}, "back-calculation"),
+    ({"limits.peak_time": "1 s", "limits.continuous_current": "12 A"}, "peak_current above continuous"),
+    ({"supply.regenerative": False}, r"needs supply\.capacitance"),
+    ({"command.rate": "90 deg/s"}, r"faster than limits\.speed"),
+    ({"command.jerk": "1 rad/s^3"}, r"needs command\.acceleration"),
+    ({"command.filter_time": "31 us"}, r"filter_time = 31 us.*above T/pi.*3.1831e-05 s"),
+    ({"friction.point": [{"speed": "1 rad/s", "torque": "1 mN*m"}]}, "friction.dry_torque"),
+    ({"instruments.jitter": "50 us"}, "a tenth of a tick"),
+    ({"temperature.winding": "20 K"}, "degC"),
+    ({"motor.constants": "ac"}, "rms-line"),
+    ({"coupling": STIFF, "load.inertia": "0 kg*m^2"}, r"coupling\.stiffness = 100"),
+    ({"coupling": STIFF, "friction.law": "tanh"}, r"friction\.law"),
+    ({"coupling": {**STIFF, "after": "planetary"}}, "before the self-locking stage"),
+    ({"coupling": {**STIFF, "after": "bevel"}}, "is no gear; allowed: planetary, worm"),
+    ({"coupling": STIFF, "friction.load_coefficient": 0.9 / 2376}, "gives energy"),
+    ({"load.friction": {"dry_torque": "1 N*m"}}, "allowed behind a coupling"),
+    ({"coupling": {"stiffness": "1 N*m/rad"}, "load.friction": {"breakaway_ratio": 0.9}}, "at least 1"),
+    ({"motor.rotor_inertia": "3 kg"}, r"motor.rotor_inertia.*m \(p/2 pi\)\^2"),
+    ({"motor.back_emf_constant": f"{5.9e-3 / sqrt(3)!r} V*s/rad"}, r'motor\.constants = "rms-line"'),
+    ({"motor.back_emf_constant": f"{5.9e-3 * 60 / (2 * pi)!r} V*s/rad"}, r"60/\(2 pi\)"),
+])  # fmt: skip
 def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         with_overrides(AMBER, changes)
@@ -144,17 +141,14 @@ def test_refused_in_one_line(changes: dict[str, object], words: str) -> None:
 SPRING = {"coupling": {**STIFF, "play": "2 mrad"}}
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        SPRING,
-        {"coupling": {**SPRING["coupling"], "after": "worm"}},
-        {**SPRING, "friction.load_coefficient": 1.0 / 2376},
-        {"coupling": {**SPRING["coupling"], "after": "planetary"}, "load.path": "back-drivable",
-         "friction.load_coefficient": 0.0, "load.friction": {"dry_torque": "1 N*m"}},
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize("changes", [
+    {},
+    SPRING,
+    {"coupling": {**SPRING["coupling"], "after": "worm"}},
+    {**SPRING, "friction.load_coefficient": 1.0 / 2376},
+    {"coupling": {**SPRING["coupling"], "after": "planetary"}, "load.path": "back-drivable",
+     "friction.load_coefficient": 0.0, "load.friction": {"dry_torque": "1 N*m"}},
+])  # fmt: skip
 def test_a_drive_train_that_can_be(changes: dict[str, object]) -> None:
     assert with_overrides(AMBER, changes).coupling is not None or not changes
 
@@ -191,24 +185,19 @@ def test_what_the_check_of_a_design_accepts_its_file_may_hold() -> None:
     assert refused
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "written"),
-    [
-        ("motor.resistance", -1.0, "-1 ohm"),
-        ("motor.inductance", nan, "nan H"),
-        ("limits.voltage", (), "-1 V"),
-        ("control.period", 0.0, "0 s"),
-        ("control.position.every", 0, 0),
-        ("control.position.gain", 1e13, "1e13 1/s"),
-        ("control.velocity.sensor", "load", "load"),
-        ("friction.law", "none", "none"),
-        ("gear.worm.ratio", 0.0, 0.0),
-        ("validation.full_deflection", -0.1, "-0.1 rad"),
-    ],
-)
-def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(
-    key: str, value: object, written: object
-) -> None:
+@pytest.mark.parametrize(("key", "value", "written"), [
+    ("motor.resistance", -1.0, "-1 ohm"),
+    ("motor.inductance", nan, "nan H"),
+    ("limits.voltage", (), "-1 V"),
+    ("control.period", 0.0, "0 s"),
+    ("control.position.every", 0, 0),
+    ("control.position.gain", 1e13, "1e13 1/s"),
+    ("control.velocity.sensor", "load", "load"),
+    ("friction.law", "none", "none"),
+    ("gear.worm.ratio", 0.0, 0.0),
+    ("validation.full_deflection", -0.1, "-0.1 rad"),
+])  # fmt: skip
+def test_a_design_made_in_python_is_refused_with_the_words_of_the_file(key, value, written) -> None:
     section, field = key.rpartition(".")[0], FIELDS[template_of(key)]
     part = replace(part_at(AMBER, section), **{field.attribute: value})
     with pytest.raises(InputError) as made:

@@ -68,13 +68,10 @@ def test_noise_needs_double_precision(tmp_path, monkeypatch, cli) -> None:
     assert not Path("out").exists()
 
 
-@pytest.mark.parametrize(
-    ("command", "files"),
-    [
-        ("c noisy.toml --no-check", "drive.h drive.c drive_design.h drive_design.c main.c README.md"),
-        ("controller emps", "controller.h controller.c controller.hpp vectors.h main.c README.md"),
-    ],
-)
+@pytest.mark.parametrize(("command", "files"), [
+    ("c noisy.toml --no-check", "drive.h drive.c drive_design.h drive_design.c main.c README.md"),
+    ("controller emps", "controller.h controller.c controller.hpp vectors.h main.c README.md"),
+])  # fmt: skip
 def test_a_folder_holds_all_files_of_its_export(command: str, files: str, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     Path("noisy.toml").write_text(NOISY)

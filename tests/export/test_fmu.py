@@ -141,15 +141,12 @@ def test_own_host_saves_serialises_and_goes_on(step: float, save_at: int, tmp_pa
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    ("name", "change"),
-    [
-        ("ilr33-amber", {"control.position.gain": 50.0}),
-        # a row of parameters that becomes longer, and a motor that no longer slips where it did
-        ("joint", {"coupling.stiffness": 30.0, "coupling.play": 2e-3, "friction.dry_torque": 3.0}),
-        ("ilr33-amber", {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}),
-    ],
-)
+@pytest.mark.parametrize(("name", "change"), [
+    ("ilr33-amber", {"control.position.gain": 50.0}),
+    # a row of parameters that becomes longer, and a motor that no longer slips where it did
+    ("joint", {"coupling.stiffness": 30.0, "coupling.play": 2e-3, "friction.dry_torque": 3.0}),
+    ("ilr33-amber", {"friction.dry_torque": 0.0, "friction.load_coefficient": 0.0}),
+])  # fmt: skip
 def test_tuning_between_steps_changes_what_follows(name: str, change: dict[str, float], tmp_path) -> None:
     """Keys changed during the run: as if the simulator had been stopped and gone on with the other row."""
     from nonlinear._kernels import layout as at

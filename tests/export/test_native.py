@@ -60,16 +60,13 @@ def test_runs_have_the_bits_of_the_kernels_as_written(seed: int) -> None:
 
 
 @quiet
-@pytest.mark.parametrize(
-    ("name", "delay_ticks", "form"),
-    [
-        *((f"ilr33-amber{name}", delay, f"{form}_{2 if delay < 1.0 else 3}")
-          for name, form in (("", "dry"), ("-tanh", "tanh"), ("-compliant", "elastic"))
-          for delay in (0.0, 0.3, 1.0, 1.7)),
-        ("emps", 0.0, "rigid"), ("ballscrew", 1.0, "two_sided"),
-        ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "delay_ticks", "form"), [
+    *((f"ilr33-amber{name}", delay, f"{form}_{2 if delay < 1.0 else 3}")
+      for name, form in (("", "dry"), ("-tanh", "tanh"), ("-compliant", "elastic"))
+      for delay in (0.0, 0.3, 1.0, 1.7)),
+    ("emps", 0.0, "rigid"), ("ballscrew", 1.0, "two_sided"),
+    ("fin", 0.5, "measured_voltage"), ("joint", 1.0, "measured_current"),
+])  # fmt: skip
 def test_a_form_of_the_loop_has_the_bits_of_the_kernels_as_written(name: str, delay_ticks: float, form: str):
     """Through stick, slip and limits; the last form that fits, which is taken, is this drive's own."""
     design = load_design(name)
@@ -180,17 +177,12 @@ def of_another_machine(_: pytest.MonkeyPatch, library: Library) -> None:
     library.path().write_bytes(b"\x7fELF of another machine")
 
 
-@pytest.mark.parametrize(
-    ("lack", "words"),
-    [
-        (no_compiler, r"gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins"),
-        (lambda patch, _: patch.setattr(os, "access", lambda *_: False), "no compiled kernels of these"),
-        (of_another_machine, "does not load"),
-    ],
-)
-def test_a_library_that_cannot_be_had_is_one_line_and_none_is_made(
-    lack: Callable[..., None], words: str, library: Library, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize(("lack", "words"), [
+    (no_compiler, r"gcc, clang, or pip install ziglang; then python -m nonlinear\.native: margins"),
+    (lambda patch, _: patch.setattr(os, "access", lambda *_: False), "no compiled kernels of these"),
+    (of_another_machine, "does not load"),
+])  # fmt: skip
+def test_a_library_that_cannot_be_had_is_one_line_and_none_is_made(lack, words, library, monkeypatch) -> None:
     lack(monkeypatch, library)
     before = library.path().parent.exists()
     with pytest.raises(InputError, match=words):
@@ -241,18 +233,15 @@ def sliced(s):
     s[0:2] = 1.0
 
 
-@pytest.mark.parametrize(
-    ("function", "kinds", "words"),
-    [
-        (power, ["float"], "Pow is not in the subset"),
-        (two_types, ["float"], "y is a int and becomes a float"),
-        (open_order, ["row"], "writes s beside another use of s"),
-        (twice, ["row"], "writes s beside another use of s"),
-        (truth, ["float"], "a float as a condition"),
-        (sliced, ["row"], "Slice is not in the subset"),
-        (push, ["row", "row"], "takes"),
-    ],
-)
+@pytest.mark.parametrize(("function", "kinds", "words"), [
+    (power, ["float"], "Pow is not in the subset"),
+    (two_types, ["float"], "y is a int and becomes a float"),
+    (open_order, ["row"], "writes s beside another use of s"),
+    (twice, ["row"], "writes s beside another use of s"),
+    (truth, ["float"], "a float as a condition"),
+    (sliced, ["row"], "Slice is not in the subset"),
+    (push, ["row", "row"], "takes"),
+])  # fmt: skip
 def test_what_is_outside_the_subset_is_refused_with_its_place(function: Any, kinds: Any, words: str) -> None:
     with pytest.raises(EmitError, match=rf"test_native\.py:[0-9]+: {function.__name__}: .*{words}"):
         emit_c({function: kinds})

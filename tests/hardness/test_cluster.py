@@ -139,13 +139,10 @@ def bare(tmp_path, paths) -> Iterator[Cluster]:
         cluster.end()
 
 
-@pytest.mark.parametrize(
-    ("environment", "words"),
-    [
-        ({"OPENBLAS_CORETYPE": "Prescott"}, "OPENBLAS_CORETYPE is Prescott, here"),
-        ({"OPENBLAS_NUM_THREADS": "3"}, "start it with .*OPENBLAS_NUM_THREADS=1"),
-    ],
-)
+@pytest.mark.parametrize(("environment", "words"), [
+    ({"OPENBLAS_CORETYPE": "Prescott"}, "OPENBLAS_CORETYPE is Prescott, here"),
+    ({"OPENBLAS_NUM_THREADS": "3"}, "start it with .*OPENBLAS_NUM_THREADS=1"),
+])  # fmt: skip
 def test_a_worker_that_adds_up_otherwise_gets_no_work(bare, environment, words, tmp_path, cli) -> None:
     bare.add_worker(**environment)
     got: list[int] = []
@@ -250,13 +247,10 @@ def test_a_scheduler_that_dies_is_one_line_and_what_is_done_is_kept(bare, tmp_pa
     assert kept.items() <= after.items()
 
 
-@pytest.mark.parametrize(
-    ("address", "told"),
-    [
-        ("tcp://10.0.0.7:8786", True), ("tcp://cluster:8786", True), ("cluster:8786", True),
-        ("tcp://127.0.0.1:8786", False), ("tcp://localhost:8786", False), ("tcp://[::1]:8786", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("address", "told"), [
+    ("tcp://10.0.0.7:8786", True), ("tcp://cluster:8786", True), ("cluster:8786", True),
+    ("tcp://127.0.0.1:8786", False), ("tcp://localhost:8786", False), ("tcp://[::1]:8786", False),
+])  # fmt: skip
 def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_path, cli) -> None:
     assert bool(Engine(scheduler=address).caution) is told
     words = ["nightly", "approve", "emps", "--site", str(tmp_path / "s"), "--by", "x", "--reason", "y"]
@@ -266,17 +260,14 @@ def test_an_address_that_anybody_can_reach_is_warned_about(address, told, tmp_pa
     assert said.count("\n") == 1 + told  # and that there is no night yet
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"scheduler": "tls://h:1"}, "--tls"),
-        ({"scheduler": "tcp://h:1", "tls": Path("x")}, "--scheduler tls://"),
-        ({"workers": 1, "tls": Path("x")}, "--scheduler tls://"),
-        ({"workers": 2, "scheduler": "tcp://x"}, "one of them"),
-        ({"workers": 0}, "at least 1"),
-        ({"scheduler": "nowhere"}, "tcp://host:8786"),
-    ],
-)
+@pytest.mark.parametrize(("options", "words"), [
+    ({"scheduler": "tls://h:1"}, "--tls"),
+    ({"scheduler": "tcp://h:1", "tls": Path("x")}, "--scheduler tls://"),
+    ({"workers": 1, "tls": Path("x")}, "--scheduler tls://"),
+    ({"workers": 2, "scheduler": "tcp://x"}, "one of them"),
+    ({"workers": 0}, "at least 1"),
+    ({"scheduler": "nowhere"}, "tcp://host:8786"),
+])  # fmt: skip
 def test_an_engine_that_cannot_be_is_refused(options, words) -> None:
     fails(InputError, words, **options)
 

@@ -88,22 +88,19 @@ def test_a_figure_that_crashes_leaves_the_page(tmp_path, monkeypatch, cli) -> No
     assert "loop-position" in page
 
 
-@pytest.mark.parametrize(
-    ("error", "status", "words"),
-    [
-        (KeyError("x"), 3, "unforeseen KeyError"),
-        (ValueError("f(a) and f(b) must have different signs"), 3, "different signs"),
-        (RecursionError(), 3, "unforeseen RecursionError"),
-        (MemoryError(), 3, "not enough memory"),
-        (NumericalError("try a\nlarger band"), 3, "numerical failure: try a larger band"),
-        (InputError("a = 1: must be 2", where="x.toml"), 2, "actuator-lti: x.toml: a = 1: must be 2"),
-        (FileNotFoundError(2, "No such file", "a\nb"), 2, "No such file"),
-        (FileNotFoundError(2, "No such file or directory", "a.csv"), 2, "a.csv: No such file or directory"),
-        (KeyboardInterrupt(), 130, "interrupted"),
-        (typer.Abort(), 130, "interrupted"),
-        (typer.BadParameter("no"), 2, "no"),
-    ],
-)
+@pytest.mark.parametrize(("error", "status", "words"), [
+    (KeyError("x"), 3, "unforeseen KeyError"),
+    (ValueError("f(a) and f(b) must have different signs"), 3, "different signs"),
+    (RecursionError(), 3, "unforeseen RecursionError"),
+    (MemoryError(), 3, "not enough memory"),
+    (NumericalError("try a\nlarger band"), 3, "numerical failure: try a larger band"),
+    (InputError("a = 1: must be 2", where="x.toml"), 2, "actuator-lti: x.toml: a = 1: must be 2"),
+    (FileNotFoundError(2, "No such file", "a\nb"), 2, "No such file"),
+    (FileNotFoundError(2, "No such file or directory", "a.csv"), 2, "a.csv: No such file or directory"),
+    (KeyboardInterrupt(), 130, "interrupted"),
+    (typer.Abort(), 130, "interrupted"),
+    (typer.BadParameter("no"), 2, "no"),
+])  # fmt: skip
 def test_each_kind_of_failure_has_its_status_and_one_line(error, status, words, capsys) -> None:
     def call() -> None:
         raise error

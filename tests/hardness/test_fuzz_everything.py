@@ -96,19 +96,16 @@ def test_numbers_beyond_floats_names_that_cannot_be_read_and_a_status_twice() ->
     BY_NAME["report"].attack(written(json.dumps(made).encode(), ".json"))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (lambda made: first("glance", made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
-        (lambda made: first("table", made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
-        (lambda made: first("table", made)["rows"][0].update(b={"text": "x"}), "status"),
-        (lambda made: first("glance", made)["loops"][0].update(stable="yes"), "stable"),
-        (lambda made: first("glance", made)["loops"][0]["stable"].pop("status"), "status"),
-        (lambda made: first("glance", made)["weakest"].pop("words"), "words"),
-        (lambda made: made["provenance"].update(time=3), "time"),
-        (lambda made: made["provenance"].update(commit=[1]), "commit"),
-    ],
-)
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda made: first("glance", made)["loops"][0]["figures"][0].update(format="sig:x"), "format"),
+    (lambda made: first("table", made)["rows"][0].update(_status="f{{7*7}}"), "_status"),
+    (lambda made: first("table", made)["rows"][0].update(b={"text": "x"}), "status"),
+    (lambda made: first("glance", made)["loops"][0].update(stable="yes"), "stable"),
+    (lambda made: first("glance", made)["loops"][0]["stable"].pop("status"), "status"),
+    (lambda made: first("glance", made)["weakest"].pop("words"), "words"),
+    (lambda made: made["provenance"].update(time=3), "time"),
+    (lambda made: made["provenance"].update(commit=[1]), "commit"),
+])  # fmt: skip
 def test_a_report_that_no_page_can_be_made_of(change, words: str) -> None:
     made = json.loads(small_report())
     change(made)
@@ -239,19 +236,16 @@ def test_twenty_thousand_runs_are_read_and_one_more_is_not(tmp_path) -> None:
     refusals.refused(load_campaign, path, words=(words,))
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"),
-    [
-        (b'name = "Bench, March"', b'name = "a\\u001b[31mb"', "U+001B"),
-        (b'separator = ";"', b"separator = { a = 1 }", "separator"),
-        (b'"correlation"', b'"guess"', "join.method = 'guess': one of correlation, event, given"),
-        (b'signals.current = { column = "I", unit = "mA" }', b"", "drive.signals.current: is needed"),
-        (b'unit = "rpm"', b'unit = "kg"', "must be a unit like rad/s"),
-        (b"torque_accuracy =", b"torque_acuracy =", 'did you mean "torque_accuracy"'),
-        (b'speed = "104.7 rad/s"', b'speed = "105 N"', "run[1].speed"),
-        (b"[[run]]", b"[[run]]" + CAMPAIGN.partition(b"[[run]]")[2] + b"[[run]]", "given twice"),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "words"), [
+    (b'name = "Bench, March"', b'name = "a\\u001b[31mb"', "U+001B"),
+    (b'separator = ";"', b"separator = { a = 1 }", "separator"),
+    (b'"correlation"', b'"guess"', "join.method = 'guess': one of correlation, event, given"),
+    (b'signals.current = { column = "I", unit = "mA" }', b"", "drive.signals.current: is needed"),
+    (b'unit = "rpm"', b'unit = "kg"', "must be a unit like rad/s"),
+    (b"torque_accuracy =", b"torque_acuracy =", 'did you mean "torque_accuracy"'),
+    (b'speed = "104.7 rad/s"', b'speed = "105 N"', "run[1].speed"),
+    (b"[[run]]", b"[[run]]" + CAMPAIGN.partition(b"[[run]]")[2] + b"[[run]]", "given twice"),
+])  # fmt: skip
 def test_a_campaign_is_read_as_strictly_as_a_design(tmp_path, old, new, words) -> None:
     assert old in CAMPAIGN
     path = tmp_path / "c.toml"

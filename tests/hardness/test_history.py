@@ -164,17 +164,14 @@ def test_a_night_that_is_missing_is_told(site, name: str) -> None:
         refused(read, match=r"\d\.json: is damaged \(is missing\): restore it from a copy")
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        lambda index: index["runs"][0].update(started=5),
-        lambda index: index["runs"][0].update(id="1"),
-        lambda index: index["runs"][0].pop("code"),
-        lambda index: index["runs"][0].update(libraries={"numpy": 2}),
-        lambda index: index["baselines"][0].update(by=None),
-        lambda index: index.update(interrupted="never"),
-    ],
-)
+@pytest.mark.parametrize("change", [
+    lambda index: index["runs"][0].update(started=5),
+    lambda index: index["runs"][0].update(id="1"),
+    lambda index: index["runs"][0].pop("code"),
+    lambda index: index["runs"][0].update(libraries={"numpy": 2}),
+    lambda index: index["baselines"][0].update(by=None),
+    lambda index: index.update(interrupted="never"),
+])  # fmt: skip
 def test_a_value_of_another_kind_is_damage(site, change) -> None:
     rewritten(site, change)
     refused(open_history, state(site), words="is damaged")

@@ -103,14 +103,11 @@ def test_steps_a_row_or_two_apart_are_those_of_the_drive(gaps: tuple[int, ...], 
     assert max(signal.relative_error for signal in found.signals.values()) < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("column", "key", "stage"),
-    [
-        ("speed_reference [rad/s]", "speed_command_rad_s", "velocity"),
-        ("current_reference [A]", "current_command_A", "current"),
-        ("voltage_reference [V]", "voltage_V", "voltage"),
-    ],
-)
+@pytest.mark.parametrize(("column", "key", "stage"), [
+    ("speed_reference [rad/s]", "speed_command_rad_s", "velocity"),
+    ("current_reference [A]", "current_command_A", "current"),
+    ("voltage_reference [V]", "voltage_V", "voltage"),
+])  # fmt: skip
 def test_an_inner_command_drives_the_loops_inside_it(column: str, key: str, stage: str, tmp_path) -> None:
     """A whole cascade, of which the record holds the command of an inner stage only."""
     run = simulate(BASE, _swing(0.03), 0.5)

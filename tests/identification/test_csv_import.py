@@ -28,21 +28,15 @@ def _write(folder: Path, text: str | bytes) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    ("text", "layout"),
-    [
-        ("t;n\n0;1,5\n1;2,5\n", CsvFormat(separator=";", decimal=",")),
-        ("t\tn\r\n0\t1.5\r\n1\t2.5\r\n", CsvFormat(separator="\t")),
-        ("  t   n\n 0   1.5\n 1\t2.5\n", CsvFormat(separator="whitespace")),
-        (
-            "% made by hand\n0,1.5;\n% between\n1,2.5;\n",
-            CsvFormat(comment="%", row_end=";", names=("t", "n")),
-        ),
-        ("junk\nmore junk\nt,n\n0,1.5\n\n1,2.5", CsvFormat(skip_lines=2)),
-        ("\ufefft,n\n0,1.5\n1,2.5\n", CsvFormat()),
-        ('"t","n"\n"0","1.5"\n"1","2.5"\n', CsvFormat()),
-    ],
-)
+@pytest.mark.parametrize(("text", "layout"), [
+    ("t;n\n0;1,5\n1;2,5\n", CsvFormat(separator=";", decimal=",")),
+    ("t\tn\r\n0\t1.5\r\n1\t2.5\r\n", CsvFormat(separator="\t")),
+    ("  t   n\n 0   1.5\n 1\t2.5\n", CsvFormat(separator="whitespace")),
+    ("% made by hand\n0,1.5;\n% between\n1,2.5;\n", CsvFormat(comment="%", row_end=";", names=("t", "n"))),
+    ("junk\nmore junk\nt,n\n0,1.5\n\n1,2.5", CsvFormat(skip_lines=2)),
+    ("\ufefft,n\n0,1.5\n1,2.5\n", CsvFormat()),
+    ('"t","n"\n"0","1.5"\n"1","2.5"\n', CsvFormat()),
+])  # fmt: skip
 def test_layouts(tmp_path, text: str, layout: CsvFormat) -> None:
     record = read_csv_record(_write(tmp_path, text), _spec(format=layout))
     assert (record.time_s.tolist(), record.units["speed"]) == ([0.0, 1.0], "rad/s")
@@ -120,22 +114,19 @@ def test_every_row_and_line_is_accounted_for(held, layout, policy, end, tmp_path
     assert counts.lines == lines == counts.comments + counts.blanks + counts.header + counts.rows_in
 
 
-@pytest.mark.parametrize(
-    ("content", "reason"),
-    [
-        ("x,n\n0,1\n1,2\n", 'no column "t"'),
-        ("t,n\n0,1\n", "fewer than two usable rows"),
-        (b"t,n\n0,1\n\x00\x00", "NUL"),
-        ("t,n\n".encode("utf-16"), "UTF-16"),
-        ("", "fewer than two usable rows"),
-        ("t,n,n\n0,1,2\n1,2,3\n", "2 times"),
-        ("t,n\n0,1\n1,abc\n2,3\n", r'log.csv:3: column "n" = "abc": not a number'),
-        ("t,n\n0,1\n2,1\n1,1\n3,1\n", r"log.csv:4: time 1 s does not come after 2 s; allowed"),
-        ("t,n\n1700000000.01,1\n1700000000.01,1\n", r"1700000000.01 s does not come after 1.*: a row twice"),
-        ("t;n\n0;1\n1;1\n", r'no column "t"; is separator = ";" missing\? There is: "t;n"$'),
-        ("u,n\n0,1\n1,1\n", r'no column "t"; there are: "u", "n"$'),
-    ],
-)
+@pytest.mark.parametrize(("content", "reason"), [
+    ("x,n\n0,1\n1,2\n", 'no column "t"'),
+    ("t,n\n0,1\n", "fewer than two usable rows"),
+    (b"t,n\n0,1\n\x00\x00", "NUL"),
+    ("t,n\n".encode("utf-16"), "UTF-16"),
+    ("", "fewer than two usable rows"),
+    ("t,n,n\n0,1,2\n1,2,3\n", "2 times"),
+    ("t,n\n0,1\n1,abc\n2,3\n", r'log.csv:3: column "n" = "abc": not a number'),
+    ("t,n\n0,1\n2,1\n1,1\n3,1\n", r"log.csv:4: time 1 s does not come after 2 s; allowed"),
+    ("t,n\n1700000000.01,1\n1700000000.01,1\n", r"1700000000.01 s does not come after 1.*: a row twice"),
+    ("t;n\n0;1\n1;1\n", r'no column "t"; is separator = ";" missing\? There is: "t;n"$'),
+    ("u,n\n0,1\n1,1\n", r'no column "t"; there are: "u", "n"$'),
+])  # fmt: skip
 def test_files_that_are_no_records(tmp_path, content: str | bytes, reason: str) -> None:
     with pytest.raises(InputError, match=reason):
         read_csv_record(_write(tmp_path, content), _spec())

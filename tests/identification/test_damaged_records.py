@@ -467,9 +467,7 @@ def test_what_the_constant_moves_by_more_than_the_value_is_said_in_its_unit() ->
     ("constants", "ampere", "read"),
     [("rms-line", 1.5**0.5, "rms read as DC: 0.82"), ("peak-phase", 0.75**0.5, "peak read as DC: 1.15")],
 )
-def test_a_constant_of_an_ac_motor_is_told_in_the_amperes_of_the_model(
-    constants: str, ampere: float, read: str
-) -> None:
+def test_a_constant_of_an_ac_motor_is_told_in_the_amperes_of_the_model(constants, ampere, read) -> None:
     """N m/A dc is N m/A rms over sqrt(3/2), N m/A peak over sqrt(3)/2; so is a current that one read so."""
     motor = replace(BASE.motor, constants=constants)
     design = replace(BASE, motor=motor)

@@ -135,24 +135,21 @@ def test_a_compressed_and_a_plain_file_read_alike() -> None:
         assert content.texts == {"text": ("abc",)}
 
 
-@pytest.mark.parametrize(
-    ("header", "signal", "factor"),
-    [
-        ("Speed [1/min]", "speed", np.pi / 30.0),
-        ("n / U/min", "speed", np.pi / 30.0),
-        ("omega in rad/s", "speed", 1.0),
-        ("velocity [mm/s]", "velocity", 1e-3),
-        ("Irms [A]", "current", np.sqrt(1.5)),
-        ("motor current (Arms)", "current", np.sqrt(1.5)),
-        ("Torque [N]", "load_force", 1.0),
-        ("load_Nm", "torque", 1.0),
-        ("U_DC [V]", "supply", 1.0),
-        ("setpoint [rpm]", "speed_reference", np.pi / 30.0),
-        ("cmd [A]", "current_reference", 1.0),
-        ("cmd [deg]", "reference", np.pi / 180.0),
-        ("cmd [mm]", "position_reference", 1e-3),
-    ],
-)
+@pytest.mark.parametrize(("header", "signal", "factor"), [
+    ("Speed [1/min]", "speed", np.pi / 30.0),
+    ("n / U/min", "speed", np.pi / 30.0),
+    ("omega in rad/s", "speed", 1.0),
+    ("velocity [mm/s]", "velocity", 1e-3),
+    ("Irms [A]", "current", np.sqrt(1.5)),
+    ("motor current (Arms)", "current", np.sqrt(1.5)),
+    ("Torque [N]", "load_force", 1.0),
+    ("load_Nm", "torque", 1.0),
+    ("U_DC [V]", "supply", 1.0),
+    ("setpoint [rpm]", "speed_reference", np.pi / 30.0),
+    ("cmd [A]", "current_reference", 1.0),
+    ("cmd [deg]", "reference", np.pi / 180.0),
+    ("cmd [mm]", "position_reference", 1e-3),
+])  # fmt: skip
 def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) -> None:
     (tmp_path / "r.csv").write_text(f"time_s;{header}\n" + "".join(f"{k / 10};{k}\n" for k in range(9)))
     record = open_record(tmp_path / "r.csv")
@@ -160,16 +157,13 @@ def test_units_in_the_header(header: str, signal: str, factor: float, tmp_path) 
     assert record[signal] == pytest.approx(factor * np.arange(9.0))
 
 
-@pytest.mark.parametrize(
-    ("value", "between", "factor", "power"),
-    [
-        ("", "", 1.0, None),
-        ("rms", "", np.sqrt(2.0), None),
-        ("", "phase", np.sqrt(3.0), None),
-        ("peak", "phase", np.sqrt(3.0), 1.5),
-        ("rms", "phase", np.sqrt(6.0), 3.0),
-    ],
-)
+@pytest.mark.parametrize(("value", "between", "factor", "power"), [
+    ("", "", 1.0, None),
+    ("rms", "", np.sqrt(2.0), None),
+    ("", "phase", np.sqrt(3.0), None),
+    ("peak", "phase", np.sqrt(3.0), 1.5),
+    ("rms", "phase", np.sqrt(6.0), 3.0),
+])  # fmt: skip
 def test_ac_values_are_those_of_the_equivalent_dc_motor(value, between, factor, power, tmp_path) -> None:
     """P = u i with u the peak line-line voltage: 3 V_phase I_phase in rms of a motor without reactance."""
     rows, value = np.arange(1.0, 10.0), f', value = "{value}"' if value else ""
@@ -221,24 +215,21 @@ def test_jitter_is_resampled_with_an_error_that_holds_and_a_gap_within_the_toler
         open_record(tmp_path / "r.toml").resampled()
 
 
-@pytest.mark.parametrize(
-    ("write", "reason"),
-    [
-        (lambda p: savemat(p / "r.mat", {"X": TABLE}), "layout is not known"),
-        (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "too short"),
-        (lambda p: (p / "r.json").write_text("[1, 2]"), "columns by name, or a list of rows"),
-        (lambda p: (p / "r.parquet").write_bytes(b"PAR1PAR1"), "is no Parquet file"),
-        (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
-        (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
-        (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
-        (lambda p: (p / "r.csv").write_text("a,b,c,d,e,f\n1,2,3,4,5,6\n"), '"f": no name'),
-        (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "its number from 1"),
-        (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
-        (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
-        (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),
-        (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
-    ],
-)
+@pytest.mark.parametrize(("write", "reason"), [
+    (lambda p: savemat(p / "r.mat", {"X": TABLE}), "layout is not known"),
+    (lambda p: (p / "r.mat").write_bytes(b"MATLAB"), "too short"),
+    (lambda p: (p / "r.json").write_text("[1, 2]"), "columns by name, or a list of rows"),
+    (lambda p: (p / "r.parquet").write_bytes(b"PAR1PAR1"), "is no Parquet file"),
+    (lambda p: (p / "r.csv").write_text("time,current\n1,2\n"), "has no unit in its name"),
+    (lambda p: (p / "r.csv").write_text("time_s,banana_A\n1,2\n"), '"banana_A": no name'),
+    (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "describe it in a record file"),
+    (lambda p: (p / "r.csv").write_text("a,b,c,d,e,f\n1,2,3,4,5,6\n"), '"f": no name'),
+    (lambda p: (p / "r.csv").write_text("a,b\n1,2\n"), "its number from 1"),
+    (lambda p: (p / "r.csv.gz").write_bytes(gzip.compress(b"a,b\n1,2\n")), "binary or packed"),
+    (lambda p: (p / "r.csv").write_bytes(bytes(range(256))), "binary or packed"),
+    (lambda p: (p / "r.csv").write_text("time_s,i_A\n1,2\n1,3\n2,3"), 'disorder = "drop" in a record'),
+    (lambda p: (p / "r.toml").write_text('file = "r.csv"\nseperator = ";"\n'), 'mean "separator"'),
+])  # fmt: skip
 def test_what_cannot_be_read_says_why(write: object, reason: str, tmp_path) -> None:
     write(tmp_path)
     file = next(tmp_path.iterdir())

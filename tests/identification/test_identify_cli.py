@@ -95,15 +95,12 @@ def test_the_virtual_bench_writes_54_runs(tmp_path, capsys, monkeypatch) -> None
     assert "seed 3" in (tmp_path / "campaign.toml").read_text()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "reason"),
-    [
-        ((), "--force"),
-        (("--force", "--design", "emps"), "rotary drive"),
-        (("--sweep", "--design", "fin"), "current loop and a coupling"),
-        (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "reason"), [
+    ((), "--force"),
+    (("--force", "--design", "emps"), "rotary drive"),
+    (("--sweep", "--design", "fin"), "current loop and a coupling"),
+    (("--sweep", "--design", "ilr33-amber"), "current loop and a coupling"),
+])  # fmt: skip
 def test_a_bench_that_is_there_or_a_drive_that_it_cannot_take(arguments, reason, tmp_path, capsys) -> None:
     (tmp_path / "campaign.toml").touch()
     with pytest.raises(SystemExit, match="2"):

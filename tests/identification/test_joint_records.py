@@ -238,18 +238,12 @@ def test_a_drive_on_a_voltage_is_refined_over_its_gains(tmp_path, cli) -> None:
         assert parameter_value(made, key) == pytest.approx(value)
 
 
-@pytest.mark.parametrize(
-    ("settings", "reason"),
-    [
-        ('"control.position.gain" = "90 kg"', "settings: control.position.gain"),
-        ('"control.position.gian" = "90 1/s"', "settings: control.position.gian"),
-        (
-            '"friction.viscous" = "1e-6 N*m*s/rad"',
-            "is found from all records; allowed: any other key, or --fix",
-        ),
-        ('"control.position.gain" = [1]', "a key of the design with its value is wanted"),
-    ],
-)
+@pytest.mark.parametrize(("settings", "reason"), [
+    ('"control.position.gain" = "90 kg"', "settings: control.position.gain"),
+    ('"control.position.gian" = "90 1/s"', "settings: control.position.gian"),
+    ('"friction.viscous" = "1e-6 N*m*s/rad"', "is found from all records; allowed: any other key, or --fix"),
+    ('"control.position.gain" = [1]', "a key of the design with its value is wanted"),
+])  # fmt: skip
 def test_a_setting_that_cannot_be_is_refused(settings: str, reason: str, sixteen: Path, cli) -> None:
     file = sixteen.with_name("wrong.toml")
     file.write_text(f'{SHARED}\nfile = "{GAINS[0]:g}_{INERTIAS[0]:g}_1.csv"\n[settings]\n{settings}\n')

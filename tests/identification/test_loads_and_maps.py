@@ -88,21 +88,16 @@ def test_a_small_motion_tells_the_mass_at_the_design_s_offset_and_no_load_beside
     assert abs(model["offset"]) < 3.0 * model.std("offset") < 1e-4
 
 
-@pytest.mark.parametrize(
-    ("term", "found_kg", "given", "mass_kg", "offset_rad"),
-    [
-        ("gravity_sin", 2.0, None, 2.0, 0.0),
-        ("gravity_cos", 2.0, None, 2.0, 0.5 * np.pi),
-        ("gravity_sin", -2.0, None, 2.0, np.pi),  # it hangs
-        ("gravity_cos", -2.0, None, 2.0, -0.5 * np.pi),
-        ("gravity_sin", 2.0, 1.1, 2.0, 1.1),
-        ("gravity_cos", 2.0, 1.1, np.hypot(0.5, 2.0), 1.1 + np.arctan2(2.0, 0.5)),  # the other term is kept
-        ("gravity_sin", -2.0, 3.0, 2.0, 3.0 - np.pi),
-    ],
-)
-def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(
-    term, found_kg, given, mass_kg, offset_rad
-) -> None:
+@pytest.mark.parametrize(("term", "found_kg", "given", "mass_kg", "offset_rad"), [
+    ("gravity_sin", 2.0, None, 2.0, 0.0),
+    ("gravity_cos", 2.0, None, 2.0, 0.5 * np.pi),
+    ("gravity_sin", -2.0, None, 2.0, np.pi),  # it hangs
+    ("gravity_cos", -2.0, None, 2.0, -0.5 * np.pi),
+    ("gravity_sin", 2.0, 1.1, 2.0, 1.1),
+    ("gravity_cos", 2.0, 1.1, np.hypot(0.5, 2.0), 1.1 + np.arctan2(2.0, 0.5)),  # the other term is kept
+    ("gravity_sin", -2.0, 3.0, 2.0, 3.0 - np.pi),
+])  # fmt: skip
+def test_one_term_of_a_pendulum_is_written_at_the_design_s_offset(term, found_kg, given, mass_kg, offset_rad):
     design = _joint()
     if given is not None:
         gravity = Gravity(mass_kg=0.5, arm_m=1.0, offset_rad=given)

@@ -77,15 +77,12 @@ def _wrong(path: Path) -> str:
     return "\n".join(f"{one.subject}: {one.text}" for one in found if one.passed is False)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "words"),
-    [
-        ("current", 999.0, r"^current against its limit: 999 A in line 1236 \(1.234 s\), .* bad row"),
-        ("current", -999.0, r"^current against its limit: -999 A in line 1236 \(1.234 s\), .* bad row"),
-        ("angle", 1745.0, r"^steps of the angle.* jumps from \S+ to 1745 rad in line 1236 .*line 1237 "),
-        ("angle", 0.0, r"^steps of the angle.* jumps from \S+ to 0 rad in line 1236 .*line 1237 "),
-    ],
-)
+@pytest.mark.parametrize(("name", "value", "words"), [
+    ("current", 999.0, r"^current against its limit: 999 A in line 1236 \(1.234 s\), .* bad row"),
+    ("current", -999.0, r"^current against its limit: -999 A in line 1236 \(1.234 s\), .* bad row"),
+    ("angle", 1745.0, r"^steps of the angle.* jumps from \S+ to 1745 rad in line 1236 .*line 1237 "),
+    ("angle", 0.0, r"^steps of the angle.* jumps from \S+ to 0 rad in line 1236 .*line 1237 "),
+])  # fmt: skip
 def test_one_row_that_no_drive_can_have_is_named(name, value, words, columns, tmp_path) -> None:
     """Of the file, of one that lacks a line before it; without its line nothing is wrong."""
     path = tmp_path / "r.csv"

@@ -20,9 +20,7 @@ def right() -> Columns:
     return columns_of(motion(2))
 
 
-def test_the_right_record_gives_its_drive_and_accounts_for_every_column(
-    right: Columns, tmp_path, identify, cli
-) -> None:
+def test_the_right_record_gives_its_drive_and_accounts_for_every_column(right, tmp_path, identify, cli):
     """The whole inertia at the motor is the drive's: what gears and load have is taken off the rotor's."""
     data, written = identify(right).data, tmp_path / "o" / "ilr33-amber-identified.toml"
     truth, result = load_design("ilr33-amber"), load_design(written)
@@ -67,15 +65,12 @@ def test_a_residual_above_the_level_writes_nothing_unless_accepted(right, tmp_pa
     assert words in " ".join(cli.text("identify", tmp_path / "r.csv", *asked, status=1).split())
 
 
-@pytest.mark.parametrize(
-    ("signal", "reason"),
-    [
-        ('signals.banana = { column = "current_A", unit = "A" }', "signals.banana: no signal that is known"),
-        ('signals.curent = { column = "current_A", unit = "A" }', 'did you mean "current"?'),
-        ('signals.current = { column = "current_A", unit = "V" }', "must be a unit like A"),
-        ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
-    ],
-)
+@pytest.mark.parametrize(("signal", "reason"), [
+    ('signals.banana = { column = "current_A", unit = "A" }', "signals.banana: no signal that is known"),
+    ('signals.curent = { column = "current_A", unit = "A" }', 'did you mean "current"?'),
+    ('signals.current = { column = "current_A", unit = "V" }', "must be a unit like A"),
+    ('signals.current = { column = "current_A", unit = "A", value = "mean" }', "one of dc, rms, peak"),
+])  # fmt: skip
 def test_a_signal_that_nothing_reads_is_refused(signal, reason, right, tmp_path, cli) -> None:
     write(tmp_path / "r.csv", right)
     text = f'file = "r.csv"\ntime = {{ column = "time_s" }}\n{signal}\n'

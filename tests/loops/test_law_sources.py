@@ -44,17 +44,14 @@ def read(folder: Path, held: Any, beside: str = "") -> Design:
 NAMES = f"inputs = {INPUTS}"
 
 
-@pytest.mark.parametrize(
-    ("held", "beside"),
-    [
-        (PARTS | {"L": L}, NAMES),
-        (PARTS | {"L": L[:, None], "inputs": INPUTS}, ""),
-        (PARTS, f"{NAMES}\nL = [0.25, -0.5]"),
-        (PARTS | {"L": L, "A": csc_matrix(A), "B": csc_matrix(B), "D": csc_matrix(D)}, NAMES),
-        (PARTS | {"L": L + 0j, "A": csc_matrix(A + 0j)}, NAMES),
-        ({"K": PARTS | {"L": L, "inputs": np.array(INPUTS, dtype=object)}}, NAMES),
-    ],
-)
+@pytest.mark.parametrize(("held", "beside"), [
+    (PARTS | {"L": L}, NAMES),
+    (PARTS | {"L": L[:, None], "inputs": INPUTS}, ""),
+    (PARTS, f"{NAMES}\nL = [0.25, -0.5]"),
+    (PARTS | {"L": L, "A": csc_matrix(A), "B": csc_matrix(B), "D": csc_matrix(D)}, NAMES),
+    (PARTS | {"L": L + 0j, "A": csc_matrix(A + 0j)}, NAMES),
+    ({"K": PARTS | {"L": L, "inputs": np.array(INPUTS, dtype=object)}}, NAMES),
+])  # fmt: skip
 def test_all_that_a_file_holds_is_taken(held: Any, beside: str, tmp_path: Path) -> None:
     assert read(tmp_path, held, beside).controller == WANTED
 
@@ -144,14 +141,11 @@ def test_what_a_file_leaves_open_is_refused(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "system",
-    [
-        scipy.signal.StateSpace([[0.5j]], [[1]], [[1]], [[0]], dt=T),
-        scipy.signal.ZerosPolesGain([0.2j], [0.5], 1.0, dt=T),
-        scipy.signal.TransferFunction([1 + 1j], [1, 0.5], dt=T),
-    ],
-)
+@pytest.mark.parametrize("system", [
+    scipy.signal.StateSpace([[0.5j]], [[1]], [[1]], [[0]], dt=T),
+    scipy.signal.ZerosPolesGain([0.2j], [0.5], 1.0, dt=T),
+    scipy.signal.TransferFunction([1 + 1j], [1, 0.5], dt=T),
+])  # fmt: skip
 def test_a_complex_system_is_refused(system: Any) -> None:
     assert "must be real" in refused(BASE.with_law, "velocity", system, ["error"])
 

@@ -215,21 +215,18 @@ def test_operating_points_of_the_friction() -> None:
     assert abs(rest.open_loop(z)) < 0.5 * abs(sliding.open_loop(z))
 
 
-@pytest.mark.parametrize(
-    ("wrong", "words"),
-    [
-        ({"design": emps(), "rotor": "locked"}, "locked"),
-        ({"design": amber(encoder=Encoder(speed="tracking"))}, "bandwidth"),
-        ({"operating_point": "driving"}, "no coupling"),
-        ({"inner_loops": "half"}, "inner_loops"),
-        ({"form": "discrete"}, "^form = 'discrete': one of sampled, continuous, ideal$"),
-        ({"operating_point": "moving"}, "operating_point = 'moving'"),
-        ({"operating_point": "describing-function"}, "speed_amplitude_rad_s"),
-        ({"load_Nm": float("nan")}, "load_Nm"),
-        ({"direction": 0}, "direction"),
-        ({"rotor": "stuck"}, "rotor"),
-    ],
-)
+@pytest.mark.parametrize(("wrong", "words"), [
+    ({"design": emps(), "rotor": "locked"}, "locked"),
+    ({"design": amber(encoder=Encoder(speed="tracking"))}, "bandwidth"),
+    ({"operating_point": "driving"}, "no coupling"),
+    ({"inner_loops": "half"}, "inner_loops"),
+    ({"form": "discrete"}, "^form = 'discrete': one of sampled, continuous, ideal$"),
+    ({"operating_point": "moving"}, "operating_point = 'moving'"),
+    ({"operating_point": "describing-function"}, "speed_amplitude_rad_s"),
+    ({"load_Nm": float("nan")}, "load_Nm"),
+    ({"direction": 0}, "direction"),
+    ({"rotor": "stuck"}, "rotor"),
+])  # fmt: skip
 def test_refusals_name_the_argument(wrong: dict[str, Any], words: str) -> None:
     with pytest.raises(InputError, match=words):
         assemble_loops(**{"design": amber(), **wrong})

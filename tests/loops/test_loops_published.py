@@ -218,15 +218,12 @@ def test_a_current_command_closes_the_current_loop() -> None:
     assert plant(design, command="i_ref").input_labels == ["i_ref", "load_torque"]
 
 
-@pytest.mark.parametrize(
-    ("name", "bad", "words"),
-    [
-        ("joint", {"form": "zoh"}, "form = 'zoh': one of sampled, continuous, ideal"),
-        ("joint", {"rotor": "held"}, "rotor = 'held': free or locked"),
-        ("joint", {"command": "w_ref"}, "command = 'w_ref': one of u, i_ref"),
-        ("emps", {"command": "i_ref"}, "emps has no current loop"),
-        ("emps", {"rotor": "locked"}, "the design has no current"),
-    ],
-)
+@pytest.mark.parametrize(("name", "bad", "words"), [
+    ("joint", {"form": "zoh"}, "form = 'zoh': one of sampled, continuous, ideal"),
+    ("joint", {"rotor": "held"}, "rotor = 'held': free or locked"),
+    ("joint", {"command": "w_ref"}, "command = 'w_ref': one of u, i_ref"),
+    ("emps", {"command": "i_ref"}, "emps has no current loop"),
+    ("emps", {"rotor": "locked"}, "the design has no current"),
+])  # fmt: skip
 def test_bad_arguments_are_named(name: str, bad: dict[str, Any], words: str) -> None:
     refused(plant, name, words=words, **bad)

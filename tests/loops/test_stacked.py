@@ -106,15 +106,12 @@ def same(blocks: list[Any], k: int) -> None:
         np.testing.assert_array_less(np.abs(mine - one), 1e-9 * scale + 1e-300)
 
 
-@pytest.mark.parametrize(
-    ("design", "k", "loop", "told"),
-    [
-        (drive_d(), 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
-        (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
-        (sprung("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
-        (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
-    ],
-)
+@pytest.mark.parametrize(("design", "k", "loop", "told"), [
+    (drive_d(), 3, "current", False),  # a crossover at 2.5e-4 rad/s, 2e8 samples a turn
+    (load_design("fin"), 8, "velocity", True),  # nearest to -1 at zero frequency itself
+    (sprung("ilr33-amber", 3000.0), 10, "velocity", True),  # L(0) from two slow poles
+    (sprung("ilr33-amber", 3000.0), 20, "velocity", True),  # the same, and nearest to -1 there
+])  # fmt: skip
 def test_slow_loops_agree_with_exact_arithmetic_or_have_no_figures(design, k, loop, told):
     values = scattered(design, k + 1)
     figures = linear_figures(Population(design, values, k + 1), time_figures=False)

@@ -17,6 +17,8 @@ from actuator_lti.drive.operating import Operating, follows_angle, holding_torqu
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import TickProgram
+from analyses.linear.loop_survey import operating_points
+from analyses.specification.requirements import evaluate_requirements
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import small_signal
 from nonlinear import State, commands, simulate
@@ -322,3 +324,26 @@ def test_a_loop_that_only_the_hold_of_a_slope_makes_unstable_is_told_so(cli) -> 
     fast = cli.text("margins", "ilr33-amber", *asked, "--set", "control.position.gain=6000 1/s", status=1)
     assert "current loop: only as the slope of a torque over the angle, held over" in " ".join(fast.split())
     assert "PASS" in cli.text("corners", "ilr33-amber", *asked)
+
+
+def test_margins_are_told_where_the_cogging_is_steepest() -> None:
+    """At DC a crest of F Z works against a stiffness of g kv kp: the gain may fall to their ratio."""
+    force, periods = 500.0, 600.0
+    cogging = {"cogging_Nm": force, "cogging_periods": periods, "cogging_phase_rad": 1.2}
+    points = operating_points(changed(load_design("emps"), motor=cogging), [], described=False)
+    least = {one.label: one.figures["position"].margins.gain_margin_db for one in points}
+    down = 20.0 * np.log10(force * periods / (35.15065 * 243.45 * 160.18))
+    assert least["on a crest of the cogging"] == pytest.approx(down, rel=1e-9)
+    assert least["in a notch of the cogging"] > 0.0
+    assert "on a crest of the cogging" in {one.place for one in points}
+
+
+def test_beside_the_bandwidth_of_standing_in_a_notch_stands_that_of_a_motion() -> None:
+    """g kv kp = 1.37e6 N/m and a notch of 9e5: 0.6 is left at DC, all of it in a motion."""
+    plain = load_design("emps")
+    asked = (model.Requirement(id="b", quantity="bandwidth", loop="position", minimum=1.0, unit="Hz"),)
+    notch = {"cogging_Nm": 1500.0, "cogging_periods": 600.0, "cogging_phase_rad": pi}
+    (alone,) = evaluate_requirements(changed(plain, requirements=asked))
+    (standing,) = evaluate_requirements(changed(plain, requirements=asked, motor=notch))
+    assert standing.value != pytest.approx(alone.value, rel=0.01)
+    assert standing.reason.endswith(f"in a motion over many {alone.value:.4g} Hz")

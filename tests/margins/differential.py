@@ -151,6 +151,12 @@ def too_far(m: StabilityMargins, end: float = math.inf) -> str:
     return f"modulus margin {m.modulus_margin} beyond a crossing at {nearest}" if wrong else ""
 
 
+def farther(m: StabilityMargins, other: StabilityMargins) -> str:
+    """The smallest distances to -1 where they are not one."""
+    same = math.isclose(m.modulus_margin, other.modulus_margin, rel_tol=1e-7, abs_tol=1e-12)
+    return "" if same else f"modulus margin {m.modulus_margin}, not {other.modulus_margin}"
+
+
 def delayed_forms(
     loop: control.TransferFunction, rng: np.random.Generator
 ) -> Iterator[tuple[str, Facts, Facts, float]]:
@@ -254,7 +260,7 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
             gains, phases = ([(w * unit, x) for w, x in part] for part in (theirs.gains, theirs.phases))
             theirs = Facts(theirs.unstable, gains, phases)
             tight = (RATIO, DEG) if m.evidence == other.evidence == "checked" else (1e-6, 1e-3)
-            if not other.withheld and (what := unlike(ours, theirs, *tight, far=30.0)):
+            if not other.withheld and (what := unlike(ours, theirs, *tight, far=30.0) or farther(m, other)):
                 return "wrong", f"{name}: {what}"
         if isinstance(loop, control.TransferFunction) and rng.random() < 0.5:
             for name, a, b, far in delayed_forms(loop, rng):

@@ -104,14 +104,11 @@ def test_peaks_beside_a_mode_at_rest_that_the_loop_does_not_show(shown: str) -> 
     assert result.complementary_rad_s == 0.0
 
 
-@pytest.mark.parametrize(
-    ("loop", "level", "message"),
-    [
-        (control.tf([1], [1, 0]), "1/sqrt(2)", "pole at zero"),
-        (s / (s + 1), "1/sqrt(2)", "is zero"),
-        (SECOND, "3", "level"),
-    ],
-)
+@pytest.mark.parametrize(("loop", "level", "message"), [
+    (control.tf([1], [1, 0]), "1/sqrt(2)", "pole at zero"),
+    (s / (s + 1), "1/sqrt(2)", "is zero"),
+    (SECOND, "3", "level"),
+])  # fmt: skip
 def test_no_value_to_fall_from_and_no_such_level(loop: control.LTI, level: str, message: str) -> None:
     refused(closed_loop_bandwidth, loop, level=level, match=message)
 

@@ -75,17 +75,14 @@ BAND = r"^band_rad_s = .*: two frequencies, 0 <= low < high, in rad/s$"
 NO_BANDS = ((1,), 5, ("a", "b"), "ab", (2, 1), (1, 2, 3), (None, 1), (math.nan, 1))
 
 
-@pytest.mark.parametrize(
-    ("loop", "asked", "message"),
-    [
-        (control.tf([1, 0, 1], [1, 1]), {}, "improper"),
-        (control.tf([-1, 1], [1, 2]), {}, "well posed"),
-        (control.tf([2, 1], [1, 5]), {"delay_s": 0.1}, "neutral"),
-        (control.ss([[np.nan]], [[1.0]], [[1.0]], [[0.0]]), {}, "finite"),
-        (control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), {}, "one input"),
-        *((control.tf([1.0], [1.0, 1.0]), {"band_rad_s": band}, BAND) for band in NO_BANDS),
-    ],
-)
+@pytest.mark.parametrize(("loop", "asked", "message"), [
+    (control.tf([1, 0, 1], [1, 1]), {}, "improper"),
+    (control.tf([-1, 1], [1, 2]), {}, "well posed"),
+    (control.tf([2, 1], [1, 5]), {"delay_s": 0.1}, "neutral"),
+    (control.ss([[np.nan]], [[1.0]], [[1.0]], [[0.0]]), {}, "finite"),
+    (control.ss(-np.eye(2), np.eye(2), np.eye(2), np.zeros((2, 2))), {}, "one input"),
+    *((control.tf([1.0], [1.0, 1.0]), {"band_rad_s": band}, BAND) for band in NO_BANDS),
+])  # fmt: skip
 def test_refusals_say_why(loop: control.LTI, asked: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         stability_margins(loop, **asked)

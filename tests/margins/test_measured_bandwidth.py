@@ -103,19 +103,16 @@ def test_phase_of_data_is_followed_over_whole_turns() -> None:
     )
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (step_figures, "step response"),
-        (plot_step, "step response"),
-        (peaks, "modulus_margin"),
-        (lambda d: unwrapped_phase_deg(d, 0.1), "outside of the measured band"),
-        (lambda d: unwrapped_phase_deg(d, 1e4), "outside of the measured band"),
-        (lambda _: unwrapped_phase_deg(control.frd(B2, np.geomspace(1, 8e3, 60)), 2e3), "do not tell"),
-        (lambda d: closed_loop_bandwidth(control.frd(1 / s, np.geomspace(1, 10, 50))), "measure lower"),
-        (lambda d: closed_loop_bandwidth(d, level="3"), "level"),
-    ],
-)
+@pytest.mark.parametrize(("call", "message"), [
+    (step_figures, "step response"),
+    (plot_step, "step response"),
+    (peaks, "modulus_margin"),
+    (lambda d: unwrapped_phase_deg(d, 0.1), "outside of the measured band"),
+    (lambda d: unwrapped_phase_deg(d, 1e4), "outside of the measured band"),
+    (lambda _: unwrapped_phase_deg(control.frd(B2, np.geomspace(1, 8e3, 60)), 2e3), "do not tell"),
+    (lambda d: closed_loop_bandwidth(control.frd(1 / s, np.geomspace(1, 10, 50))), "measure lower"),
+    (lambda d: closed_loop_bandwidth(d, level="3"), "level"),
+])  # fmt: skip
 def test_what_data_do_not_hold_is_refused_with_the_reason(call: Callable[..., object], message: str) -> None:
     data = control.frd(CLOSED["F5"], np.geomspace(1.0, 10.0, 50))
     for kind in (data, MeasuredResponse.with_noise(data, 0.0)):

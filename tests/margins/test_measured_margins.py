@@ -50,16 +50,13 @@ def test_delay_is_applied_exactly_to_data() -> None:
     assert m.phase_margins[0].deg == pytest.approx(61.3521, abs=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("omega", "values", "message"),
-    [
-        ([1.0], [1.0], "two points"),
-        ([1.0, 2.0, 3.0], [1.0, np.nan, 0.5], "finite"),
-        ([1.0, 2.0, 3.0], [1.0, 0.0, 0.5], "not zero"),
-        ([1.0, 2.0, 3.0], [1.0, -1.0, 0.5], "too coarse: 2 of 2"),
-        ([1.0, 2.0, 2.0], [1.0, 0.8, 0.8], "2 rad/s is given twice; allowed: each once, repeats as Measured"),
-    ],
-)
+@pytest.mark.parametrize(("omega", "values", "message"), [
+    ([1.0], [1.0], "two points"),
+    ([1.0, 2.0, 3.0], [1.0, np.nan, 0.5], "finite"),
+    ([1.0, 2.0, 3.0], [1.0, 0.0, 0.5], "not zero"),
+    ([1.0, 2.0, 3.0], [1.0, -1.0, 0.5], "too coarse: 2 of 2"),
+    ([1.0, 2.0, 2.0], [1.0, 0.8, 0.8], "2 rad/s is given twice; allowed: each once, repeats as Measured"),
+])  # fmt: skip
 def test_unusable_data(omega: list[float], values: list[float], message: str) -> None:
     refused(stability_margins, control.frd(np.array(values, dtype=complex), omega), match=message)
 
@@ -229,18 +226,15 @@ def test_values_lost_in_noise_give_no_gain_margin() -> None:
     assert any("smaller than their noise" in text for text in m.notes)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda d: MeasuredResponse.with_noise(d, -1.0), "standard_deviation"),
-        (lambda d: MeasuredResponse.with_noise(d, [1.0, 2.0, 3.0]), "one for each of the 2"),
-        (lambda d: MeasuredResponse.with_noise(d, 0.1, confidence=1.0), "confidence"),
-        (lambda d: MeasuredResponse.from_coherence(d, 0.0, 8), "coherence"),
-        (lambda d: MeasuredResponse.from_coherence(d, 0.9, 1), "averages"),
-        (lambda d: MeasuredResponse.from_repeats([d]), "at least two"),
-        (lambda d: MeasuredResponse.from_repeats([d, control.frd([1, 0.5], [1.0, 3.0])]), "same frequencies"),
-    ],
-)
+@pytest.mark.parametrize(("call", "message"), [
+    (lambda d: MeasuredResponse.with_noise(d, -1.0), "standard_deviation"),
+    (lambda d: MeasuredResponse.with_noise(d, [1.0, 2.0, 3.0]), "one for each of the 2"),
+    (lambda d: MeasuredResponse.with_noise(d, 0.1, confidence=1.0), "confidence"),
+    (lambda d: MeasuredResponse.from_coherence(d, 0.0, 8), "coherence"),
+    (lambda d: MeasuredResponse.from_coherence(d, 0.9, 1), "averages"),
+    (lambda d: MeasuredResponse.from_repeats([d]), "at least two"),
+    (lambda d: MeasuredResponse.from_repeats([d, control.frd([1, 0.5], [1.0, 3.0])]), "same frequencies"),
+])  # fmt: skip
 def test_unusable_noise(call: Callable[..., MeasuredResponse], message: str) -> None:
     refused(call, control.frd([1.0, 0.5], [1.0, 2.0]), match=message)
 

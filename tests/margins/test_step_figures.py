@@ -74,17 +74,14 @@ def test_small_delays_approach_the_loop_without() -> None:
     assert late.settling_time_s == pytest.approx(free.settling_time_s, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("system", "message"),
-    [
-        (1 / (s - 1), "not stable"),
-        (1 / s, "integrates"),
-        (1 / (s**2 + 1), "not stable"),
-        (s / (s + 1), "zero"),
-        (control.tf([1], [1, -1.1], 0.1), "not stable"),
-        ((DelaySystem.from_system(400 / s) * DelaySystem.delay(0.005)).feedback(), "not stable"),
-    ],
-)
+@pytest.mark.parametrize(("system", "message"), [
+    (1 / (s - 1), "not stable"),
+    (1 / s, "integrates"),
+    (1 / (s**2 + 1), "not stable"),
+    (s / (s + 1), "zero"),
+    (control.tf([1], [1, -1.1], 0.1), "not stable"),
+    ((DelaySystem.from_system(400 / s) * DelaySystem.delay(0.005)).feedback(), "not stable"),
+])  # fmt: skip
 def test_refusals(system: control.LTI, message: str) -> None:
     refused(step_figures, system, match=message)
 
@@ -110,20 +107,17 @@ def test_F2_three_integrators_start_at_minus_270(loop: control.LTI) -> None:
     assert unwrapped_phase_deg(loop, [1e-4, 1.0, 1e4]) == pytest.approx([-270.0] * 3, abs=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("loop", "start", "end"),
-    [
-        (-1 / (s + 1), -180, -270),
-        (1 / (s - 2), -180, -90),
-        ((1 - s) / (1 + s), 0, -180),
-        ((s - 1) / (s + 1), -180, -360),
-        (1 / (s**2 + 1e-9 * s + 1), 0, -180),
-        (1 / (s**2 + 1), 0, -180),
-        (1 / (s**2 - 0.1 * s + 1), 0, 180),
-        ((s**2 + 1) / (s + 1) ** 4, 0, -180),
-        (10 / (s * (s + 1) ** 4), -90, -450),
-    ],
-)
+@pytest.mark.parametrize(("loop", "start", "end"), [
+    (-1 / (s + 1), -180, -270),
+    (1 / (s - 2), -180, -90),
+    ((1 - s) / (1 + s), 0, -180),
+    ((s - 1) / (s + 1), -180, -360),
+    (1 / (s**2 + 1e-9 * s + 1), 0, -180),
+    (1 / (s**2 + 1), 0, -180),
+    (1 / (s**2 - 0.1 * s + 1), 0, 180),
+    ((s**2 + 1) / (s + 1) ** 4, 0, -180),
+    (10 / (s * (s + 1) ** 4), -90, -450),
+])  # fmt: skip
 def test_start_and_end(loop: control.LTI, start: float, end: float) -> None:
     for form in (loop, control.ss(loop)):
         assert unwrapped_phase_deg(form, [1e-5, 1e7]) == pytest.approx([start, end], abs=0.02)

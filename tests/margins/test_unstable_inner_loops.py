@@ -211,9 +211,7 @@ def test_small_coefficients_of_a_numerator_stay_where_a_delay_is_joined() -> Non
     (3.0, (1.0, 3.0), 0.3212380417677561), (5.0, (1.0, 5.0), 0.02), (8.0, (2.0, 4.0), 0.9),
     (60.0, (2.0, 5.0), 0.05), (60.0, (2.0, 5.0), 0.01),
 ])  # fmt: skip
-def test_two_integrators_that_cancel_behind_a_series_delay(
-    gain: float, poles: tuple[float, float], delay_s: float
-) -> None:
+def test_two_integrators_that_cancel_behind_a_series_delay(gain, poles, delay_s) -> None:
     """K s^2/(s^3 (s + a)(s + b)) exp(-s T): seen is K/(s (s + a)(s + b)), whose phase only falls."""
     a, b = poles
     loop = control.tf([gain, 0.0, 0.0], np.polymul([1.0, a + b, a * b], [1.0, 0.0, 0.0, 0.0]))

@@ -260,16 +260,12 @@ def test_old_reports_go_and_old_figures_stay(nights) -> None:
     assert "between 10.00 and 17.00 over 8 nights" in page
 
 
-@pytest.mark.parametrize(
-    ("jobs", "words"),
-    [
-        ([Job(name=str(k)) for k in range(NIGHTLY_JOBS.most + 1)], f"at most {NIGHTLY_JOBS.most}"),
-        ([job("a"), job("a")], "used twice"),
-        ([job("a" * 20001)], "at most 20000 allowed"),
-        *(([job(name)], "a name needs at least one sign") for name in ("", " \n", "\ud800")),
-    ],
-    ids=["too many", "twice", "too long", "empty", "blank", "half a sign"],
-)
+@pytest.mark.parametrize(("jobs", "words"), [
+    ([Job(name=str(k)) for k in range(NIGHTLY_JOBS.most + 1)], f"at most {NIGHTLY_JOBS.most}"),
+    ([job("a"), job("a")], "used twice"),
+    ([job("a" * 20001)], "at most 20000 allowed"),
+    *(([job(name)], "a name needs at least one sign") for name in ("", " \n", "\ud800")),
+], ids=["too many", "twice", "too long", "empty", "blank", "half a sign"])  # fmt: skip
 def test_a_study_that_cannot_be_is_refused_with_the_limit(tmp_path, jobs: list[Job], words: str) -> None:
     refused(run_night, study(*jobs), tmp_path / "s", INLINE, code=CODE, words=words)
     assert not (tmp_path / "s").exists()

@@ -62,14 +62,11 @@ def test_the_cache_gives_back_what_it_was_given(tmp_path) -> None:
     assert cache.read("cd34") is None
 
 
-@pytest.mark.parametrize(
-    "damage",
-    [
-        *(lambda data, k=k: data[:k] + bytes([data[k] ^ 1]) + data[k:][1:] for k in (0, 10, 60, 120, -1)),
-        *(lambda data, size=size: data[:size] for size in (0, 1, 50, 200, -1)),
-        lambda _: sealed("ab34", {}, {"report.html": b"x"}),
-    ],
-)
+@pytest.mark.parametrize("damage", [
+    *(lambda data, k=k: data[:k] + bytes([data[k] ^ 1]) + data[k:][1:] for k in (0, 10, 60, 120, -1)),
+    *(lambda data, size=size: data[:size] for size in (0, 1, 50, 200, -1)),
+    lambda _: sealed("ab34", {}, {"report.html": b"x"}),
+])  # fmt: skip
 def test_an_entry_that_is_damaged_or_another_s_is_neither_read_nor_kept(tmp_path, damage) -> None:
     cache = Cache(tmp_path)
     data = sealed("ab12", {}, {"report.html": b"x"})

@@ -176,16 +176,13 @@ def test_nights_of_real_designs_their_approval_and_a_report_as_pdf(tmp_path, cli
     cli.refused("pdf", tmp_path / "no.json")
 
 
-@pytest.mark.parametrize(
-    ("table", "expected"),
-    [
-        ("nightly = 1", "nightly: must be a table"),
-        ("[nightly]\npdff = true", 'nightly.pdff: unknown key; did you mean "pdf"? Allowed: pdf, tolerance'),
-        ("[nightly]\npdf = 1", "nightly.pdf = 1: true or false"),
-        ("[nightly]\ntolerance = 3", "nightly.tolerance: must be a table"),
-        ('[nightly.tolerance]\n"*" = "much"', "a number of at least 0"),
-    ],
-)
+@pytest.mark.parametrize(("table", "expected"), [
+    ("nightly = 1", "nightly: must be a table"),
+    ("[nightly]\npdff = true", 'nightly.pdff: unknown key; did you mean "pdf"? Allowed: pdf, tolerance'),
+    ("[nightly]\npdf = 1", "nightly.pdf = 1: true or false"),
+    ("[nightly]\ntolerance = 3", "nightly.tolerance: must be a table"),
+    ('[nightly.tolerance]\n"*" = "much"', "a number of at least 0"),
+])  # fmt: skip
 def test_a_wrong_nightly_table_is_told_in_one_line(tmp_path, table: str, expected: str) -> None:
     path = tmp_path / "s.toml"
     path.write_text(f'{table}\n[study]\nbase = "emps"\n')

@@ -98,14 +98,11 @@ def test_the_running_drive_and_the_facts_have_its_difference_equation(b: Any, a:
     assert ratio == pytest.approx(sum(b) / (1 + sum(a)), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "allowed"),
-    [
-        ("a", (1.0, 0.5, 0.2), "1 or 2, a1 a2, after a leading 1"),
-        ("a", (-2.1, 1.0), "poles inside the unit circle"),
-        ("b", (1.0, 2.0, 3.0, 4.0), "1 to 3, b0 b1 b2"),
-    ],
-)
+@pytest.mark.parametrize(("key", "value", "allowed"), [
+    ("a", (1.0, 0.5, 0.2), "1 or 2, a1 a2, after a leading 1"),
+    ("a", (-2.1, 1.0), "poles inside the unit circle"),
+    ("b", (1.0, 2.0, 3.0, 4.0), "1 to 3, b0 b1 b2"),
+])  # fmt: skip
 def test_a_refusal_names_file_key_and_what_is_allowed(tmp_path, key: str, value: Any, allowed: str) -> None:
     """In a file; one made in Python is refused alike."""
     given = {"b": (1.0,), "a": (0.0,), key: value}

@@ -89,13 +89,10 @@ def test_every_command_is_told_and_begins_at_its_start(kind: str, run, cli) -> N
         assert np.abs(reference[1000:1200]).max() > 0.0
 
 
-@pytest.mark.parametrize(
-    ("words", "seconds", "rising"),
-    [
-        ("sine --frequency 4 --cycles 3 --start 0.1", 0.1 + 3 / 4, 2),
-        ("stepped-sine --frequency 5 --to 10 --count 2 --cycles 3", 3 / 5 + 3 / 10, 5),
-    ],
-)
+@pytest.mark.parametrize(("words", "seconds", "rising"), [
+    ("sine --frequency 4 --cycles 3 --start 0.1", 0.1 + 3 / 4, 2),
+    ("stepped-sine --frequency 5 --to 10 --count 2 --cycles 3", 3 / 5 + 3 / 10, 5),
+])  # fmt: skip
 def test_cycles_are_those_played(words: str, seconds: float, rising: int, run) -> None:
     """The first period begins at zero: one rising crossing less than there are periods."""
     facts, rows = run(f"--amplitude 0.05 --command {words}")
@@ -197,21 +194,18 @@ def test_words_have_the_unit(stages: tuple[str, ...], unit: str, tmp_path, cli) 
     assert any(row[:2] == ["largest", "error"] and row[3:] == [unit] for row in rows)
 
 
-@pytest.mark.parametrize(
-    ("drive", "words", "most"),
-    [
-        (VOLTAGE, "--amplitude 6 --duration 0.3", 1e-9),
-        (CURRENT, "--amplitude 1 --duration 0.3", 1e-9),
-        (SPEED, "--amplitude 20 --duration 0.3", 1e-9),
-        ("ilr33-amber", "--command step --amplitude 1 --duration 10", 1e-9),
-        ("ballscrew", "--command chirp --amplitude 1 --duration 0.5", 1e-9),
-        ("joint", "--command step --amplitude 1 --duration 0.5", 1e-9),
-        ("emps", "--command step --amplitude 1 --duration 0.3", 1e-9),
-        # a drive with friction that a load makes: without its load the record would not be met
-        ("ilr33-amber", "--command multisine --frequency 2 --to 6 --count 3 --load 1 --amplitude 0.5 "
-         "--duration 0.5 --load-slope -5 --load-file LOAD", 1e-6),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("drive", "words", "most"), [
+    (VOLTAGE, "--amplitude 6 --duration 0.3", 1e-9),
+    (CURRENT, "--amplitude 1 --duration 0.3", 1e-9),
+    (SPEED, "--amplitude 20 --duration 0.3", 1e-9),
+    ("ilr33-amber", "--command step --amplitude 1 --duration 10", 1e-9),
+    ("ballscrew", "--command chirp --amplitude 1 --duration 0.5", 1e-9),
+    ("joint", "--command step --amplitude 1 --duration 0.5", 1e-9),
+    ("emps", "--command step --amplitude 1 --duration 0.3", 1e-9),
+    # a drive with friction that a load makes: without its load the record would not be met
+    ("ilr33-amber", "--command multisine --frequency 2 --to 6 --count 3 --load 1 --amplitude 0.5 "
+     "--duration 0.5 --load-slope -5 --load-file LOAD", 1e-6),
+])  # fmt: skip
 def test_its_own_record_correlates(drive, words: str, most: float, run, tmp_path, cli) -> None:
     """A record of the same drive under the same command: the same run, to the last digits of the file."""
     bare, k = not isinstance(drive, str), np.arange(31)

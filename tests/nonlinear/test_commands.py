@@ -31,20 +31,16 @@ def run(controller: dict[str, None], **parts: dict[str, float]) -> object:
     return simulate(changed(AMBER, controller=controller, **parts), commands.hold(), 0.01)
 
 
-@pytest.mark.parametrize(
-    ("command", "expected"),
-    [
-        (commands.sine(2.0, 3.0, 0.4, 0.5), np.where(T >= 0.5, 2 * np.sin(6 * np.pi * (T - 0.5) + 0.4), 0)),
-        (commands.ramp(2.0, 0.3, 0.8), 2.0 * np.clip(T - 0.3, 0.0, 0.5)),
-        (commands.step(1.5, 0.25), np.where(T >= 0.25, 1.5, 0.0)),
-        (commands.hold(0.7), np.full(T.size, 0.7)),
-        (commands.triangle(2.0, 4.0), 2.0 * signal.sawtooth(8 * np.pi * T + np.pi / 2, 0.5)),
-        (commands.chirp(1.0, 1.0, 20.0, 2.0), signal.chirp(T, 1.0, 2.0, 20.0, "logarithmic", -90.0)),
-        (commands.chirp(1.0, 1.0, 20.0, 2.0, logarithmic=False), signal.chirp(T, 1.0, 2.0, 20.0, phi=-90.0)),
-        (commands.sampled([0.0, 1.0, 2.0], [0.0, 3.0, 1.0]), np.interp(T, [0, 1, 2], [0, 3, 1])),
-    ],
-    ids=lambda value: value.kind if isinstance(value, Command) else "",
-)
+@pytest.mark.parametrize(("command", "expected"), [
+    (commands.sine(2.0, 3.0, 0.4, 0.5), np.where(T >= 0.5, 2 * np.sin(6 * np.pi * (T - 0.5) + 0.4), 0)),
+    (commands.ramp(2.0, 0.3, 0.8), 2.0 * np.clip(T - 0.3, 0.0, 0.5)),
+    (commands.step(1.5, 0.25), np.where(T >= 0.25, 1.5, 0.0)),
+    (commands.hold(0.7), np.full(T.size, 0.7)),
+    (commands.triangle(2.0, 4.0), 2.0 * signal.sawtooth(8 * np.pi * T + np.pi / 2, 0.5)),
+    (commands.chirp(1.0, 1.0, 20.0, 2.0), signal.chirp(T, 1.0, 2.0, 20.0, "logarithmic", -90.0)),
+    (commands.chirp(1.0, 1.0, 20.0, 2.0, logarithmic=False), signal.chirp(T, 1.0, 2.0, 20.0, phi=-90.0)),
+    (commands.sampled([0.0, 1.0, 2.0], [0.0, 3.0, 1.0]), np.interp(T, [0, 1, 2], [0, 3, 1])),
+], ids=lambda value: value.kind if isinstance(value, Command) else "")  # fmt: skip
 def test_values(command: Command, expected: np.ndarray) -> None:
     np.testing.assert_allclose(command.values(TS, T.size), expected, atol=1e-9)
 
@@ -77,43 +73,40 @@ def test_stepped_sine_joins_whole_periods_and_a_multisine_has_its_lines_and_its_
         refused(commands.multisine, 0.3, wrong, 1.0, 1e-4, match=words)
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: commands.sine(1.0, 0.0), "frequency_hz = 0.0: must be positive"),
-        (lambda: commands.step(float("nan")), "amplitude_rad = nan"),
-        (lambda: commands.ramp(1.0, 1.0, 0.5), "must be later"),
-        (lambda: commands.multisine(1.0, [], 1.0, TS), "at least one frequency"),
-        (lambda: commands.sampled([0.0, 1.0], [0.0]), "equal numbers"),
-        (lambda: loads.series([0.0, 1.0], ["a", "b"]), "values = .*must be numbers, in SI"),
-        (lambda: Drive("ilr33-amber").step(float("nan")), "command = nan: must be a finite number"),
-        (lambda: Drive("ilr33-amber").step(None), "command = None: must be a finite number"),
-        (lambda: Drive("ilr33-amber").step("x"), "command = 'x': must be a finite number"),
-        (lambda: Drive("ilr33-amber").step(0.0, np.inf), "load_Nm = inf: must be a finite number"),
-        (lambda: simulate("ilr33-amber", None, 0.1), "None: allowed: a Command"),
-        (lambda: commands.sampled([0.0, 0.0], [0.0, 1.0]), "must be later than"),
-        (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
-        (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
-        (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
-        (lambda: read_columns(Path("r.csv"), ("t", "a")), 'line 3, column 2 = "x"'),
-        (lambda: read_columns(Path("r.csv"), ("b",)), 'no column "b"; there are "t", "a"'),
-        (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm, m"),
-        (lambda: loads.constant(float("inf")), "finite"),
-        (lambda: loads.proportional(float("nan")), "finite"),
-        (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
-        (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
-        (lambda: simulate_many([]), "at least one"),
-        (lambda: simulate_many([Run(**SHORT, reducers=Reducers(window_ticks=800))]), "must fit twice"),
-        (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
-        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="i_ref")]), "no such stage"),
-        (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="u")] * 2), "one a point"),
-        (lambda: Probe(point="v"), "must be one of"),
-        (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
-        (lambda: run(TORQUE, command={"rate_rad_s": 1.0}), "need a position or a velocity loop"),
-        (lambda: run({}, command={"acceleration_rad_s2": 1.0, "jerk_rad_s3": 1e-4}), "a mean over"),
-        (lambda: run({"current": None}, limits={"peak_time_s": 1.0}), "needs a current loop"),
-    ],
-)
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: commands.sine(1.0, 0.0), "frequency_hz = 0.0: must be positive"),
+    (lambda: commands.step(float("nan")), "amplitude_rad = nan"),
+    (lambda: commands.ramp(1.0, 1.0, 0.5), "must be later"),
+    (lambda: commands.multisine(1.0, [], 1.0, TS), "at least one frequency"),
+    (lambda: commands.sampled([0.0, 1.0], [0.0]), "equal numbers"),
+    (lambda: loads.series([0.0, 1.0], ["a", "b"]), "values = .*must be numbers, in SI"),
+    (lambda: Drive("ilr33-amber").step(float("nan")), "command = nan: must be a finite number"),
+    (lambda: Drive("ilr33-amber").step(None), "command = None: must be a finite number"),
+    (lambda: Drive("ilr33-amber").step("x"), "command = 'x': must be a finite number"),
+    (lambda: Drive("ilr33-amber").step(0.0, np.inf), "load_Nm = inf: must be a finite number"),
+    (lambda: simulate("ilr33-amber", None, 0.1), "None: allowed: a Command"),
+    (lambda: commands.sampled([0.0, 0.0], [0.0, 1.0]), "must be later than"),
+    (lambda: commands.sampled([0.0, 1.0, 2.0], [0.0, np.nan, 1.0]), "angle in row 2"),
+    (lambda: commands.sampled([0.0, 1.0, 2.0, 4.0], [0.0] * 4), "hole in time from 2 s to 4 s"),
+    (lambda: commands.recorded("nowhere.csv"), "nowhere.csv: cannot be read: no such file"),
+    (lambda: read_columns(Path("r.csv"), ("t", "a")), 'line 3, column 2 = "x"'),
+    (lambda: read_columns(Path("r.csv"), ("b",)), 'no column "b"; there are "t", "a"'),
+    (lambda: commands.recorded("x.csv", unit="furlong"), "must be deg, rad, mm, m"),
+    (lambda: loads.constant(float("inf")), "finite"),
+    (lambda: loads.proportional(float("nan")), "finite"),
+    (lambda: loads.series([0.0, 1.0, 5.0, 6.0], [0.0] * 4), "hole in time"),
+    (lambda: loads.series([-2.0, -1.0], [1.0, 1.0]), "must be 0 or later"),
+    (lambda: simulate_many([]), "at least one"),
+    (lambda: simulate_many([Run(**SHORT, reducers=Reducers(window_ticks=800))]), "must fit twice"),
+    (lambda: Reducers(harmonics=40).write(np.zeros(layout.SIZE)), "harmonics"),
+    (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="i_ref")]), "no such stage"),
+    (lambda: simulate("emps", commands.hold(), 0.1, probes=[Probe(point="u")] * 2), "one a point"),
+    (lambda: Probe(point="v"), "must be one of"),
+    (lambda: Probe(point="u", delay_samples=-1.0), "zero or more"),
+    (lambda: run(TORQUE, command={"rate_rad_s": 1.0}), "need a position or a velocity loop"),
+    (lambda: run({}, command={"acceleration_rad_s2": 1.0, "jerk_rad_s3": 1e-4}), "a mean over"),
+    (lambda: run({"current": None}, limits={"peak_time_s": 1.0}), "needs a current loop"),
+])  # fmt: skip
 def test_refusals(make: Callable[[], object], words: str, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("r.csv").write_text("t,a\n0,1\n1,x\n")

@@ -54,17 +54,14 @@ def test_pieces_of_a_run_are_the_run_and_the_same_state_has_the_same_end() -> No
     assert rest.error == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("command", "held"),
-    [
-        (commands.step(0.01), True),
-        (commands.ramp(0.1), False),
-        (commands.ramp(0.1, stop_s=0.05), True),
-        (commands.sine(0.01, 2.0), False),
-        (commands.sampled([0.0, 0.05], [0.0, 0.01]), True),
-        (commands.step(0.01, start_s=0.2), False),
-    ],
-)
+@pytest.mark.parametrize(("command", "held"), [
+    (commands.step(0.01), True),
+    (commands.ramp(0.1), False),
+    (commands.ramp(0.1, stop_s=0.05), True),
+    (commands.sine(0.01, 2.0), False),
+    (commands.sampled([0.0, 0.05], [0.0, 0.01]), True),
+    (commands.step(0.01, start_s=0.2), False),
+])  # fmt: skip
 def test_only_what_stays_is_judged(command: commands.Command, held: bool) -> None:
     rest = judge(simulate(AMBER, command, 0.1).running)
     assert (rest is not None) == held

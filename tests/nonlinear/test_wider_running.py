@@ -63,14 +63,11 @@ def test_slope_gravity_series_and_constant_act_together_and_are_held() -> None:
     assert expected < 0.99
 
 
-@pytest.mark.parametrize(
-    "supply",
-    [
-        model.Supply(resistance_ohm=0.1),
-        model.Supply(resistance_ohm=0.1, regenerative=False, capacitance_F=2e-4, brake_voltage_V=27.0),
-        model.Supply(regenerative=False, capacitance_F=1e-3),
-    ],
-)
+@pytest.mark.parametrize("supply", [
+    model.Supply(resistance_ohm=0.1),
+    model.Supply(resistance_ohm=0.1, regenerative=False, capacitance_F=2e-4, brake_voltage_V=27.0),
+    model.Supply(regenerative=False, capacitance_F=1e-3),
+])  # fmt: skip
 def test_supply(supply: model.Supply) -> None:
     """The bus by its law from recorded voltage and current, its account, and the limit that it is."""
     design = replace(AMBER, supply=supply, limits=model.Limits(voltage_V=24.0, peak_current_A=8.0))

@@ -70,9 +70,7 @@ def test_an_axis_places_its_ends_and_what_lies_between(low, ratio, part, log, re
 
 
 @pytest.mark.parametrize("before", [True, False])
-def test_limits_follow_the_values_that_an_axis_has_a_place_for_whenever_its_kind_is_said(
-    before: bool,
-) -> None:
+def test_limits_follow_the_values_that_an_axis_has_a_place_for_whenever_its_kind_is_said(before) -> None:
     panel = Chart().panel()
     panel.curve([1.0, 1.0], [5.0, 5.0])
     (x0, x1), (y0, y1) = panel.x.span(), panel.y.span()

@@ -36,16 +36,13 @@ def holding(blocks: list[Any], **section: Any) -> str:
     return json.dumps(made(sections=[doc.section("x", "X", blocks, **section)]))
 
 
-@pytest.mark.parametrize(
-    ("passed", "waiver", "word", "lines"),
-    [
-        ((True, None), "", "not proven", [("1 of 2 requirements met, 1 not proven", "warn")]),
-        ((True, None), "waived", "met", [("1 of 2 requirements met, 1 waived", "pass")]),
-        ((None,), "waived", "met", [("0 of 1 requirements met, 1 waived", "info")]),
-        ((None, False), "waived", "not met", [("0 of 2 requirements met, 1 not met, 1 waived", "fail")]),
-        ((), "", "met", [("the design states no requirements", "info")]),
-    ],
-)
+@pytest.mark.parametrize(("passed", "waiver", "word", "lines"), [
+    ((True, None), "", "not proven", [("1 of 2 requirements met, 1 not proven", "warn")]),
+    ((True, None), "waived", "met", [("1 of 2 requirements met, 1 waived", "pass")]),
+    ((None,), "waived", "met", [("0 of 1 requirements met, 1 waived", "info")]),
+    ((None, False), "waived", "not met", [("0 of 2 requirements met, 1 not met, 1 waived", "fail")]),
+    ((), "", "met", [("the design states no requirements", "info")]),
+])  # fmt: skip
 def test_not_proven_is_neither_good_nor_passed_unless_it_is_waived(passed, waiver, word, lines):
     items = [judged(f"v{k}", one) | {"waiver": waiver * (one is None)} for k, one in enumerate(passed)]
     result = verdict_of([doc.section("one", "One", [doc.verdicts(items)])], "report")
@@ -60,20 +57,17 @@ REFUTED = doc.section("two", "Two", [doc.verdicts([judged("d", False)], what="ch
 GOOD = doc.section("one", "One", [doc.verdicts([judged("a", True)])])
 
 
-@pytest.mark.parametrize(
-    ("parts", "kind", "word", "said"),
-    [
-        ([*made()["sections"], CHECKED], "report", "not met",  # wherever they stand
-         ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]),
-        ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
-        ([REFUTED], "report", "not met",  # what decides it first
-         ["0 of 1 checks by simulation met, 1 not met", "the design states no requirements"]),
-        ([OPEN], "compare", "not proven", ["not proven: Margins"]),
-        ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
-        ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide
-        (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("parts", "kind", "word", "said"), [
+    ([*made()["sections"], CHECKED], "report", "not met",  # wherever they stand
+     ["1 of 3 requirements met, 1 not met, 1 not proven", "1 of 1 checks by simulation met"]),
+    ([OPEN], "report", "not proven", ["not proven: Margins", "the design states no requirements"]),
+    ([REFUTED], "report", "not met",  # what decides it first
+     ["0 of 1 checks by simulation met, 1 not met", "the design states no requirements"]),
+    ([OPEN], "compare", "not proven", ["not proven: Margins"]),
+    ([GOOD, BARE], "report", "not met", ["failed: Missing parts", "1 of 1 requirements met"]),
+    ([GOOD, BARE], "validation", "met", ["1 of 1 requirements met"]),  # its own verdicts decide
+    (made()["sections"], "report", "not met", ["1 of 3 requirements met, 1 not met, 1 not proven"]),
+])  # fmt: skip
 def test_a_document_is_as_good_as_its_worst_part(parts: list[Any], kind: str, word: str, said: list[str]):
     """A section that has failed or is open by itself counts; one whose verdict fails is not said twice."""
     whole = doc.document(title="T", subtitle="", design={}, provenance={}, sections=parts, kind=kind)
@@ -89,20 +83,17 @@ def test_what_json_cannot_hold_becomes_null_or_is_refused() -> None:
         doc.plain([1j])
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("{", "not JSON"),
-        ("[" * 100_000, "nested too deeply"),
-        ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
-        ("[]", "schema must be"),
-        (json.dumps({"schema": doc.SCHEMA, "version": 1, "sections": []}), "version = 1"),
-        (holding([{"kind": "magic"}]), r"sections\[1\].blocks\[1\].*'magic' found using 'kind'"),
-        (holding([{"kind": "text"}]), r"sections\[1\].blocks\[1\].text: field required"),
-        (holding([], status="good"), r"sections\[1\].status = \"good\": .*'pass', 'fail'"),
-        (json.dumps(made(sections=[doc.section("x", "X", [])] * 2)), 'section "x" occurs twice'),
-    ],
-)
+@pytest.mark.parametrize(("content", "words"), [
+    ("{", "not JSON"),
+    ("[" * 100_000, "nested too deeply"),
+    ('{"schema": "actuator-lti/report", "version": NaN}', "NaN is not allowed"),
+    ("[]", "schema must be"),
+    (json.dumps({"schema": doc.SCHEMA, "version": 1, "sections": []}), "version = 1"),
+    (holding([{"kind": "magic"}]), r"sections\[1\].blocks\[1\].*'magic' found using 'kind'"),
+    (holding([{"kind": "text"}]), r"sections\[1\].blocks\[1\].text: field required"),
+    (holding([], status="good"), r"sections\[1\].status = \"good\": .*'pass', 'fail'"),
+    (json.dumps(made(sections=[doc.section("x", "X", [])] * 2)), 'section "x" occurs twice'),
+])  # fmt: skip
 def test_a_page_is_not_made_of_a_broken_document(content: str, words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         doc.loads(content, "some.json")
@@ -121,19 +112,16 @@ def test_a_verdict_that_is_not_that_of_its_sections_is_refused(change: dict[str,
     refused(doc.load, path, words="report.json: verdict")
 
 
-@pytest.mark.parametrize(
-    ("place", "value", "words"),
-    [
-        (("columns",), [], "columns: a chart has at least one"),
-        (("columns", 0, "heights"), [0], r"columns\.0\.heights\.0: input should be greater than 0"),
-        (("columns", 0, "panels", 0, "x", "seen"), [-1e308, 1e308], "OverflowError"),
-        ((*CURVE, "x"), [], "ValueError"),
-        ((*CURVE, "y"), [1.0], "ValueError"),
-        ((*CURVE, "x"), ["a", 1, 2], r"columns\.0\.panels\.0\.items\.0\.curve\.x: .*'a'"),
-        ((*CURVE, "look"), {"marker": "?"}, "KeyError"),
-        ((*CURVE, "look"), {"colour": 'red"/><b>'}, r"columns\..*\.look\.colour: .*allowed: ink"),
-    ],
-)
+@pytest.mark.parametrize(("place", "value", "words"), [
+    (("columns",), [], "columns: a chart has at least one"),
+    (("columns", 0, "heights"), [0], r"columns\.0\.heights\.0: input should be greater than 0"),
+    (("columns", 0, "panels", 0, "x", "seen"), [-1e308, 1e308], "OverflowError"),
+    ((*CURVE, "x"), [], "ValueError"),
+    ((*CURVE, "y"), [1.0], "ValueError"),
+    ((*CURVE, "x"), ["a", 1, 2], r"columns\.0\.panels\.0\.items\.0\.curve\.x: .*'a'"),
+    ((*CURVE, "look"), {"marker": "?"}, "KeyError"),
+    ((*CURVE, "look"), {"colour": 'red"/><b>'}, r"columns\..*\.look\.colour: .*allowed: ink"),
+])  # fmt: skip
 def test_a_figure_that_cannot_be_drawn_is_refused_where_it_is_read(place, value, words, tmp_path):
     chart = Chart()
     chart.panel().curve([0.0, 1.0, 2.0], [3.0, None, 4.0], "k")

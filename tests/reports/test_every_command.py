@@ -69,24 +69,21 @@ def test_json_of_commands_that_write(tmp_path, cli) -> None:
 POSITION = "control.position.gain"
 
 
-@pytest.mark.parametrize(
-    ("words", "first"),
-    [
-        (f"margins --set {POSITION}=9000/s", "FAIL  ilr33-amber: not stable: Position loop. "),
-        (
-            f"margins --set {POSITION}=1560/s",
-            "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: ",
-        ),
-        ("stiffness", "PASS  "),
-        ("corners fin", "FAIL  "),
-        ("duty joint", "PASS  "),
-        ("cycles ballscrew", "PASS  "),
-        (f"compare ilr33-amber --no-validate --quiet --set {POSITION}=1560/s", "FAIL  "),
-        (f"simulate --no-limits --duration 0.03 --set {POSITION}=9000/s", "FAIL  "),
-        ("tune --no-curve --quiet --require position.bandwidth>=2000Hz", "FAIL  "),
-    ],
-    ids=lambda words: words.split()[0],
-)
+@pytest.mark.parametrize(("words", "first"), [
+    ("margins", "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."),
+    (f"margins --set {POSITION}=9000/s", "FAIL  ilr33-amber: not stable: Position loop. "),
+    (
+        f"margins --set {POSITION}=1560/s",
+        "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: ",
+    ),
+    ("stiffness", "PASS  "),
+    ("corners fin", "FAIL  "),
+    ("duty joint", "PASS  "),
+    ("cycles ballscrew", "PASS  "),
+    (f"compare ilr33-amber --no-validate --quiet --set {POSITION}=1560/s", "FAIL  "),
+    (f"simulate --no-limits --duration 0.03 --set {POSITION}=9000/s", "FAIL  "),
+    ("tune --no-curve --quiet --require position.bandwidth>=2000Hz", "FAIL  "),
+], ids=lambda words: words.split()[0])  # fmt: skip
 def test_the_first_line_is_the_verdict(words: str, first: str, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "80")
@@ -157,15 +154,6 @@ def test_a_key_is_never_cut(word: str, width: int, monkeypatch, cli) -> None:
 def test_help_is_not_cut_at_80_columns(command: str, monkeypatch, cli) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     assert "…" not in cli.text(command, "--help")
-
-
-@pytest.mark.parametrize("width", [60, 80, 120])
-def test_margins_say_the_verdict_first_and_fit(width: int, monkeypatch, cli) -> None:
-    monkeypatch.setenv("COLUMNS", str(width))
-    first, *rest = cli.text("margins", "ilr33-amber").splitlines()
-    assert first == "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."
-    assert max(map(len, rest)) <= width
-    assert sum(line.count("✓ met") for line in rest) == 12
 
 
 def test_the_program_runs_as_a_module() -> None:

@@ -114,16 +114,13 @@ def test_a_drive_that_its_load_drives_away_is_judged_as_it_is() -> None:
         assert {figures[name].sound for name in ("current", "velocity")} == {stable}
 
 
-@pytest.mark.parametrize(
-    ("design", "held", "verdict"),
-    [
-        (falling_friction(), ["current"], "met"),
-        (on_a_spring(), ["current"], "met"),
-        (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
-        # nothing around the current loop stops the load that pushes away
-        (pushed(requirements=(), controller={"position": None, "velocity": None}), [], "not met"),
-    ],
-)
+@pytest.mark.parametrize(("design", "held", "verdict"), [
+    (falling_friction(), ["current"], "met"),
+    (on_a_spring(), ["current"], "met"),
+    (replace(p_velocity(1.0), requirements=()), ["current", "velocity"], "met"),
+    # nothing around the current loop stops the load that pushes away
+    (pushed(requirements=(), controller={"position": None, "velocity": None}), [], "not met"),
+])  # fmt: skip
 def test_margins_and_validate_judge_the_same_loops(design: Design, held: list[str], verdict: str) -> None:
     found, checked = margins(design), validate(design, QUICK)
     assert [name for name, one in found.loops.items() if one.held is not None] == held

@@ -7,11 +7,10 @@ goes through ``margins``, whose figures are those of the linear form, found with
 import math
 from dataclasses import replace
 from html import unescape
-from pathlib import Path
 
 import numpy as np
 import pytest
-from live_page import AMBER, HOSTILE, Browser, Page, command_line, page_text, same_figures, written
+from live_page import AMBER, Page, command_line, page_text, same_figures, written
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import Design, check_design, with_values
@@ -182,14 +181,6 @@ def test_a_dropped_response_is_laid_over_the_loop(page: Page) -> None:
     assert page.locator('[data-chart="difference"]').is_hidden()
 
 
-def test_nothing_of_a_design_becomes_markup(opens) -> None:
-    design = replace(AMBER, name=HOSTILE, title=HOSTILE, description=HOSTILE)
-    result = opens(design)
-    result.type_value("control.position.gain", 130.0)
-    result.click('[data-do="file"]')
-    assert HOSTILE.split("\u202e")[0].split('"')[0] in result.input_value(".sheet textarea")
-
-
 def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     small = opens(AMBER, viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
     assert small.evaluate("document.documentElement.scrollWidth") <= 390
@@ -199,9 +190,7 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
-def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(
-    browser: Browser, tmp_path: Path
-) -> None:
+def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(browser, tmp_path):
     page = browser.new_context(offline=True, java_script_enabled=False).new_page()
     page.goto(written(AMBER, tmp_path).as_uri())
     assert page.locator("#hands-on").is_hidden()

@@ -99,30 +99,27 @@ def test_the_command_line_judges_it(tmp_path, cli) -> None:
     assert around["stable"] is False
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"dt": None}, "dt: missing"),
-        ({"dt": -1.0}, "dt: allowed: a time in s"),
-        ({"dt": True}, "dt: allowed"),
-        ({"dt": 1.5e-4, "sampling_period": None}, "whole multiples of 0.0001 s"),
-        ({"sampling_period": None}, "sampling_period: missing"),
-        ({"sampling_period": 0.0}, "sampling_period: allowed: a time > 0"),
-        ({"dt": 1e-3}, "sampling_period: allowed: a time > 0 in s, for a continuous"),
-        ({"num": [1.0, 2.0, 3.0]}, "num: of a higher degree"),
-        ({"num": ["a"]}, "num: allowed: a list of numbers"),
-        ({"den": [0.0]}, "num, den: all zero"),
-        ({"den": None}, "allowed: num and den, or A"),
-        ({"A": [[1.0]]}, "allowed: num and den, or A"),
-        ({"gain": 2.0}, "gain: no such key"),
-        ({"sign": 0}, "sign: allowed"),
-        ({"name": ""}, "name: allowed: a text"),
-        ({"num": None, "den": None, "A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]}, "n by n"),
-        ({"num": None, "den": None, "A": [[1.0], [1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]},
-         "A: allowed: a list of rows"),
-        *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "said"), [
+    ({"dt": None}, "dt: missing"),
+    ({"dt": -1.0}, "dt: allowed: a time in s"),
+    ({"dt": True}, "dt: allowed"),
+    ({"dt": 1.5e-4, "sampling_period": None}, "whole multiples of 0.0001 s"),
+    ({"sampling_period": None}, "sampling_period: missing"),
+    ({"sampling_period": 0.0}, "sampling_period: allowed: a time > 0"),
+    ({"dt": 1e-3}, "sampling_period: allowed: a time > 0 in s, for a continuous"),
+    ({"num": [1.0, 2.0, 3.0]}, "num: of a higher degree"),
+    ({"num": ["a"]}, "num: allowed: a list of numbers"),
+    ({"den": [0.0]}, "num, den: all zero"),
+    ({"den": None}, "allowed: num and den, or A"),
+    ({"A": [[1.0]]}, "allowed: num and den, or A"),
+    ({"gain": 2.0}, "gain: no such key"),
+    ({"sign": 0}, "sign: allowed"),
+    ({"name": ""}, "name: allowed: a text"),
+    ({"num": None, "den": None, "A": [[1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]}, "n by n"),
+    ({"num": None, "den": None, "A": [[1.0], [1.0, 2.0]], "B": [[1.0]], "C": [[1.0]], "D": [[0.0]]},
+     "A: allowed: a list of rows"),
+    *((text, "airframe.json") for text in ("", "[1, 2]", "{", '{"num": [NaN]}', '{"dt": 0, "dt": 1}')),
+])  # fmt: skip
 def test_a_bad_file_is_one_line(change: dict | str, said: str, tmp_path, cli) -> None:
     path = tmp_path / "airframe.json"
     if isinstance(change, str):

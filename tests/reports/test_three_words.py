@@ -187,17 +187,14 @@ def test_without_requirements_margins_below_custom_are_named(written, cli) -> No
     assert "position loop, gain margin 3 dB (of 6 dB)" in " ".join(text.split())
 
 
-@pytest.mark.parametrize(
-    ("call", "word"),
-    [
-        (("duty", "joint"), "met"),
-        (("duty", "joint", "--load", "200 N*m"), "not met"),
-        (("duty", "fin"), "not proven"),
-        (("stiffness", "emps"), "met"),
-        (("cycles", "joint"), "not met"),
-        (("corners", "ilr33-amber", "--hot", "400"), "not met"),
-    ],
-)
+@pytest.mark.parametrize(("call", "word"), [
+    (("duty", "joint"), "met"),
+    (("duty", "joint", "--load", "200 N*m"), "not met"),
+    (("duty", "fin"), "not proven"),
+    (("stiffness", "emps"), "met"),
+    (("cycles", "joint"), "not met"),
+    (("corners", "ilr33-amber", "--hot", "400"), "not met"),
+])  # fmt: skip
 def test_terminal_json_page_pdf_and_section_have_one_verdict(call, word: str, tmp_path, cli) -> None:
     said = cli.text(*call, "--out", tmp_path, status=int(word != "met"))
     assert said.startswith(HEADS[word])

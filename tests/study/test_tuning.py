@@ -399,4 +399,3 @@ def test_the_command_places_and_says_so(cli, tmp_path):
     assert [item.kind for item in load_design(tmp_path / "tuned.toml").controller.velocity.filters] == [
         "notch"
     ]
-    assert "spring" in cli.refused("tune", "fin", "--place", "spring", "--quiet")

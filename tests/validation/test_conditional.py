@@ -128,14 +128,11 @@ def test_saturation_gain() -> None:
         assert saturation_gain(saturation_ratio(gain)) == pytest.approx(gain, rel=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("seed", "ending", "limiter"),
-    [
-        (91, "keeps oscillating", "overload"),
-        (333, "diverges", "torque-command"),
-        (3108, "", "voltage"),  # 45 times as large a step was named: an irregular swing, by either word
-    ],
-)
+@pytest.mark.parametrize(("seed", "ending", "limiter"), [
+    (91, "keeps oscillating", "overload"),
+    (333, "diverges", "torque-command"),
+    (3108, "", "voltage"),  # 45 times as large a step was named: an irregular swing, by either word
+])  # fmt: skip
 def test_a_finding_on_a_random_drive_is_that_of_plain_runs(seed: int, ending: str, limiter: str):
     """2 % below the threshold the error dies out, 2 % above it grows beyond the step itself."""
     design = changed(full_drive(seed), encoder={"counts_per_rev": None}, supply=None)

@@ -87,19 +87,16 @@ def _joint_rate(loop: Hysteresis) -> float:
     return 2.0 * 0.6 / 14.4 * 1.5e-3 * 6.0 * 9.80665 * 0.3 * rate
 
 
-@pytest.mark.parametrize(
-    ("name", "load_Nm", "expected", "within"),
-    [
-        ("ilr33-amber", 0.0, lambda loop: 0.0, 0.0),
-        ("emps", 0.0, lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
-        ("ilr33-amber-compliant", 0.0, lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
-        ("ilr33-amber-compliant", 8.0, lambda loop: 2.0 * 0.05 / 1500.0, 1e-9),  # which the load takes out
-        ("ballscrew", 0.0, lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
-        ("joint", 0.0, _joint_rate, 1e-4),
-        # (T0 + C0_l f)/(gain + 30 f), f the motor's torque per torque on the fin, which the moment relieves
-        ("fin", 0.0, lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
-    ],
-)
+@pytest.mark.parametrize(("name", "load_Nm", "expected", "within"), [
+    ("ilr33-amber", 0.0, lambda loop: 0.0, 0.0),
+    ("emps", 0.0, lambda loop: 2.0 * 20.3935 / (35.15065 * 243.45 * 160.18), 1e-9),
+    ("ilr33-amber-compliant", 0.0, lambda loop: 2.0 * 0.05 / 1500.0 + 1e-3, 1e-9),  # at rest in the play
+    ("ilr33-amber-compliant", 8.0, lambda loop: 2.0 * 0.05 / 1500.0, 1e-9),  # which the load takes out
+    ("ballscrew", 0.0, lambda loop: 2.0 * 30.0 / 1e8, 1e-9),
+    ("joint", 0.0, _joint_rate, 1e-4),
+    # (T0 + C0_l f)/(gain + 30 f), f the motor's torque per torque on the fin, which the moment relieves
+    ("fin", 0.0, lambda loop: 2.0 * (0.008 + 0.05 * FIN) / (60 * 0.03 * 0.12 * 110 + 30 * FIN), 2e-3),
+])  # fmt: skip
 def test_what_a_reversal_loses_is_predicted(name, load_Nm, expected, within):
     """Behind a motor's sensor 2 C0_l/k and the play; in front of it the error that friction asks for."""
     design = quiet(load_design(name))

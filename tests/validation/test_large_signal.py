@@ -78,16 +78,13 @@ def test_the_baseline_reverses_too_slowly_for_the_lag() -> None:
         assert 5.0 < run.lag_error_deg < result.reversal_deg
 
 
-@pytest.mark.parametrize(
-    ("name", "changed", "asked", "word"),
-    [
-        ("emps", {}, {}, "no speed limit"),
-        ("ctms-motor-position", {}, {}, "no speed limit"),
-        ("ilr33-amber", {"limits.voltage": 5.6}, {}, "not every load"),
-        # dry friction holds the drive: nothing to compare, and no division by a motion that is none
-        ("ilr33-amber", {}, {"amplitude_rad": 1e-7, "frequency_hz": 1.0}, "stands still"),
-    ],
-)
+@pytest.mark.parametrize(("name", "changed", "asked", "word"), [
+    ("emps", {}, {}, "no speed limit"),
+    ("ctms-motor-position", {}, {}, "no speed limit"),
+    ("ilr33-amber", {"limits.voltage": 5.6}, {}, "not every load"),
+    # dry friction holds the drive: nothing to compare, and no division by a motion that is none
+    ("ilr33-amber", {}, {"amplitude_rad": 1e-7, "frequency_hz": 1.0}, "stands still"),
+])  # fmt: skip
 def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, word: str) -> None:
     result = sawtooth(with_values(load_design(name), changed), **asked)
     assert result.runs == ()
@@ -95,17 +92,14 @@ def test_not_applicable_with_a_reason(name: str, changed: dict, asked: dict, wor
     assert word in result.reason
 
 
-@pytest.mark.parametrize(
-    ("name", "share", "friction_on", "counts", "within"),
-    [
-        # small amplitudes without friction: between the map's frequencies as the linear response goes
-        ("ilr33-amber", 1e-5, False, (6, 40), 5e-6),
-        ("emps", 1e-5, False, (6, 40), 5e-6),
-        # a moment over the angle (the gain at zero frequency is no 1), a limited jerk, a coarse map
-        ("fin", 1.0, True, (2, 14), 1e-4),
-        ("ballscrew", 1.0, True, (2, 14), 1e-4),
-    ],
-)
+@pytest.mark.parametrize(("name", "share", "friction_on", "counts", "within"), [
+    # small amplitudes without friction: between the map's frequencies as the linear response goes
+    ("ilr33-amber", 1e-5, False, (6, 40), 5e-6),
+    ("emps", 1e-5, False, (6, 40), 5e-6),
+    # a moment over the angle (the gain at zero frequency is no 1), a limited jerk, a coarse map
+    ("fin", 1.0, True, (2, 14), 1e-4),
+    ("ballscrew", 1.0, True, (2, 14), 1e-4),
+])  # fmt: skip
 def test_the_linear_bandwidth_is_that_of_the_margins(name, share, friction_on, counts, within):
     design, loops = load_design(name), assemble_loops(name)
     small = changed(design, validation={"full_deflection_rad": share * design.validation.full_deflection_rad})
@@ -163,18 +157,15 @@ def _words(gain_db: list[float]) -> str:
     return _result(result, output_unit("rotary"))
 
 
-@pytest.mark.parametrize(
-    ("gain_db", "words"),
-    [
-        ([0.0, 0.0, np.nan, np.nan], "(linear); at full deflection (10 deg) it is above 2 Hz."),
-        ([0.0, np.nan, -6.0, -9.0], "between 1 and 4 Hz, the points between are not steady."),
-        ([np.nan, np.nan, np.nan, np.nan], "not known: no point is steady."),
-        ([np.nan, -6.0, -9.0, -9.0], "not known: no point below it is steady."),
-        ([-4.0, -6.0, -9.0, -9.0], "falls from 5 Hz (linear) to below 1 Hz at"),
-        ([0.0, 0.0, -6.02059991, -9.0], "falls from 5 Hz (linear) to 2.83 Hz at"),
-        ([0.0, 0.0, 0.0, -6.02059991], "rises from 5 Hz (linear) to 5.66 Hz at"),
-    ],
-)
+@pytest.mark.parametrize(("gain_db", "words"), [
+    ([0.0, 0.0, np.nan, np.nan], "(linear); at full deflection (10 deg) it is above 2 Hz."),
+    ([0.0, np.nan, -6.0, -9.0], "between 1 and 4 Hz, the points between are not steady."),
+    ([np.nan, np.nan, np.nan, np.nan], "not known: no point is steady."),
+    ([np.nan, -6.0, -9.0, -9.0], "not known: no point below it is steady."),
+    ([-4.0, -6.0, -9.0, -9.0], "falls from 5 Hz (linear) to below 1 Hz at"),
+    ([0.0, 0.0, -6.02059991, -9.0], "falls from 5 Hz (linear) to 2.83 Hz at"),
+    ([0.0, 0.0, 0.0, -6.02059991], "rises from 5 Hz (linear) to 5.66 Hz at"),
+])  # fmt: skip
 def test_a_missing_point_is_no_value(gain_db: list[float], words: str) -> None:
     """3.01 dB is half of 6.02: halfway on the logarithm, the root of two times the lower frequency."""
     assert words in _words(gain_db)

@@ -214,13 +214,10 @@ def test_the_bandwidth_of_the_map_is_that_of_the_output() -> None:
     np.testing.assert_allclose(bode.minus3db_hz, bode.linear_minus3db_hz, rtol=1e-5)
 
 
-@pytest.mark.parametrize(
-    ("change", "cause"),
-    [
-        ({}, "other"),  # play
-        ({"coupling": {"play_rad": 0.0}, "friction": Friction(dry_torque_Nm=5e-3)}, "friction"),
-    ],
-)
+@pytest.mark.parametrize(("change", "cause"), [
+    ({}, "other"),  # play
+    ({"coupling": {"play_rad": 0.0}, "friction": Friction(dry_torque_Nm=5e-3)}, "friction"),
+])  # fmt: skip
 def test_cells_are_named_after_friction_only_where_it_acts(change: dict[str, Any], cause: str) -> None:
     causes = {CAUSES[k] for k in mapped(small(changed(drive_f(), **change), 0.02), (6, 8)).cause.ravel()}
     assert cause in causes

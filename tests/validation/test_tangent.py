@@ -12,7 +12,7 @@ from actuator_lti.design.law import LAW_WORDS
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops import Loops, assemble_loops, exact_margins, periodic_loop
 from analyses.validation import CHECKS, validate
-from analyses.validation.bench_sweep import bench_sweep
+from analyses.validation.in_time import bench_sweep
 from analyses.validation.places import Bench
 from analyses.validation.small_signal import nearest_pole, small_signal
 from nonlinear import tangent

@@ -53,19 +53,16 @@ def hunting(step_rad: float, swing_rad: float, hertz: float) -> Settling:
 
 
 @pytest.mark.parametrize("name", ["emps", "fin"])
-@pytest.mark.parametrize(
-    ("ends", "allowed", "waivers", "verdict"),
-    [
-        ("limit cycle", (), (), "not met"),
-        ("limit cycle", (2.0,), (), "met"),
-        ("limit cycle", (0.9,), (), "not met"),
-        ("limit cycle", (2.0, 0.9), (), "not met"),
-        ("still moving", (2.0,), (), "not proven"),
-        ("still moving", (2.0,), (WAIVED,), "met"),
-        ("limit cycle", (0.9,), (WAIVED,), "not met"),
-        ("diverging", (2.0,), (), "not met"),
-    ],
-)
+@pytest.mark.parametrize(("ends", "allowed", "waivers", "verdict"), [
+    ("limit cycle", (), (), "not met"),
+    ("limit cycle", (2.0,), (), "met"),
+    ("limit cycle", (0.9,), (), "not met"),
+    ("limit cycle", (2.0, 0.9), (), "not met"),
+    ("still moving", (2.0,), (), "not proven"),
+    ("still moving", (2.0,), (WAIVED,), "met"),
+    ("limit cycle", (0.9,), (WAIVED,), "not met"),
+    ("diverging", (2.0,), (), "not met"),
+])  # fmt: skip
 def test_who_states_a_swing_that_is_accepted_has_rest_judged_by_it(
     name: str, ends, allowed: tuple[float, ...], waivers: tuple[Waiver, ...], verdict: str, monkeypatch
 ) -> None:
@@ -122,14 +119,11 @@ def test_a_swing_that_nothing_shows_fails_nothing(part: float, hunts: bool) -> N
     assert (validation.hunting is not None) is hunts
 
 
-@pytest.mark.parametrize(
-    ("swing_rad", "motor_rad", "said"),
-    [
-        (0.0, 0.0, "stands still 40 s later; whether it stays is not known"),
-        (1e-5, 1e-5, "still moving 40 s later, by ±0.000573 deg"),
-        (0.0, 1e-5, "still moving 40 s later, by ±0.000573 deg (motor over the ratio, the output at rest)"),
-    ],
-)
+@pytest.mark.parametrize(("swing_rad", "motor_rad", "said"), [
+    (0.0, 0.0, "stands still 40 s later; whether it stays is not known"),
+    (1e-5, 1e-5, "still moving 40 s later, by ±0.000573 deg"),
+    (0.0, 1e-5, "still moving 40 s later, by ±0.000573 deg (motor over the ratio, the output at rest)"),
+])  # fmt: skip
 def test_what_does_not_move_is_not_said_to_be_moving(swing_rad: float, motor_rad: float, said: str) -> None:
     """1e-5 rad are 5.73e-4 deg; nothing is no motion."""
     rest = replace(hunting(0.1, swing_rad, 3.0).rest, verdict="still moving", frequency_hz=None, after_s=40.0)
@@ -159,20 +153,17 @@ PEAK_NM = AMBER.limits.peak_current_A * (AMBER.motor.torque_constant_Nm_A or 0.0
 STEP, SINE = commands.step(0.02), commands.sine(0.01, 5.0)
 
 
-@pytest.mark.parametrize(
-    ("parts", "command", "duration_s", "ends"),
-    [
-        ({}, STEP, 0.02, "comes to rest"),  # what a step ends in is no matter of the run
-        ({}, STEP, 0.4, "comes to rest"),
-        ({"instruments": {"current_noise_A": 0.05}}, STEP, 0.3, "comes to rest"),  # noise is no limit cycle
-        ({}, SINE, 0.5, "following"),
-        ({}, commands.ramp(1.75), 1.0, "following"),  # 100 deg/s, of which the motor gives 22.7
-        # limits hold the growing oscillation: it neither dies out nor runs away
-        ({"controller": LOUD.controller}, commands.step(0.05), 0.5, "limit cycle"),
-        # the rotor stays, the current is at its limit
-        ({"friction": {"dry_torque_Nm": 2.0 * PEAK_NM}}, commands.step(0.1), 0.5, "sits on a limit"),
-    ],
-)
+@pytest.mark.parametrize(("parts", "command", "duration_s", "ends"), [
+    ({}, STEP, 0.02, "comes to rest"),  # what a step ends in is no matter of the run
+    ({}, STEP, 0.4, "comes to rest"),
+    ({"instruments": {"current_noise_A": 0.05}}, STEP, 0.3, "comes to rest"),  # noise is no limit cycle
+    ({}, SINE, 0.5, "following"),
+    ({}, commands.ramp(1.75), 1.0, "following"),  # 100 deg/s, of which the motor gives 22.7
+    # limits hold the growing oscillation: it neither dies out nor runs away
+    ({"controller": LOUD.controller}, commands.step(0.05), 0.5, "limit cycle"),
+    # the rotor stays, the current is at its limit
+    ({"friction": {"dry_torque_Nm": 2.0 * PEAK_NM}}, commands.step(0.1), 0.5, "sits on a limit"),
+])  # fmt: skip
 def test_what_a_run_ends_in_and_only_what_nobody_wants_is_marked(parts, command, duration_s, ends):
     design = changed(AMBER, **parts)
     run = simulate(design, command, duration_s)
@@ -233,9 +224,7 @@ every = 40
 
 
 @pytest.mark.parametrize(("cogging", "ends"), [("68 mN*m", "ripple"), ("0 N*m", "becomes steady")])
-def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(
-    cli, tmp_path, cogging: str, ends: str
-) -> None:
+def test_what_swings_as_often_as_the_cogging_passes_is_its_ripple(cli, tmp_path, cogging, ends) -> None:
     """50 periods a turn at one turn a second: 50 Hz."""
     path = tmp_path / "turning.toml"
     path.write_text(SPEED_DRIVE.format(cogging=cogging))
