@@ -205,9 +205,8 @@ def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
         "something is not modelled, and the truth need not lie in the intervals. What the simulated record "
         "leaves too is taken off first."
     )
-    return doc.listing(
-        "Residual tests", tests, columns, note, status=lambda one: "pass" if one.within else "warn"
-    )
+    listed = ("Residual tests", tests, columns, note)
+    return doc.listing(*listed, status=lambda one: "pass" if one.within else "warn")
 
 
 def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:

@@ -82,7 +82,6 @@ POSITION = "control.position.gain"
     ("cycles ballscrew", "PASS  "),
     (f"compare ilr33-amber --no-validate --quiet --set {POSITION}=1560/s", "FAIL  "),
     (f"simulate --no-limits --duration 0.03 --set {POSITION}=9000/s", "FAIL  "),
-    ("tune --no-curve --quiet --require position.bandwidth>=2000Hz", "FAIL  "),
 ], ids=lambda words: words.split()[0])  # fmt: skip
 def test_the_first_line_is_the_verdict(words: str, first: str, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)

@@ -203,7 +203,8 @@ def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
 
 def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
     words = ("--no-curve", "--out", tmp_path, "--quiet", "--require")
-    assert "misses" in cli.text("tune", *words, "position.bandwidth>=2000 Hz", status=1)
+    said = cli.text("tune", *words, "position.bandwidth>=2000 Hz", status=1)
+    assert (said[:6], "misses" in said) == ("FAIL  ", True)
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
     assert not (tmp_path / "tuned.toml").exists()
