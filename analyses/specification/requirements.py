@@ -128,12 +128,13 @@ class RequirementVerdict:
     reason: str = ""  # what has to be known to read it
     waiver: Waiver | None = None  # of what is not proven
     rotor: str = ""  # of a current loop: whether its rotor is ``"free"`` or ``"locked"``
+    load_unit: str = ""  # of the requirement's load, where it has one
 
     @property
     def figure(self) -> tuple[object, ...]:
         """What is judged: verdicts of two designs stand side by side where it is the same."""
         of = self.requirement
-        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, of.unit
+        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, self.load_unit, of.unit
 
     @property
     def passes(self) -> bool:
@@ -168,8 +169,9 @@ def judged(
     else:
         loops = judged_loops(requirement.loop, figures)
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
-    waiver = design.waiver_of
-    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+    waivers = [design.waiver_of(one.id) if one.verdict == "not proven" else None for one in verdicts]
+    unit = design.load_unit if requirement.load_Nm else ""
+    return [replace(one, waiver=w, load_unit=unit) for one, w in zip(verdicts, waivers, strict=True)]
 
 
 NOT_STATED = "the design does not state what this needs"
