@@ -1,6 +1,5 @@
 """Margins, bandwidths and step figures of many designs at once."""
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -103,7 +102,7 @@ class LinearFigures:
 def linear_figures(
     population: Population, *, operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0,
     speed_amplitude_rad_s: float | None = None, direction: int = 1, time_figures: bool = True,
-    held: bool = False, threads: int = 1, progress: Callable[[int, int], None] | None = None
+    held: bool = False, threads: int = 1,
 ) -> LinearFigures:  # fmt: skip
     """Figures of the sampled loops of every design of a population.
 
@@ -119,14 +118,11 @@ def linear_figures(
     in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
     load moment held (velocity), if stable.
     ``threads``: that share the designs.
-    ``progress``: called with (designs done, designs in all).
 
     Raises `InputError`: for loops of more states than `actuator_lti.bounds.LOOP_STATES`.
     """
-    at = Operating(
-        point=operating_point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction
-    )  # fmt: skip
+    more: Any = {"speed_amplitude_rad_s": speed_amplitude_rad_s, "direction": direction}
+    at = Operating(point=operating_point, load_Nm=load_Nm, **more)
     out = np.full((population.count, len(LOOPS), fig.COLUMNS), np.nan)
     chunks = [
         group[first : first + _CHUNK]
@@ -134,16 +130,11 @@ def linear_figures(
         for first in range(0, len(group), _CHUNK)
     ]
 
-    def fill(chosen: np.ndarray) -> int:
+    def fill(chosen: np.ndarray) -> None:
         _fill(wire(population.part(chosen).stacked, at), chosen, time_figures, out)
-        return len(chosen)
 
-    done = 0
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for finished in pool.map(fill, chunks):
-            done += finished
-            if progress is not None:
-                progress(done, population.count)
+        list(pool.map(fill, chunks))
     wired = wire(population.stacked, at)
     if held:
         for loop in wired.stages:
@@ -190,8 +181,7 @@ def _fill(
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         blocks = stage_blocks(wired, stage)
         _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
-        unjudged = np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1))
-        for k in unjudged:
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1)):
             alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
             _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:

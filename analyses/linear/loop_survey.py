@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, slope_at, turned
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import ExactMargins, Loops, assemble_loops, exact_margins

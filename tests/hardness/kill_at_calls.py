@@ -24,7 +24,7 @@ from reports.nightly.history import open_history
 from reports.nightly.night import run_night
 
 CALLS = ("open", "os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.utime", "os.chmod", "shutil.rmtree")
-DESIGNS = 4
+DESIGNS = 6
 
 
 def night(site: Path, round_: int) -> None:

@@ -72,10 +72,7 @@ POSITION = "control.position.gain"
 @pytest.mark.parametrize(("words", "first"), [
     ("margins", "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."),
     (f"margins --set {POSITION}=9000/s", "FAIL  ilr33-amber: not stable: Position loop. "),
-    (
-        f"margins --set {POSITION}=1560/s",
-        "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: ",
-    ),
+    (f"margins --set {POSITION}=1560/s", "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met"),
     ("stiffness", "PASS  "),
     ("corners fin", "FAIL  "),
     ("duty joint", "PASS  "),
