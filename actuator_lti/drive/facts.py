@@ -93,6 +93,22 @@ def _through_train(design: Design, ratio: Any = 1.0) -> Any:
     return passed + ratio * design.friction.load_coefficient * design.ratio_behind_coupling
 
 
+def held_moment_Nm(design: Design, torque_Nm: float) -> float:
+    """Moment with which a motor torque presses on an output held fast: friction takes its part of both.
+
+    Never more than the torque through the ratio, whatever friction by load a self-locking design leaves out.
+
+    >>> from actuator_lti.design import load_design
+    >>> fin = load_design("fin")  # (T - C0)/(1/N + CM)
+    >>> round(held_moment_Nm(fin, 0.05), 6) == round((0.05 - 0.008) / (1 / 60 + 1.7e-3), 6)
+    True
+    """
+    way = 1 if torque_Nm > 0.0 else -1
+    left = abs(torque_Nm) - dry_torque(design, 0.0, way) - way * design.friction.offset_torque_Nm
+    at_coupling = max(left, 0.0) / max(_through_train(design), 1.0 / design.ratio_to_coupling)
+    return way * float(at_coupling) * design.ratio_behind_coupling
+
+
 def driven_inertia_kgm2(design: Design) -> Any:
     """Inertia that the motor speeds up, at its shaft; behind a coupling with the friction of its torque.
 
