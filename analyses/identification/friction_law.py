@@ -4,10 +4,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.stats import t
 
 from actuator_lti.types import Floats
-from analyses.estimation.least_squares import scaled_lstsq, wider_covariance
+from analyses.estimation.least_squares import event_blocks, scaled_lstsq, wider_covariance
 from analyses.identification.friction_map import away_from_reversals, speeds_tried
 from analyses.identification.joint_model import JointModel
 from analyses.records.consistency import NO_CHANCE
@@ -21,11 +21,12 @@ class Bend:
     errors: float  # standard errors that the term is from zero
     moved: Floats = field(repr=False)  # what each value of the fit changes by beside it
     tries: int
+    blocks: int  # behind the standard error
 
     @property
     def chance(self) -> float:
         """Probability of a term as sure as this among all that were tried, where the law is right."""
-        return min(self.tries * float(chi2.sf(self.errors**2, 1)), 1.0)
+        return min(self.tries * 2.0 * float(t.sf(self.errors, self.blocks - 1)), 1.0)
 
     @property
     def is_sure(self) -> bool:
@@ -37,7 +38,8 @@ def bend_of(model: JointModel) -> Bend:
     """The surest of the terms that a richer law has: a slope of its own below some speed, or by direction.
 
     Score tests (C. R. Rao, 1948): each term alone beside those of the model, in what the simulated records
-    leave of the residual; where none are, in rows away from reversals, which the filter mixes.
+    leave of the residual; where none are, in rows away from reversals, which the filter mixes. By Student's
+    distribution for the blocks behind the error (Bell and McCaffrey, 2002), as few may hold all events.
     """
     tried = speeds_tried(max(float(np.max(np.abs(part.speed))) for part in model.records)).tolist()
     if model.form == "symmetric" and model.knots_rad_s is None:
@@ -57,12 +59,13 @@ def _term(model: JointModel, speed: float, tries: int) -> Bend:
     table, rest, count = np.concatenate(tables), np.concatenate(rests), len(model.names)
     size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
     if len(rest) <= table.shape[1] or np.linalg.matrix_rank(table / size) < table.shape[1]:
-        return Bend(speed_rad_s=speed, errors=0.0, moved=np.zeros(count), tries=tries)
+        return Bend(speed_rad_s=speed, errors=0.0, moved=np.zeros(count), tries=tries, blocks=2)
     found = scaled_lstsq(table, rest)
     left = [(w, e - w @ found) for w, e in zip(tables, rests, strict=True)]
     error = float(np.sqrt(wider_covariance(left)[-1, -1]))
     errors = abs(float(found[-1])) / error if error > 0.0 else 0.0
-    return Bend(speed_rad_s=speed, errors=errors, moved=found[:count], tries=tries)
+    blocks = sum(event_blocks(len(one)) for one in rests)
+    return Bend(speed_rad_s=speed, errors=errors, moved=found[:count], tries=tries, blocks=blocks)
 
 
 def _columns(model: JointModel, speed: Floats, below: float) -> Iterator[Floats]:

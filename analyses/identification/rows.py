@@ -7,13 +7,22 @@ from functools import partial
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 from scipy.ndimage import minimum_filter1d
+from scipy.stats import chi2
 from scipy.stats import f as variance_ratio
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
+from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import default_value, pendulum_angle
-from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
+from analyses.identification.joint_model import (
+    NAMES,
+    FrictionForm,
+    JointModel,
+    Recipe,
+    Rows,
+    friction_columns,
+)
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import NO_CHANCE, place_of
@@ -103,10 +112,7 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
 
 
 def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
-    """Whether a record shows no motion: nothing but noise, as much above the recipe's cut-off as below it.
-
-    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
-    """
+    """Whether a record shows no motion: noise that is white, or that nothing of the drive's torque moves."""
     place, rate = place_of(design, record), RATES[design.axis]
     if _too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
@@ -115,13 +121,40 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     else:
         moved = place[1] - place[1][0]  # exactly zero of a constant angle
         values = moved - moved.mean()
+    recipe = recipe or recipe_for(record)
+    return _is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
+
+
+def _is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
+    """Whether a signal has as much power above the cut-off as below it, line by line.
+
+    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
+    """
     power = np.abs(rfft(values)) ** 2
-    below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
+    below = rfftfreq(len(values), period_of(record)) <= recipe.cutoff_hz
     count, rest = np.count_nonzero(below), np.count_nonzero(~below)
     if not rest:
         return not np.any(values)
     most = float(variance_ratio.isf(NO_CHANCE, 2 * count, 2 * rest))
     return bool(power[below].mean() <= most * power[~below].mean())
+
+
+def _is_unmoved(design: Design, record: Record, recipe: Recipe) -> bool:
+    """Whether a drive that is more than noise moves nothing: its torque has no inertia and no friction.
+
+    By Wald's test of all three, with the correlation in time of what they leave. Noise of a speed behind a
+    filter is not white, but no torque goes into it.
+    """
+    try:
+        drive = drive_of(design, record)[0]
+        if _is_white(drive, record, recipe):
+            return False
+        rows = record_rows(design, record, "symmetric", recipe)
+        found = solve(rows.columns(NAMES["symmetric"]), rows.y)
+    except (InputError, np.linalg.LinAlgError):
+        return False
+    values, covariance = found.values[:-1], found.correlated[:-1, :-1]
+    return bool(chi2.sf(values @ np.linalg.solve(covariance, values), len(values)) > NO_CHANCE)
 
 
 def moment_of(

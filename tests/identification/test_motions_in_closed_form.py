@@ -9,6 +9,7 @@ from analyses.identification.friction_law import bend_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel
 from analyses.identification.motion_noise import with_noise_of_motion
+from analyses.identification.rows import stands
 from analyses.identification.verdict import law_items, noise_items
 from tests.identification.bench_records import record_of
 
@@ -100,3 +101,18 @@ def test_noise_of_a_speed_takes_nothing_from_the_mass_without_a_command() -> Non
     assert abs(np.mean(off)) < 4.0 / np.sqrt(len(off))
     assert np.mean(np.abs(off) < 1.96) > 0.8
     assert len(said) > 10
+
+
+@pytest.mark.parametrize("corner_hz", [2.0, 15.0, 80.0])
+@pytest.mark.parametrize("moves", [0.0, 0.03])
+def test_noise_behind_a_filter_is_no_motion(corner_hz: float, moves: float) -> None:
+    """A held axis under a force to and fro; where it moves, 3 % of the speed are enough to see it."""
+    rng, design = np.random.default_rng(1), load_design("emps")
+    time, _, speed, acceleration = _sines(rng, 4000)
+    keep = np.exp(-2.0 * np.pi * corner_hz * 1e-3)
+    noise = lfilter([1.0 - keep], [1.0, -keep], rng.standard_normal(8000))[4000:]
+    force = (
+        MASS * acceleration + VISCOUS * speed + DRY * np.sign(speed) + 0.3 * rng.standard_normal(len(time))
+    )
+    logged = moves * speed + 2e-4 * noise / np.std(noise)
+    assert stands(design, record_of(time, velocity=logged, force=force)) is (moves == 0.0)
