@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -177,7 +177,7 @@ class SampleTask:
     # Of the linear loops
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
-    time_figures: bool = True  # of their steps
+    time_figures: bool | Collection[str] = True  # of their steps, or of which loops
     step: StepCheck | None = None  # a nonlinear one
 
     def __post_init__(self) -> None:
