@@ -82,20 +82,15 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
     there is no compiler, or it fails.
     """
     more = ["-target", TARGETS[target].zig] if target in TARGETS else []
-    allowed = "gcc, clang, or pip install ziglang"
-    command = _chosen(target, more, allowed, own=target == HERE and not portable)
+    command = _chosen(target, more, "gcc, clang, or pip install ziglang", own=target == HERE and not portable)
     flags = (*LIBRARY_FLAGS, "-shared", "-s" if output.endswith(".dll") else "-fPIC")
     return compile_files({"kernels.c": text}, output, target, flags, command=command)
 
 
 def compile_files(
-    texts: Mapping[str, str],
-    output: str,
-    target: str,
-    extra: Sequence[str] = (),
-    *,
-    command: Sequence[str] | None = None,
-) -> bytes:
+    texts: Mapping[str, str], output: str, target: str, extra: Sequence[str] = (), *,
+    command: Sequence[str] | None = None
+) -> bytes:  # fmt: skip
     """Compile C files given as text; returns the bytes of ``output``.
 
     A Windows library has the same bytes each time where it is stripped (``-s``) of its debug file's name.

@@ -33,7 +33,6 @@ class Expressions:
         self.want, self.whole = function.want, ast.AST()
 
     def emit(self, node: ast.expr) -> Text:
-        """Text and kind of an expression."""
         text: Text = self.translated(node)
         return text
 
@@ -51,13 +50,11 @@ class Expressions:
         return bare(text) if kind == "bool" else f"{text} != 0"
 
     def as_float(self, node: ast.expr) -> str:
-        """A number as a double."""
         text, kind = self.emit(node)
         self.want(kind in ("float", "int"), node, f"a {kind} where a number is wanted")
         return widened(text, kind)
 
     def whole_number(self, node: ast.expr, what: str) -> str:
-        """A whole number."""
         text, kind = self.emit(node)
         self.want(kind == "int", node, f"{what} that is a {kind}; use int()")
         return bare(text)
@@ -116,7 +113,6 @@ class Expressions:
         return f"{text}.length" if kind == "bytes" else None
 
     def element(self, node: ast.Subscript) -> str:
-        """``row[index]``."""
         table = self._table(node.value)
         row, kind = (table, "row") if table else self.emit(node.value)
         self.want(kind in ("row", "bytes"), node, "only a row has elements")
@@ -165,8 +161,7 @@ class Expressions:
         self.want(once, node, "a chained comparison evaluates its middle once; give it a name")
         parts = []
         for left, op, right in zip(values, node.ops, values[1:], strict=False):
-            known = type(op) in _COMPARE
-            self.want(known, node, f"the comparison {type(op).__name__} is not in the subset")
+            self.want(type(op) in _COMPARE, node, f"the comparison {type(op).__name__} is not in the subset")
             parts.append(self._compared(left, _COMPARE[type(op)], right))
         return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
 

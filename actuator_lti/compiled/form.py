@@ -32,7 +32,6 @@ class Form:
         return " && ".join(f"{self.row}[{place}] == {value!r}" for place, value in self.known.items())
 
     def look(self, row: str, place: int) -> float | None:
-        """The known number at a place of a row."""
         return self.known.get(place) if row == self.row else None
 
 
@@ -79,8 +78,7 @@ class Known(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)
-        alone = len(node.targets) == 1
-        return None if alone and self.told(node.targets[0], node.value) else node
+        return None if len(node.targets) == 1 and self.told(node.targets[0], node.value) else node
 
     def told(self, target: ast.expr, value: ast.expr) -> bool:
         """Note a variable that is assigned here alone, and known."""
@@ -136,5 +134,4 @@ class Known(ast.NodeTransformer):
 
 
 def number(node: ast.Constant) -> Any:
-    """The number that a constant is."""
     return node.value

@@ -50,7 +50,6 @@ class Function:
 
     @property
     def c_name(self) -> str:
-        """Its name in C."""
         return f"{self.prefix}{self.name}"
 
     def local(self, name: str) -> Kind | None:
@@ -58,7 +57,6 @@ class Function:
         return self.variables.get(name) or self.arguments.get(name)
 
     def error(self, node: ast.AST, text: str) -> EmitError:
-        """The error of one place in the source."""
         line = self.first_line + getattr(node, "lineno", 1) - 1
         return EmitError(f"{self.file}:{line}: {self.name}: {text}")
 
@@ -69,7 +67,6 @@ class Function:
 
 
 def tree_of(python: Any) -> ast.FunctionDef:
-    """A function's text as a tree."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(python))).body[0]
     assert isinstance(tree, ast.FunctionDef)
     return tree
@@ -88,7 +85,6 @@ def stored(tree: ast.AST) -> list[str]:
 
 
 def c_name(name: str) -> str:
-    """A variable's name in C."""
     return f"{name}_" if name in RESERVED else name
 
 

@@ -47,7 +47,6 @@ class Entry:
 
     @property
     def function(self) -> Callable[..., Any]:
-        """As it is written."""
         function: Callable[..., Any] = getattr(import_module(self.module), self.name)
         return function
 
@@ -59,7 +58,6 @@ class Called:
         self._function, self._passing = function, passing
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call it."""
         return self._function(*[way(each) for way, each in zip(self._passing, arguments, strict=True)])
 
     def bound(self, *arguments: Any) -> Callable[[], Any]:
@@ -109,11 +107,9 @@ class Library:
         return digest.hexdigest()[:16]
 
     def text(self) -> str:
-        """Its C."""
         from actuator_lti.compiled.program import emit_c
 
-        entries = {entry.function: entry.arguments for entry in self.entries}
-        return emit_c(entries, forms=self.forms()).source
+        return emit_c({entry.function: entry.arguments for entry in self.entries}, forms=self.forms()).source
 
     def build(self) -> Path:
         """Emit, compile and keep the library, if it is not there; older ones of this kind of machine go.
@@ -163,7 +159,6 @@ class Library:
             raise InputError(f"{path.name}: does not load ({error}); allowed: {_BUILD}") from None
 
     def loaded(self, path: Path) -> Any:
-        """The entries of a library file of this text."""
         opened, found = ctypes.CDLL(str(path)), SimpleNamespace()
         for entry in self.entries:
             function = getattr(opened, f"drive_{entry.name}")

@@ -53,13 +53,11 @@ class Program:
 
     @property
     def helpers(self) -> list[str]:
-        """Minimum and maximum as Python has them, those that are called."""
         known = {name: text.replace("@", self.prefix) for name, text in _MINMAX.items()}
         return [text for name, text in known.items() if f"{self.prefix}{name}(" in self.functions]
 
     @property
     def source(self) -> str:
-        """All of it as one file."""
         cloned = any(f"{self.prefix}{mark} " in self.functions for mark in ("clones", "wide"))
         clones = _CLONES.replace("@", self.prefix) if cloned else ""
         parts = [_INCLUDES + clones, _BYTES.replace("@", self.prefix), self.constants_text(), *self.helpers]
@@ -85,15 +83,13 @@ class Program:
         return "\n".join(lines)
 
 
-def emit_c(
-    entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_", forms: Sequence[Form] = ()
-) -> Program:
+def emit_c(entries: Mapping[Any, Sequence[Kind]], forms: Sequence[Form] = ()) -> Program:
     """C99 for compiled functions, with the kinds of their arguments, and everything that they call.
 
     ``forms`` are second forms of functions that these call; the function itself chooses by its row, at every
     call. `EmitError`: the first construct outside the subset, with its file and line.
     """
-    collector = Collector(prefix)
+    collector = Collector("drive_")
     names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
     return program_of(collector, names, [_Formed(collector, form) for form in forms])
 
@@ -153,7 +149,6 @@ class Collector:
         return function
 
     def parsed(self, python: Any, kinds: list[Kind]) -> Function:
-        """A function with its text."""
         tree, first = tree_of(python), inspect.getsourcelines(python)[1]
         names = [argument.arg for argument in tree.args.args]
         file, scope = Path(inspect.getsourcefile(python) or "?").name, python.__globals__
@@ -165,11 +160,9 @@ class Collector:
         return function
 
     def statements(self, function: Function) -> Statements:
-        """What translates its body."""
         return Statements(function, self.call, self.constants, self.helpers)
 
     def definition(self, function: Function, head: str, lines: list[str]) -> str:
-        """Its definition in C."""
         about = _plain(ast.get_docstring(function.tree) or "")
         described = [f" * {line}".rstrip() for line in about.splitlines()]
         comment = ["/*", *described, f" * ({function.file}, line {function.first_line})", " */"]
@@ -218,7 +211,6 @@ class _Formed(Collector):
 
 
 def declared(function: Function) -> list[str]:
-    """The declarations of its variables in C."""
     return [
         f"{INDENT}{C_TYPES[kind]} {c_name(name)} = {_ZERO[kind]};"
         for name, kind in function.variables.items()

@@ -28,7 +28,6 @@ class Member:
     kind: Kind = "float"
 
     def holds(self, place: int) -> bool:
-        """Whether a place of the row is one of its."""
         return self.first <= place < self.first + max(self.length, 1)
 
 
@@ -83,7 +82,6 @@ class _Members(Statements):
         return self.element(node), self.member(node).kind
 
     def member(self, node: ast.Subscript) -> Member:
-        """The member that an element is, or lies in."""
         assert isinstance(node.value, ast.Name)
         return self.rows.structs[node.value.id].member(node.slice)[0]
 
@@ -99,7 +97,6 @@ class _Members(Statements):
         return self.of_counts(text) if kind == "count" else super().as_float(node)
 
     def of_counts(self, text: str) -> str:
-        """A number of counts as what is counted."""
         return f"((double){text} / {c_float(self.rows.counts_per_unit)})"
 
     def _BinOp(self, node: ast.BinOp) -> Text:

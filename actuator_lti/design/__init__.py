@@ -19,24 +19,7 @@ from actuator_lti.design.tolerances import tolerances
 from actuator_lti.design.writing import design_hash, design_tree, with_overrides, write_design
 
 __all__ = [
-    "FIELDS",
-    "QUANTITIES",
-    "Design",
-    "SweepPoint",
-    "as_design",
-    "check_design",
-    "design_hash",
-    "design_tree",
-    "load_design",
-    "no_load_speed",
-    "parameter_value",
-    "paths_of",
-    "read_design_text",
-    "shipped_designs",
-    "sweep",
-    "tolerances",
-    "warnings_of",
-    "with_overrides",
-    "with_values",
-    "write_design",
-]
+    "FIELDS", "QUANTITIES", "Design", "SweepPoint", "as_design", "check_design", "design_hash", "design_tree",
+    "load_design", "no_load_speed", "parameter_value", "paths_of", "read_design_text", "shipped_designs",
+    "sweep", "tolerances", "warnings_of", "with_overrides", "with_values", "write_design"
+]  # fmt: skip

@@ -64,7 +64,8 @@ def parameter_value(design: Design, path: str) -> float:
 def with_values(design: Design, values: Mapping[str, float], *, check: bool = True) -> Design:
     """A copy of a design with some numeric keys, by their dotted paths, changed to SI values.
 
-    Its parameters carry the new values; a tolerance in percent follows them. ``check``: whether the relations
+    Its parameters carry the new values; a tolerance in percent follows them, one cut at limits that a value
+    leaves is gone (a design file is refused for that). ``check``: whether the relations
     between keys are checked too (kE against kM, speed against supply); each value alone always is.
 
     An InputError as :func:`actuator_lti.design.load_design`.

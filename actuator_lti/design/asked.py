@@ -116,7 +116,6 @@ class Waiver:
 
     @property
     def words(self) -> str:
-        """As reports write it."""
         return f"waived {self.date}: {self.reason}"
 
 
@@ -191,7 +190,6 @@ class ObjectPlace:
 
     @property
     def place(self) -> tuple[int, int]:
-        """Index and subindex."""
         return self.index, self.subindex
 
     @property
@@ -225,6 +223,4 @@ class ControllerObjects:
         return bool(self.family or self.values)
 
     def __post_init__(self) -> None:
-        """Put the values in order."""
-        ordered = tuple(sorted(self.values, key=lambda item: item.place))
-        object.__setattr__(self, "values", ordered)
+        object.__setattr__(self, "values", tuple(sorted(self.values, key=lambda item: item.place)))

@@ -91,11 +91,9 @@ def _multiples(design: Design) -> Iterator[Refusal]:
 
 def _fed_forward(key: str) -> Rule:
     return Rule(
-        f"control.position.{key}",
-        f"{{d.controller.position.{key}:g}}",
-        "allowed: 0 without a velocity loop",
-        lambda d: d.controller.velocity is None and getattr(d.controller.position, key, 0.0),
-    )
+        f"control.position.{key}", f"{{d.controller.position.{key}:g}}", "allowed: 0 without a velocity loop",
+        lambda d: d.controller.velocity is None and getattr(d.controller.position, key, 0.0)
+    )  # fmt: skip
 
 
 # of a key of the command: the key that it needs, the limit that it has to keep

@@ -13,15 +13,11 @@ from actuator_lti.design.plant import MotorConstants
 from actuator_lti.design.spellings import split_quantity
 
 MAX_MAP_POINTS = 16  # of each direction
-_ELECTRICAL = {
-    key: FIELDS[f"motor.{key}"].attribute
-    for key in ("resistance", "inductance", "torque_constant", "back_emf_constant")
-}
+_KEYS = ("resistance", "inductance", "torque_constant", "back_emf_constant")
+_ELECTRICAL = {key: FIELDS[f"motor.{key}"].attribute for key in _KEYS}
 _TORQUE_OVER_VOLTAGE: dict[MotorConstants, tuple[float, str]] = {
-    "dc": (1.0, "1"),
-    "rms-line": (3**0.5, "sqrt(3)"),
-    "peak-phase": (1.5, "3/2"),
-}
+    "dc": (1.0, "1"), "rms-line": (3**0.5, "sqrt(3)"), "peak-phase": (1.5, "3/2"),
+}  # fmt: skip
 _PER_VOLT = re.compile(r"/ ?V|\bV\^?-1|V⁻¹|KV\b")  # a speed constant, kE upside down
 _NEAR = 0.025  # of the logarithm of a ratio: that convention is meant
 _AC = ": see motor.constants, if it is an AC motor"
@@ -119,8 +115,7 @@ def with_stand_ins(design: Design) -> Design:
     """
     motor, given = design.motor, {name: getattr(design.motor, name) for name in _ELECTRICAL.values()}
     if motor.source_gain_Nm_V is not None:
-        alone = all(value is None for value in given.values())
-        return design if alone else replace(design, motor=UNREAD)
+        return design if all(value is None for value in given.values()) else replace(design, motor=UNREAD)
     motor = replace(motor, **{name: UNREAD for name, value in given.items() if value is None})
     kM: Any = motor.torque_constant_Nm_A
     kE: Any = motor.back_emf_constant_Vs_rad

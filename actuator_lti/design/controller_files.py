@@ -42,8 +42,7 @@ Stage = Literal["velocity", "-velocity", "current", "-current"]
 Value = float | Callable[..., float]
 A_dc, V_dc, TURN, RPM = sqrt(3.0) / 2.0, sqrt(3.0), 2.0 * pi, 2.0 * pi / 60.0
 _DCF = re.compile(
-    r"^[ \t]*(?:\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|(Parameter|Default)Value[ \t]*=[ \t]*(\S+))",
-    re.I | re.M,
+    r"(?im)^[ \t]*(?:\[([0-9A-F]{4})(?:sub([0-9A-F]{1,2}))?\]|(Parameter|Default)Value[ \t]*=[ \t]*(\S+))"
 )
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.S)
 _ASSIGNED = re.compile(r"(?:^|(?<=;))[ \t]*(\w+)\.([\w.]+)\s*=\s*([^;\n]+);", re.M)
@@ -60,12 +59,9 @@ class Setting:
         self.key, self.unit, self.names, self.when, self.said = key, unit, names, when, said
         self.of = value if callable(value) else partial(mul, value)
 
-    def holds(self, design: Design) -> bool:
-        """Whether a design of these stages takes it: ``"-velocity"`` is one without a velocity loop."""
-        return _holds(self.when, design)
-
 
 def _holds(when: Stage | None, design: Design) -> bool:
+    """Whether a design has the stages that are asked for: ``"-velocity"`` is one without a velocity loop."""
     return not when or (when.strip("-") in design.controller.stages) != when.startswith("-")
 
 
@@ -306,7 +302,7 @@ def _overrides(
     used: set[str] = set()
     notes = [f"{spelled[name]} = {given[name]}: {said}" for name, (when, said) in found.also.items()
              if said and name in given and _holds(when, base)]  # fmt: skip
-    for item in (one for one in found.settings if one.holds(base) and given.keys() & {*one.names}):
+    for item in (one for one in found.settings if _holds(one.when, base) and given.keys() & {*one.names}):
         raw = {name: _number(given.get(name, found.assumed.get(name))) for name in item.names}
         numbers = {name: number for name, number in raw.items() if number is not None}
         lacking = [name for name in item.names if name not in numbers]

@@ -43,7 +43,6 @@ _TAKEN = {
 
 
 def sheet_fields(template: str) -> tuple[Field, ...]:
-    """Those of a table such as ``"gear.*"``."""
     return tuple(field for field in SHEET if field.section == template)
 
 
@@ -126,7 +125,6 @@ class DataSheet:
             yield _SPEED, "", f"missing; {_CURRENT} needs it"
 
     def read_into(self, design: model.Design) -> model.Design:
-        """The design with the friction that follows."""
         if design.friction is UNREAD:
             return design
         if _CURRENT in self.stated:
@@ -159,11 +157,9 @@ class DataSheet:
         return self._with(design, values, self.gears)
 
     def _with(self, design: model.Design, values: dict[str, float], said: Iterable[str]) -> model.Design:
-        """The design with values of friction, whose source is what the sheet says."""
         stated = [self.stated[path] for path in said if path in self.stated]
-        sources = dict.fromkeys(item.source for item in stated if item.source)
         words = ", ".join(f"{item.path} = {item.text}" for item in stated)
-        source = "; ".join((FROM + words, *sources))
+        source = "; ".join((FROM + words, *dict.fromkeys(item.source for item in stated if item.source)))
         made, attributes = dict(design.parameters), dict[str, Any]()
         for path, value in values.items():
             field, unit = FIELDS[path], FIELDS[path].unit(Structure.of(design))

@@ -42,7 +42,6 @@ class Structure:
 
     @classmethod
     def of(cls, design: Design) -> Structure:
-        """The structure of a design."""
         control = design.controller
         return cls(design.axis, control.velocity is not None, control.current is not None)
 
@@ -75,12 +74,10 @@ class Field:
 
     @property
     def section(self) -> str:
-        """Section name, such as ``"control.velocity"``."""
         return self.path.rpartition(".")[0]
 
     @property
     def key(self) -> str:
-        """Key inside the section."""
         return self.path.rpartition(".")[2]
 
     def unit(self, structure: Structure) -> str:
@@ -105,7 +102,6 @@ class Field:
         )
 
     def allowed(self, unit: str) -> str:
-        """The allowed range in words."""
         if self.kind in _WORDS:
             return _WORDS[self.kind]
         if len(self.choices) > MANY:
@@ -183,12 +179,10 @@ day, limit = partial(_declared, "day"), partial(_declared, "limit")
 
 
 def degrees(words: str, example: str) -> Field:
-    """A temperature."""
     return quantity(words, low=-273.15, high=1000.0, example=example)
 
 
 def integer(words: str, high: int, symbol: str = "", low: int = 1) -> Field:
-    """A whole number."""
     return _declared("integer", words, symbol, low=low, high=high)
 
 

@@ -41,12 +41,10 @@ class Section:
 
     @property
     def key(self) -> str:
-        """Last part of the table name."""
         return self.path.rpartition(".")[2]
 
     @property
     def attribute(self) -> str:
-        """Last part of the place."""
         return self.place.rpartition(".")[2]
 
     @property
@@ -110,7 +108,6 @@ BY_PATH: dict[str, Section] = {section.path: section for section in SECTIONS}
 
 
 def children(path: str) -> tuple[Section, ...]:
-    """The sections directly inside a table (``""``: at the top)."""
     return tuple(section for section in SECTIONS if section.parent == path)
 
 
@@ -174,13 +171,11 @@ def _declared(kind: type, template: str) -> Iterator[Field]:
         annotated, *declared = get_args(item.type)[:2] if hasattr(item.type, "__metadata__") else (None,)
         for field in (named_after(one, item.name) for one in declared):
             yield replace(
-                field,
-                path=f"{template}.{field.path}",
-                required=field.required or item.default is MISSING,
+                field, path=f"{template}.{field.path}", required=field.required or item.default is MISSING,
                 default=item.default,
                 choices=field.choices or (_words(annotated) if field.kind in ("choice", "names") else ()),
-                description=form * template.endswith(".continuous") + field.description,
-            )
+                description=form * template.endswith(".continuous") + field.description
+            )  # fmt: skip
 
 
 def _words(kind: Any) -> tuple[str, ...]:

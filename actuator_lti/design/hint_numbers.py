@@ -75,10 +75,9 @@ def hint_of(text: Any, field: Field, path: str, frame: Frame, tree: Tree) -> str
         return over or ("; those of a metre" if whole == "metre" else "")
     if field.path == "motor.torque_constant" and _ROOT_OF_WATTS.search(f"{text}"):
         return f"; it is {_motor_constant(text, tree, frame)}"
-    if (ticks_said := _TICKS.fullmatch(f"{text}")) and (
-        period_s := _period_s(_of(tree, "control", "period"))
-    ) > 0.0:
-        return f"; here {float(ticks_said[1]) * period_s:.6g} s"
+    period_s, said = _period_s(_of(tree, "control", "period")), _TICKS.fullmatch(f"{text}")
+    if said and period_s > 0.0:
+        return f"; here {float(said[1]) * period_s:.6g} s"
     return _per_count(text, field, frame, tree)
 
 
@@ -94,10 +93,8 @@ def _per_count(text: Any, field: Field, frame: Frame, tree: Tree) -> str:
         counts = frame.quantity(_of(tree, "encoder", "counts_per_rev"), FIELDS["encoder.counts_per_rev"])
         plain = CONVENTION.sub("", text)
         power = dict(parse_unit(split_quantity(plain)[1]).dimension).get("[count]", 0)
-        size = (
-            parse_quantity(_COUNT.sub("m" if linear else "rad", plain), unit)
-            * ((1.0 if linear else 2.0 * pi) / counts) ** power
-        )
+        one_rad = (1.0 if linear else 2.0 * pi) / counts
+        size = parse_quantity(_COUNT.sub("m" if linear else "rad", plain), unit) * one_rad**power
         kind = "".join(f" {one}" for one in CONVENTION.findall(text))
         return f"; of {counts:g} counts {size:.4g} {re.sub(r'(?<=A)(?=[*/ ]|$)', kind, unit)}"
     return ""

@@ -68,9 +68,7 @@ def _allowed(field: Field, unit: str) -> str:
     numbers = field.kind in ("quantity", "quantities", "matrix")
     if field.kind in ("text", "label") or (numbers and (field.low, field.high) == (-BIG, BIG)):
         return ""
-    if field.high == BIG:
-        return "above 0" if field.low > 0 else "0 or more"
-    return field.allowed(unit)
+    return field.allowed(unit) if field.high != BIG else "above 0" if field.low > 0 else "0 or more"
 
 
 @dataclass(frozen=True)
@@ -99,10 +97,8 @@ def explained(design: Design) -> tuple[Explained, ...]:
         if path.startswith("motor.") and field is not None:
             value = getattr(design.effective_motor, field.attribute)
         unit = "" if item.unit == "1" else f" {item.unit}"
-        symbol = f"{item.symbol} = " if item.symbol else ""
-        result.append(
-            Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", f"{symbol}{value:.9g}{unit}")
-        )
+        modelled = f"{item.symbol}{' = ' * bool(item.symbol)}{value:.9g}{unit}"
+        result.append(Explained(path, item.stated or item.text, f"{item.value:.9g}{unit}", modelled))
     sheet = (Explained(*stated, "friction, below") for stated in stated_in(design))
     at = next((k for k, one in enumerate(result) if one.path.startswith("friction.")), len(result))
     return (*result[:at], *sheet, *result[at:], *_own_law(design))
@@ -115,13 +111,8 @@ def _own_law(design: Design) -> Iterator[Explained]:
         return
     angle = "m" if design.axis == "linear" else "rad"
     of = {"position": angle, "velocity": f"{angle}/s", "current": f"A{dc}", "voltage": f"V{dc}"}
-    kinds = {
-        "speed": "velocity",
-        "output_speed": "velocity",
-        "current": "current",
-        "command": own[0],
-        "error": own[0],
-    }
+    kinds = {"speed": "velocity", "output_speed": "velocity", "current": "current"}
+    kinds |= dict.fromkeys(("command", "error"), own[0])
     takes = ", ".join(f"{name} in {of[kinds.get(name, 'position')]}" for name in own[1].inputs)
     stages = (*design.controller.stages, "voltage")
     gives = stages[stages.index(own[0]) + 1]

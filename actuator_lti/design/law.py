@@ -76,7 +76,6 @@ class StateSpace:
         }
 
     def matrices(self, inputs: int, L: tuple[float, ...] = ()) -> Matrices:
-        """As arrays; D and L of zeros where they are left out."""
         n = len(self.A)
         return Matrices(
             np.array(self.A, dtype=float).reshape(n, n),
@@ -108,12 +107,10 @@ class Law(StateSpace):
 
     @property
     def sampled(self) -> Matrices:
-        """The matrices that run."""
         return self.matrices(len(self.inputs), self.L)
 
     @property
     def poles(self) -> np.ndarray:
-        """Eigenvalues of A."""
         return np.linalg.eigvals(self.sampled.A)
 
     @property

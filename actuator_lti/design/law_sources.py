@@ -105,9 +105,8 @@ def law_tree(A: Any, B: Any, C: Any, D: Any, L: Any = (), period_s: Any = None) 
     if beyond and n and C.size == n and L.size in (0, n):
         t = balance(A, np.hstack([B, L.reshape(n, -1)]), C)
         A, B, C, L = A * t / t[:, None], B / t[:, None], C * t, L / t[: L.size]
-    tree = {
-        name: part.tolist() for name, part in zip((*PARTS, "L"), (A, B, C, D, L), strict=True) if part.size
-    }
+    named = zip((*PARTS, "L"), (A, B, C, D, L), strict=True)
+    tree = {name: part.tolist() for name, part in named if part.size}
     return tree if period_s is None else {**tree, "period": f"{_number('dt', period_s)!r} s"}
 
 

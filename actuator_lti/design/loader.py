@@ -54,7 +54,6 @@ as_design = load_design  # for what a function is given as a design
 
 
 def _name_of(given: object) -> str:
-    """A name or path as text."""
     name = fspath(given) if isinstance(given, str | PathLike) else None
     if not isinstance(name, str):
         allowed = "allowed: a Design, a shipped name, or the path of a design file"

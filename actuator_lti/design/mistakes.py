@@ -94,7 +94,6 @@ class Rule:
     broken: Callable[[Design], Any]
 
     def __call__(self, design: Design) -> Iterator[Refusal]:
-        """The refusal, if there is one."""
         if self.broken(design):
             yield self.key, self.given.format(d=design), self.allowed.format(d=design)
 
@@ -111,7 +110,6 @@ class Findings:
         self.found: list[tuple[int, InputError]] = []
 
     def note(self, path: str, given: object, reason: str) -> None:
-        """Keep a mistake."""
         line = self._line(path)
         at = f"line {line}: " if line else ""
         text = f"{at}{refusal_text((path, given, reason))}"
@@ -122,7 +120,6 @@ class Findings:
         self.lines[path] = self._line(written)
 
     def extend(self, refusals: Iterable[Refusal]) -> None:
-        """Keep many."""
         for refusal in refusals:
             self.note(*refusal)
 

@@ -15,11 +15,8 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, in_file
 from actuator_lti.files.reading import shown
 
-U16 = 2**16 - 1
-U32 = 2**32 - 1
-RPM = 2.0 * pi / 60.0
-REV = 2.0 * pi
-PER_RPM = 60.0 / (2.0 * pi)
+U16, U32 = 2**16 - 1, 2**32 - 1
+REV, RPM, PER_RPM = 2.0 * pi, 2.0 * pi / 60.0, 60.0 / (2.0 * pi)
 MAX_OBJECTS = 5000
 _TOLERATED = 1e-9
 _TORQUE_LIMITS = ((0x60E0, 0), (0x60E1, 0))
@@ -84,7 +81,6 @@ OBJECTS: dict[tuple[int, int], KnownObject] = {item.place: item for item in _LIS
 
 
 def step_of(known: KnownObject, velocity_gain_factor: float) -> float:
-    """The SI value of one step of an object."""
     return known.scale * (velocity_gain_factor if known.place == (0x2344, 1) else 1.0)
 
 
@@ -151,7 +147,7 @@ def import_objects(objects: ControllerObjects, base: Design, where: str = "setti
     for item in objects.values:
         known = OBJECTS.get(item.place)
         if known is None or not known.paths:
-            kept += [] if known is not None and _follows(known, item.value, given) else [item]
+            kept += [] if known and _follows(known, item.value, given) else [item]
             continue
         step = step_of(known, objects.velocity_gain_factor)
         current = model_value(base, known)
@@ -209,12 +205,10 @@ def checked_objects(values: tuple[ControllerObject, ...], factor: Any) -> Contro
 
 
 def _import_notes(given: _Values, factor: float, design: Design) -> tuple[str, ...]:
-    """What a reader of the import has to know."""
     first, second = given.get((0x6083, 0)), given.get((0x6084, 0))
     rated_A, peak_A = given.get((0x2329, 1), 0) * 1e-3, design.limits.peak_current_A
-    limits = {
-        key: given[key] * 1e-3 * rated_A for key in _TORQUE_LIMITS if key in given and (0x2329, 1) in given
-    }
+    stated = [key for key in _TORQUE_LIMITS if key in given and (0x2329, 1) in given]
+    limits = {key: given[key] * 1e-3 * rated_A for key in stated}
     per = "per rad/s" if factor == 1.0 else "per rpm"
     notes = [
         (f"velocity gain 0x2344.01 read as A s {per} (calibration factor {factor:.4g})",
@@ -258,9 +252,8 @@ def export_objects(design: Design, *, complete: bool | None = None) -> Exported:
     notes = [f"velocity gain 0x2344.01 written with calibration factor {before.velocity_gain_factor:.4g}"]
     left = [] if complete else [known.label for known in missing if known.paths]
     notes += [f"not in the imported settings, so not written: {', '.join(left)}"] if left else []
-    return Exported(
-        objects=replace(before, values=tuple(written)), rounded=tuple(rounded), notes=tuple(notes)
-    )
+    settings = replace(before, values=tuple(written))
+    return Exported(objects=settings, rounded=tuple(rounded), notes=tuple(notes))
 
 
 def _encode(design: Design, known: KnownObject, rounded: list[Rounding]) -> int | None:

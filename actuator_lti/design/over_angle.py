@@ -32,7 +32,6 @@ class OverAngle:
 
     @property
     def follows(self) -> bool:
-        """Whether it changes with the angle."""
         return self.bends or bool(np.any(self.slope_Nm_rad))
 
     @property

@@ -55,7 +55,6 @@ class Motor:
 
     @property
     def has_electrical_dynamics(self) -> bool:
-        """Whether the current is a state."""
         return self.source_gain_Nm_V is None
 
     @property
@@ -192,7 +191,6 @@ class Gravity:
 
     @property
     def peak_Nm(self) -> float:
-        """m g l."""
         return self.mass_kg * STANDARD_GRAVITY_m_s2 * self.arm_m
 
 
@@ -211,7 +209,7 @@ def reachable_speed(design: "Design") -> float:
 
 
 def torque_per_command(design: "Design") -> Any:
-    """Torque per ampere of the current loop, or per volt where there is none."""
+    """Motor torque at rest per ampere that a current loop is asked for, or per volt where there is none."""
     motor = design.effective_motor
     if motor.source_gain_Nm_V is not None:
         return motor.source_gain_Nm_V

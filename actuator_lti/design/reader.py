@@ -60,8 +60,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     reader = Reader(tree, findings)
     head, _ = reader.values("design", tree.get("design"), "design")
     tables = [item.key for item in (schema.HEAD, *schema.children(""), *schema.RECORDS)]
-    meant = reader.known(tree, [*tables, "objects"], "")
-    parts = reader.tables("", tree, meant)
+    parts = reader.tables("", tree, reader.known(tree, [*tables, "objects"], ""))
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in schema.RECORDS}
     objects = reader.objects(tree.get("objects"))
     # 10 deg (0.01 m) without a load where the file does not say what to validate
@@ -71,8 +70,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     design = reader.with_gains(
         model.Design(**{**head, "validation": fallback, **parts, **records}, objects=objects, origin=origin)
     )
-    written = frozenset(reader.written)
-    design = replace(design, parameters=FrozenMap(reader.parameters), written=written)
+    design = replace(design, parameters=FrozenMap(reader.parameters), written=frozenset(reader.written))
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
@@ -92,9 +90,8 @@ class Reader:
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
         self.gains: dict[str, tuple[Field, Tree, float, Per]] = {}
-        head, control, motor = (
-            tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
-        )
+        tables = (tree.get(key) for key in ("design", "control", "motor"))
+        head, control, motor = (each if isinstance(each, dict) else {} for each in tables)
         stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
         self.structure = Structure(_meant(head, "design.axis"), "velocity" in stages, "current" in stages)
         self.frame = Frame(self.structure, _meant(motor, "motor.constants"))
@@ -211,10 +208,8 @@ class Reader:
         return self.refuse(path, raw, f"{hint}{'; ' * bool(hint)}allowed: {allowed}")
 
     def words(self, field: Field, raw: Any, path: str) -> Any:
-        """Some of the words that a key may have, each once."""
         known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
-        texts = all(isinstance(word, str) for word in known)
-        if not known or not texts or len({*known}) != len(known):
+        if not known or not all(isinstance(word, str) for word in known) or len({*known}) != len(known):
             return self.refuse(path, raw, f"allowed: a list of {allowed}, each at most once")
         strange = [word for word in known if word not in field.choices]
         for word in strange:
@@ -259,7 +254,6 @@ class Reader:
         return False
 
     def kept(self, field: Field, table: Tree, value: Any, path: str, into: dict[str, model.Parameter]) -> Any:
-        """A value with its pedigree."""
         if value is UNREAD:
             return UNREAD
         unit = field.unit(self.structure)
@@ -290,7 +284,6 @@ class Reader:
         return design
 
     def tolerance(self, field: Field, raw: Any, value: float, path: str) -> model.Tolerance | None:
-        """How far a value may lie from what is written."""
         if raw is None:
             return None
         unit = field.unit(self.structure)
@@ -301,20 +294,17 @@ class Reader:
             return self.refuse(at, raw if error.where is None else raw[error.where], error.message)
 
     def numbers(self, field: Field, raw: Any, path: str) -> Any:
-        """A list of numbers."""
         if not isinstance(raw, list):
             return self.refuse(path, raw, "allowed: a list")
         read = tuple(self.number(field, one, f"{path}[{k}]") for k, one in enumerate(raw[:MAX_LIST], 1))
         return read if 0 < len(raw) <= MAX_LIST else self.unread(path, f"allowed: 1 to {MAX_LIST} items")
 
     def rows(self, field: Field, raw: Any, path: str) -> Any:
-        """A list of rows of numbers."""
         if not isinstance(raw, list) or not all(isinstance(row, list) for row in raw):
             return self.refuse(path, raw, "allowed: a list of rows, each a list of numbers")
         return tuple(self.numbers(field, row, f"{path}[{k}]") for k, row in enumerate(raw[:MAX_LIST], 1))
 
     def number(self, field: Field, raw: Any, path: str) -> Any:
-        """A number in SI."""
         if isinstance(raw, bool) or not isinstance(raw, str | int | float):
             what = "a whole number" if field.kind == "integer" else "a number with its unit, as text"
             return self.refuse(path, raw, f"allowed: {what}{_example(field)}")
@@ -366,7 +356,6 @@ class Reader:
         return section.kind(**values)
 
     def law(self, raw: Any, path: str) -> Any:
-        """The table of a law, with what stands in its file."""
         if not isinstance(raw, dict) or "file" not in raw:
             return raw
         file, rest = raw["file"], {key: value for key, value in raw.items() if key != "file"}

@@ -22,7 +22,6 @@ _LABEL = re.compile(r"(?:0[xX])?([0-9A-Fa-f]{4})(?:\.([0-9A-Fa-f]{2}))?\Z")
 
 
 def read_settings(path: str | Path, velocity_gain_factor: float | None = None) -> ControllerObjects:
-    """Read a settings file, see `parse_settings`."""
     return parse_settings(read_text(path, "settings file"), shown_path(path), velocity_gain_factor)
 
 
@@ -68,7 +67,6 @@ def _object_from(label: str, raw: Any) -> ControllerObject:
 
 
 def object_entry(item: ControllerObject) -> Any:
-    """The entry of one object in TOML."""
     more = {key: getattr(item, key) for key in ("name", "data_type") if getattr(item, key)}
     return {"value": item.value, **more} if more else item.value
 
@@ -136,8 +134,7 @@ def placed(element: Element, depth: int = 0) -> Iterator[tuple[ObjectPlace, Elem
             yield from placed(child, depth + 1)
         return
     index = _hex(element, "index", 4)
-    subs = [child for child in element if _is(child, "CANopenSubObject")]
-    for one in (element, *subs):
+    for one in (element, *[child for child in element if _is(child, "CANopenSubObject")]):
         yield ObjectPlace(index=index, subindex=0 if one is element else _hex(one, "subIndex", 2)), one
 
 

@@ -76,7 +76,9 @@ def _refuse_impossible(tolerance: Tolerance, nominal: float, unit: str, field: F
 
 
 def rescaled(tolerance: Tolerance, nominal: float) -> Tolerance | None:
-    """The tolerance of a changed nominal: a relative one follows it, of 0 there is none."""
+    """The tolerance of a changed nominal: a relative one follows it; of 0 and beyond limits there is none."""
+    if not tolerance.lower <= nominal <= tolerance.upper:
+        return None
     if not tolerance.relative:
         return tolerance
     if nominal == 0.0:

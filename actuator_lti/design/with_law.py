@@ -108,12 +108,10 @@ def with_law(
 
 
 def _staged(design: Design, stage: str, table: Mapping[str, Any], law: Mapping[str, Any]) -> Design:
-    """The design with a law at a stage, and what stands beside it."""
     return with_overrides(design, {f"control.{stage}": {**table, "law": law}})
 
 
 def _sampled(parts: tuple[Any, ...], dt: Any, period_s: float, method: str) -> tuple[Any, ...]:
-    """A continuous system sampled by a stated method."""
     from scipy.linalg import LinAlgError, LinAlgWarning
     from scipy.signal import cont2discrete
 

@@ -111,7 +111,6 @@ def _table(design: Design, part: Any, name: str, section: Section) -> Tree:
 
 
 def _bare(value: Any, unit: str) -> Any:
-    """A value without a pedigree."""
     if isinstance(value, tuple):
         return [_bare(item, unit) for item in value]
     return value if isinstance(value, str | bool) or unit == "1" else si_text(value, unit)
@@ -270,8 +269,7 @@ def design_hash(design: Design) -> str:
     content |= {"waivers": [asdict(item) for item in design.waivers]} if design.waivers else {}
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
     content["tolerances"] = {path: _canonical(tolerance) for path, _, tolerance in tolerances(design)}
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def _canonical(value: Any) -> Any:

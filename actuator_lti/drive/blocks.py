@@ -63,11 +63,9 @@ def pi(gain: Any, integral_time_s: Any, period_s: Any) -> Block:
     rate = gain / integral_time_s
     step = rate * period_s
     return Block(
-        Realisation(((1.0,),), (step,), (1.0,), gain + step),
-        Realisation(((0.0,),), (rate,), (1.0,), gain),
-        ("I",),
-        period_s,
-    )
+        Realisation(((1.0,),), (step,), (1.0,), gain + step), Realisation(((0.0,),), (rate,), (1.0,), gain),
+        ("I",), period_s
+    )  # fmt: skip
 
 
 def lag(time_s: Any, period_s: Any) -> Block:
@@ -75,10 +73,8 @@ def lag(time_s: Any, period_s: Any) -> Block:
     share = period_s / (time_s + period_s)
     return Block(
         Realisation(((1.0 - share,),), (share,), (1.0 - share,), share),
-        Realisation(((-1 / time_s,),), (1 / time_s,), (1.0,), 0.0),
-        ("filter",),
-        period_s,
-    )
+        Realisation(((-1 / time_s,),), (1 / time_s,), (1.0,), 0.0), ("filter",), period_s
+    )  # fmt: skip
 
 
 def difference(samples: int, period_s: Any) -> Block:
@@ -117,10 +113,8 @@ def speed_estimate(encoder: Encoder, period_s: Any) -> Block | None:
 
 def analog(item: Filter) -> tuple[Polynomial, Polynomial]:
     """Numerator and denominator in s, highest power first, of a filter that is given in s."""
-    w0: Any = item.frequency_rad_s
-    zero: Any = item.zero_rad_s
-    pole: Any = item.pole_rad_s
-    width: Any = item.width_rad_s
+    given: Any = item
+    w0, zero, pole, width = given.frequency_rad_s, given.zero_rad_s, given.pole_rad_s, given.width_rad_s
     if item.kind == "lowpass":
         return ((w0,), (1.0, w0)) if item.order == 1 else ((w0**2,), (1.0, 2 * item.damping * w0, w0**2))
     if item.kind == "notch":
@@ -133,13 +127,10 @@ def analog(item: Filter) -> tuple[Polynomial, Polynomial]:
 
 def centre_rad_s(item: Filter) -> Any:
     """The frequency at which Tustin's rule is prewarped; ``None`` for a sampled biquad."""
-    if item.kind == "biquad":
-        return None
-    if item.frequency_rad_s is not None:
+    given: Any = item
+    if item.kind == "biquad" or item.frequency_rad_s is not None:
         return item.frequency_rad_s
-    assert item.zero_rad_s is not None
-    assert item.pole_rad_s is not None
-    return (item.zero_rad_s * item.pole_rad_s) ** 0.5
+    return (given.zero_rad_s * given.pole_rad_s) ** 0.5
 
 
 def biquad(item: Filter, period_s: Any) -> Block:
@@ -150,12 +141,10 @@ def biquad(item: Filter, period_s: Any) -> Block:
     if item.kind == "biquad":
         return _given(item, period_s)
     num, den = analog(item)
-    order = len(den) - 1
-    w0 = centre_rad_s(item)
+    order, w0 = len(den) - 1, centre_rad_s(item)
     if np.any(np.asarray(w0) * period_s >= np.pi):
-        raise InputError(
-            f"{item.kind} at {np.max(w0):g} rad/s: must be below pi/T = {np.pi / np.min(period_s):g} rad/s"
-        )
+        most = f"pi/T = {np.pi / np.min(period_s):g} rad/s"
+        raise InputError(f"{item.kind} at {np.max(w0):g} rad/s: must be below {most}")
     c = w0 / np.tan(w0 * period_s / 2)
     padded = (0.0,) * (order + 1 - len(num)) + num
     b, a = _tustin(padded, c), _tustin(den, c)
@@ -177,8 +166,7 @@ def _canonical(num: Polynomial, den: Polynomial) -> Realisation:
     A = tuple(
         tuple(-a[r + 1] if c == 0 else (1.0 if c == r + 1 else 0.0) for c in range(n)) for r in range(n)
     )
-    B = tuple(b[r + 1] - a[r + 1] * b[0] for r in range(n))
-    return Realisation(A, B, (1.0, 0.0)[:n], b[0])
+    return Realisation(A, tuple(b[r + 1] - a[r + 1] * b[0] for r in range(n)), (1.0, 0.0)[:n], b[0])
 
 
 def _back(p: Polynomial, h: Any) -> Polynomial:

@@ -24,15 +24,12 @@ def where(condition: Any, yes: Any, no: Any) -> Any:
 
 
 def smaller(a: Any, b: Any) -> Any:
-    """The smaller of two values."""
     return where(b < a, b, a)
 
 
 def larger(a: Any, b: Any) -> Any:
-    """The larger of two values."""
     return where(b > a, b, a)
 
 
 def finite(value: Any) -> Any:
-    """Whether a value is neither infinite nor NaN."""
     return abs(value) < math.inf

@@ -93,6 +93,22 @@ def _through_train(design: Design, ratio: Any = 1.0) -> Any:
     return passed + ratio * design.friction.load_coefficient * design.ratio_behind_coupling
 
 
+def held_moment_Nm(design: Design, torque_Nm: float) -> float:
+    """Moment with which a motor torque presses on an output held fast: friction takes its part of both.
+
+    Never more than the torque through the ratio, whatever friction by load a self-locking design leaves out.
+
+    >>> from actuator_lti.design import load_design
+    >>> fin = load_design("fin")  # (T - C0)/(1/N + CM)
+    >>> round(held_moment_Nm(fin, 0.05), 6) == round((0.05 - 0.008) / (1 / 60 + 1.7e-3), 6)
+    True
+    """
+    way = 1 if torque_Nm > 0.0 else -1
+    left = abs(torque_Nm) - dry_torque(design, 0.0, way) - way * design.friction.offset_torque_Nm
+    at_coupling = max(left, 0.0) / max(_through_train(design), 1.0 / design.ratio_to_coupling)
+    return way * float(at_coupling) * design.ratio_behind_coupling
+
+
 def driven_inertia_kgm2(design: Design) -> Any:
     """Inertia that the motor speeds up, at its shaft; behind a coupling with the friction of its torque.
 
@@ -117,16 +133,14 @@ def resistance_Nm(design: Design, load_Nm: float, direction: int) -> Any:
 
 def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
     """Slope of friction over the motor's speed, piece by piece: (speed from which it holds, slope)."""
-    pieces = friction_slopes(design, direction)
     behind, damping = design.load.friction, design.load.moment_damping_Nms_rad
     more: Any = 0.0
     if behind is not None and design.coupling is not None:
         more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     if present(damping):
         more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
-    if not present(more):
-        return pieces
-    return [(start, slope + more) for start, slope in pieces]
+    pieces = friction_slopes(design, direction)
+    return [(start, slope + more) for start, slope in pieces] if present(more) else pieces
 
 
 def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:
@@ -176,8 +190,7 @@ def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) ->
     """First speed where ``start_value + friction(w) + more w`` rises through 0; inf where it does not."""
     result: Any = math.inf
     value = start_value
-    ends = [*(start for start, _ in slopes[1:]), None]
-    for (start, slope), end in zip(slopes, ends, strict=True):
+    for (start, slope), end in zip(slopes, [*(start for start, _ in slopes[1:]), None], strict=True):
         rise = slope + more
         rises = rise > 0.0
         root = where(rises, start - value / where(rises, rise, 1.0), math.inf)
@@ -190,25 +203,20 @@ def _first_root(start_value: Any, slopes: list[tuple[float, Any]], more: Any) ->
 
 
 def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
-    """The figures for one direction of motion, the load against it."""
     against = resistance_Nm(design, load_Nm, direction)
     speed, cause, torque = _top_speed(design, against, _speed_slopes(design, direction))
     stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
     needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
-    starts = (stall > needed) & (stall > against)
-    gain = where(starts, (stall - against) / driven_inertia_kgm2(design), 0.0)
+    gain = where((stall > needed) & (stall > against), (stall - against) / driven_inertia_kgm2(design), 0.0)
     held = larger(needed, against)
     holds = held > 0.0
     margin = where(holds, stall / where(holds, held, 1.0), math.inf)
     limit = design.limits.acceleration_rad_s2
     current = math.nan if kM is None else where(finite(speed), torque / kM, math.nan)
     return Capability(
-        output_rate_rad_s=speed / design.total_ratio,
-        rate_limit=cause,
-        motor_current_A=current,
-        acceleration_rad_s2=smaller(gain, limit) / design.total_ratio,
-        torque_margin=margin,
-    )
+        output_rate_rad_s=speed / design.total_ratio, rate_limit=cause, motor_current_A=current,
+        acceleration_rad_s2=smaller(gain, limit) / design.total_ratio, torque_margin=margin
+    )  # fmt: skip
 
 
 def _with_own_Nm(design: Design, load_Nm: float) -> Any:

@@ -6,6 +6,7 @@ themselves (`OverAngle`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -71,6 +72,8 @@ class Operating:
         """The same, refused where the design has no such operating point."""
         if self.point in ("driving", "driven", "gap") and design.coupling is None:
             raise InputError(f"operating_point = {self.point!r}: the design has no coupling")
+        if self.rotor == "locked" and not design.motor.has_electrical_dynamics:
+            raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
         return self
 
 
@@ -83,11 +86,9 @@ def slope_at(design: Design, at: Operating) -> Any:
     """
     if at.point == "describing-function":
         return sum(_described(design, at, way) for way in (1, -1)) / 2
-    slope: Any = design.friction.viscous(at.direction)
-    if points := design.friction.map(at.direction):
-        (_, slope), *others = segments(points)
-        for start, following in others:
-            slope = np.where(start <= abs(at.speed_rad_s), following, slope)[()]
+    (_, slope), *others = friction_slopes(design, at.direction)
+    for start, following in others:
+        slope = np.where(start <= abs(at.speed_rad_s), following, slope)[()]
     if at.point == "rest":
         slope = slope + dry_torque(design, at.load_Nm, at.direction) / design.friction.smoothing_speed_rad_s
     return slope
@@ -95,10 +96,9 @@ def slope_at(design: Design, at: Operating) -> Any:
 
 def dry_torque(design: Design, load_Nm: float, direction: int) -> Any:
     """Tc = C0 + CM |M_ext| in N m at the motor; C0 is the first torque of a friction map."""
-    points, dry = design.friction.map(direction), design.friction.dry_Nm(load_Nm, direction)
-    if not points:
-        return dry
-    return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
+    if points := design.friction.map(direction):
+        return points[0].torque_Nm + design.friction.load_coefficient * abs(load_Nm)
+    return design.friction.dry_Nm(load_Nm, direction)
 
 
 def rubs(design: Design) -> bool:
@@ -122,13 +122,10 @@ def friction_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
 
 
 def _described(design: Design, at: Operating, way: int) -> Any:
-    W, points = at.speed_amplitude_rad_s, design.friction.map(way)
+    W = at.speed_amplitude_rad_s
     assert W is not None
-    dry = described_dry(dry_torque(design, at.load_Nm, way), W)
-    if not points:
-        return design.friction.viscous(way) + dry
-    total, last = dry, 0.0
-    for start, slope in segments(points):
+    total, last = described_dry(dry_torque(design, at.load_Nm, way), W), 0.0
+    for start, slope in friction_slopes(design, way):
         total, last = total + (slope - last) * dead_zone(start / W), slope
     return total
 
@@ -194,23 +191,40 @@ def averaged(design: Design) -> Design:
     return replace(design, motor=design.motor.straight(), load=load) if runs(design) else design
 
 
+IN_MOTION = "in motion"
+
+
+def turned(design: Design) -> Iterator[tuple[str, Design]]:
+    """The drive where its cogging or gear error is steepest, and in a motion that averages them.
+
+    On a crest it drives the rotor away, in a notch it holds it: margins are extreme there.
+    """
+    motor, load = design.motor, design.load
+    if runs(design) or not (motor.cogging_Nm or load.gear_error_Nm):
+        return
+    for where, phase in (("on a crest", 0.0), ("in a notch", pi)):
+        if motor.cogging_Nm:
+            yield f"{where} of the cogging", replace(design, motor=replace(motor, cogging_phase_rad=phase))
+        if load.gear_error_Nm:
+            at = replace(load, gear_error_phase_rad=phase)
+            yield f"{where} of the gear error", replace(design, load=at)
+    yield IN_MOTION, replace(design, motor=motor.straight(), load=replace(load, gear_error_Nm=0.0))
+
+
 def _moving(design: Design, at: Operating) -> bool:
     return at.speed_rad_s != 0.0 or (runs(design) and at.point != "rest")
 
 
 def torque_slope(design: Design, at: Operating) -> Any:
     """dT/d(motor angle) of the motor's own torque, in the same way."""
-    if at.torques_held:
-        return 0.0
     angle = _motor_angle_rad(design, at.angle_rad, at.twist_rad)
-    return design.motor.over_angle.slope_at(angle, moving=_moving(design, at))
+    return 0.0 if at.torques_held else design.motor.over_angle.slope_at(angle, moving=_moving(design, at))
 
 
 def moment_slope(design: Design, at: Operating) -> Any:
     """dM_ext/d(output angle) in N m/rad at the operating point; a float, or an array of stacked designs."""
-    if at.torques_held:
-        return 0.0
-    return design.load.over_angle.slope_at(at.angle_rad, moving=_moving(design, at))
+    slope_at = design.load.over_angle.slope_at
+    return 0.0 if at.torques_held else slope_at(at.angle_rad, moving=_moving(design, at))
 
 
 def pushes_away(design: Design, at: Operating) -> Any:
@@ -222,10 +236,8 @@ def pushes_away(design: Design, at: Operating) -> Any:
 
 
 def level(design: Design) -> Design:
-    """The same drive without what changes with the angle."""
     return replace(design, motor=design.motor.level(), load=design.load.level())
 
 
 def straight(design: Design) -> Design:
-    """The same drive without what bends with the angle."""
     return replace(design, motor=design.motor.straight(), load=design.load.straight())

@@ -90,14 +90,9 @@ def motor_plant(design: Design, at: Operating | None = None) -> Plant:
     at = (at or Operating()).checked(design)
     motor = design.effective_motor
     if at.rotor == "locked":
-        if not motor.has_electrical_dynamics:
-            raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
-        A, B = _electrical(motor)
-        names = ("i",)
-        none = np.zeros(1)
-        return Plant(
-            names, matrix(names, {("i", "i"): A["i", "i"]}), vector(names, B), none, none, {}, {}, {}
-        )
+        (A, B), names, none = _electrical(motor), ("i",), np.zeros(1)
+        A_i = matrix(names, {("i", "i"): A["i", "i"]})
+        return Plant(names, A_i, vector(names, B), none, none, {}, {}, {})
     plant = _rigid(design, motor, at) if design.coupling is None else _elastic(design, motor, at)
     return _at_once(plant) if at.torques_at_once else plant
 
@@ -117,9 +112,8 @@ def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:
     """Equation (1): entries of the current's row, and of B_u."""
     R, L, kE = motor.resistance_ohm, motor.inductance_H, motor.back_emf_constant_Vs_rad
     if R is None or L is None or kE is None or motor.torque_constant_Nm_A is None:
-        raise InputError(
-            "motor: resistance, inductance, torque_constant and back_emf_constant, or source_gain"
-        )
+        needed = "resistance, inductance, torque_constant and back_emf_constant, or source_gain"
+        raise InputError(f"motor: {needed}")
     return {("i", "i"): -R / L, ("i", "w"): -kE / L}, {"i": 1 / L}
 
 
@@ -138,15 +132,11 @@ def _rigid(design: Design, motor: Motor, at: Operating) -> Plant:
     names = ("i", "w", "th") if motor.has_electrical_dynamics else ("w", "th")
     reaches = design.load.path == "back-drivable"
     return Plant(
-        states=names,
-        A=matrix(names, A),
-        B_u=vector(names, B_u),
-        B_T=vector(names, {"w": 1 / J}),
-        B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}),
-        torque=_own_torque(design, at),
+        states=names, A=matrix(names, A), B_u=vector(names, B_u), B_T=vector(names, {"w": 1 / J}),
+        B_M=vector(names, {"w": 1 / (N * J) if reaches else 0.0}), torque=_own_torque(design, at),
         moment=_own_moment(design, at) if reaches else {},
-        rows={"output_angle": {"th": 1 / N}, "output_speed": {"w": 1 / N}, "load_speed": {"w": 1.0}},
-    )
+        rows={"output_angle": {"th": 1 / N}, "output_speed": {"w": 1 / N}, "load_speed": {"w": 1.0}}
+    )  # fmt: skip
 
 
 def _own_torque(design: Design, at: Operating) -> Entries:

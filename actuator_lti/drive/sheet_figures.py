@@ -27,10 +27,9 @@ def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
     """
     linear, ratio = design.axis == "linear", design.total_ratio
     unit = "kg" if linear else "kg*m^2"
+    behind = design.load.inertia_kgm2 / ratio**2
     inertia = (
-        SheetFigure(
-            "load inertia at the motor, over the ratio squared", design.load.inertia_kgm2 / ratio**2, unit
-        ),
+        SheetFigure("load inertia at the motor, over the ratio squared", behind, unit),
         SheetFigure("all inertia at the motor", design.inertia_kgm2, unit),
     )
     motor, U = design.effective_motor, design.limits.voltage_V

@@ -18,7 +18,6 @@ class Signal:
     linear_unit: str = ""
 
     def unit_for(self, axis: Axis) -> str:
-        """Unit on an axis."""
         return self.linear_unit if axis == "linear" and self.linear_unit else self.unit
 
 
@@ -62,15 +61,11 @@ class Limiter:
     always: bool = False  # whether every drive that has the signal is told of it, without such a limit too
 
     def limit_of(self, limits: Limits) -> Any:
-        """Its value in a design; ``inf`` where there is none."""
         return getattr(limits, self.limit)
 
     def unit(self, axis: Axis = "rotary") -> str:
-        """Unit of the limit on an axis."""
         unit = SIGNALS[self.signal].unit_for(axis)
-        if self.kind != "rate":
-            return unit
-        return f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
+        return unit if self.kind != "rate" else f"{unit}^2" if unit.endswith("/s") else f"{unit}/s"
 
 
 _LIMITERS = (

@@ -9,6 +9,7 @@ from typing import Any
 
 from actuator_lti.design.law import Law
 from actuator_lti.design.model import Design, Motor
+from actuator_lti.design.plant import torque_per_command
 
 
 def winding(motor: Motor) -> tuple[Any, Any, Any]:
@@ -59,21 +60,12 @@ def voltage_limit_torque_Nm(design: Design, speed_rad_s: Any) -> Any:
     return kM * (design.limits.voltage_V - kE * speed_rad_s) / circuit_resistance_ohm(design)
 
 
-def standing_gain(design: Design) -> Any:
-    """Motor torque at rest per unit of what the controllers in front set: A, or V without a current loop."""
-    motor = design.effective_motor
-    if motor.source_gain_Nm_V is not None:
-        return motor.source_gain_Nm_V
-    R, kM, _ = winding(motor)
-    return kM if design.controller.current is not None else kM / R
-
-
 def own_drag_Nms_rad(design: Design) -> Any:
     """Damping of the motor by itself: its friction and, without a current loop, its back-EMF ``kM kE/R``."""
     drag = design.friction.viscous_Nms_rad
     if not design.motor.has_electrical_dynamics or design.controller.current is not None:
         return drag
-    return drag + standing_gain(design) * winding(design.effective_motor)[2]
+    return drag + torque_per_command(design) * winding(design.effective_motor)[2]
 
 
 def stage_gain(gain: Any, law: Law | None) -> Any:
@@ -83,9 +75,7 @@ def stage_gain(gain: Any, law: Law | None) -> Any:
 
 def steady_gain(item: Any) -> Any:
     """Gain of a filter at DC: 1 but for a sampled biquad."""
-    if item.kind != "biquad":
-        return 1.0
-    b, a = item.polynomials
+    b, a = item.polynomials if item.kind == "biquad" else ((1.0,), (1.0,))
     return sum(b) / sum(a)
 
 
@@ -109,7 +99,7 @@ def drive_gain(design: Design) -> Any:
     motor, current = design.effective_motor, design.controller.current
     stiff = None if motor.source_gain_Nm_V is not None else _held_ohm(design)
     if current is None or stiff is None:
-        return standing_gain(design)
+        return torque_per_command(design)
     R, kM, _ = winding(motor)
     fed = current.gain_V_A if current.law is None else current.law.steady("command")
     return kM * (fed + current.resistance_feedforward * R) / stiff

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_lti.asked.quantities import LOOPS
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block
 from actuator_lti.drive.operating import Operating
@@ -45,7 +47,6 @@ class Drive:
 
     @cached_property
     def plant(self) -> Plant:
-        """The plant at the operating point."""
         return motor_plant(self.design, self.operating)
 
     @cached_property
@@ -60,12 +61,10 @@ class Drive:
 
     @property
     def tick_s(self) -> Any:
-        """Base period Ts."""
         return self.design.controller.period_s
 
     @property
     def ratio(self) -> Any:
-        """N, motor angle over output angle."""
         return self.design.total_ratio
 
     def has_own_law(self, stage: str) -> bool:
@@ -95,7 +94,6 @@ class Drive:
         return ERRORS[place], MEASURED[place], 1.0
 
     def period_s(self, stage: str) -> Any:
-        """Period T of a stage in s."""
         return self.interval[stage] * self.tick_s
 
     @property
@@ -105,17 +103,14 @@ class Drive:
 
     def law(self, stage: str) -> Block:
         """The PI of a stage in its own period (of the position loop without its derivative part)."""
-        control, T = self.design.controller, self.period_s(stage)
-        if stage == "current" and control.current is not None:
-            return blocks.pi(control.current.gain_V_A, control.current.integral_time_s, T)
-        if stage == "velocity" and control.velocity is not None:
-            return blocks.pi(control.velocity.gain, control.velocity.integral_time_s, T)
-        return blocks.pi(control.position_loop.gain, control.position_loop.integral_time_s, T)
+        loop: Any = getattr(self.design.controller, stage)
+        gain = loop.gain_V_A if stage == "current" else loop.gain
+        return blocks.pi(gain, loop.integral_time_s, self.period_s(stage))
 
     def filters(self, place: str) -> tuple[Filter, ...]:
         """Filters of the velocity loop on ``"speed"`` or ``"torque"``, in order."""
-        velocity = self.design.controller.velocity
-        return () if velocity is None else velocity.filters_on(place)  # type: ignore[arg-type]
+        velocity: Any = self.design.controller.velocity
+        return () if velocity is None else velocity.filters_on(place)
 
     @property
     def command_filter(self) -> Block | None:
@@ -128,21 +123,14 @@ class Drive:
 
     def producer(self, signal: str) -> str:
         """The stage that updates a break point (``"output"`` is read by the position stage)."""
-        for stage, target in self.target.items():
-            if target == signal:
-                return stage
-        return "position"
+        return next((stage for stage, target in self.target.items() if target == signal), "position")
 
     @property
     def points(self) -> tuple[str, ...]:
         """The break points that exist, from the motor outwards."""
-        return (
-            *(self.target[stage] for stage in self.stages),
-            *(("output",) if "position" in self.stages else ()),
-        )
+        return (*(self.target[stage] for stage in self.stages), *["output"] * ("position" in self.stages))
 
     def inside(self, stage: str) -> tuple[str, ...]:
-        """The stages inside a stage."""
         return self.stages[: self.stages.index(stage)]
 
     def unit(self, signal: str) -> str:
@@ -150,7 +138,6 @@ class Drive:
         return SIGNALS[signal].unit_for(self.design.axis)
 
     def later(self, delay_s: float) -> Drive:
-        """The same drive with more computing delay."""
         control = self.design.controller
         slower = replace(control, computing_delay_s=control.computing_delay_s + delay_s)
         return replace(self, design=replace(self.design, controller=slower))
@@ -165,20 +152,10 @@ def wire(design: Design, operating: Operating | None = None) -> Drive:
     control = design.controller
     if control.current is not None and not design.motor.has_electrical_dynamics:
         raise InputError("control.current: an ideal torque source has no current to control")
-    if at.rotor == "locked" and not design.motor.has_electrical_dynamics:
-        raise InputError("rotor = 'locked': the design has no current, its torque is an ideal source")
     kept = control.stages if at.rotor == "free" else tuple(s for s in control.stages if s == "current")
     stages = tuple(str(stage) for stage in reversed(kept))
-    signals = {"current": "i_ref", "velocity": "w_ref"}
-    target, inner = {}, "u"
-    for stage in stages:
-        target[stage] = inner
-        inner = signals.get(stage, "")
-    every = {
-        "current": 1,
-        "velocity": control.velocity.every if control.velocity else 1,
-        "position": control.position.every if control.position else 1,
-    }
+    target = {stage: COMMANDS[inner] for inner, stage in pairwise(("voltage", *stages))}
+    every = {stage: getattr(getattr(control, stage), "every", 1) for stage in LOOPS}
     if every["position"] % every["velocity"] and "position" in stages:
         raise InputError(f"control.position.every = {every['position']}: a multiple of {every['velocity']}")
     interval = {stage: every[stage] for stage in stages} | {"speed": every["velocity"]}

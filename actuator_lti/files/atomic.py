@@ -36,7 +36,6 @@ def write_text(path: AnyPath, text: str) -> None:
 
 
 def write_bytes(path: AnyPath, data: bytes) -> None:
-    """Write bytes; see `write_text`."""
     write_together({path: data})
 
 
@@ -125,8 +124,7 @@ def _held(write: Callable[[BinaryIO], object]) -> BinaryIO:
 
 def _write_through(held: BinaryIO, path: Path) -> None:
     """Copy to a device or pipe that is there; a pipe that nobody reads is an error, not a wait."""
-    own = _OPEN_FILE.match(str(path.absolute()))
-    if own:  # at its own place in the file: opened again it would begin at the start
+    if own := _OPEN_FILE.match(str(path.absolute())):  # opened again it would begin at the start
         sys.stdout.flush()
         handle = os.dup(int(own[1]) if own[1] else _STANDARD.index(own[2]))
     else:

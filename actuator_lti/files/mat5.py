@@ -52,11 +52,9 @@ def read_mat5(data: bytes) -> MatContent:
     """
     if len(data) < HEADER:
         raise InputError(f"{len(data)} bytes: too short for a MATLAB file")
-    mark, version = data[126:128], data[124:126]
-    order = {b"IM": "<", b"MI": ">"}.get(mark)
-    if order is None:
+    if (order := {b"IM": "<", b"MI": ">"}.get(data[126:128])) is None:
         raise InputError("no MATLAB level 5 file (level 4 and other formats are not read; save it with -v7)")
-    if struct.unpack(f"{order}H", version)[0] == 0x0200 or data[HEADER : HEADER + 4] == b"\x89HDF":
+    if struct.unpack(f"{order}H", data[124:126])[0] == 0x0200 or data[HEADER : HEADER + 4] == b"\x89HDF":
         raise InputError("is a MATLAB 7.3 (HDF5) file; save it with -v7")
     reader = _Reader(order)
     for kind, body, place in reader.elements(data, HEADER):
@@ -76,7 +74,6 @@ class _Reader:
         self.order, self.content = order, MatContent()
 
     def take(self, kind: int, body: bytes, place: int) -> None:
-        """Add one top-level element."""
         parts = list(self.elements(body)) if kind == MATRIX else []
         if len(parts) < 3 or len(parts[0][1]) < 8:
             what = "incomplete array" if kind == MATRIX else f"element of type {kind}"
@@ -110,8 +107,7 @@ class _Reader:
 
     def _sparse(self, name: str, parts: list[Part], _place: int) -> bool:
         """A sparse matrix, which is written by columns, as a full one where that is not too large."""
-        found = [self._numbers(part) for part in (parts[1], *parts[3:])]
-        numbers = [one for one in found if one is not None]
+        numbers = [one for part in (parts[1], *parts[3:]) if (one := self._numbers(part)) is not None]
         there = sum(array.size for array in self.content.arrays.values())
         if len(numbers) not in (4, 5) or len(numbers[0]) != 2 or there + prod(numbers[0]) > MAT_VALUES.most:
             return False
@@ -173,7 +169,6 @@ class _Reader:
         return True
 
     def _inside(self, part: Part) -> MatContent:
-        """What one element within another holds."""
         reader = _Reader(self.order)
         reader.take(*part)
         return reader.content
@@ -205,8 +200,7 @@ class _Reader:
 
     def _numbers(self, part: Part) -> Floats | None:
         """Numbers of one element as floats; None for a type that is no number."""
-        code = NUMBERS.get(part[0])
-        if code is None:
+        if (code := NUMBERS.get(part[0])) is None:
             return None
         dtype = np.dtype(f"{self.order}{code}")
         if len(part[1]) % dtype.itemsize:

@@ -19,18 +19,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.bounds import (
-    CAMPAIGN_BYTES,
-    CAMPAIGN_VALUES,
-    JSON_DEPTH,
-    KEY_PARTS,
-    REPORT_BYTES,
-    TEXT_CHARACTERS,
-    TOML_BYTES,
-    TOML_DEPTH,
-    TOML_VALUES,
-    Bound,
-)
+from actuator_lti import bounds
+from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH, TOML_VALUES, Bound
 from actuator_lti.errors import InputError, in_file
 
 AnyPath = str | PathLike[str]
@@ -49,17 +39,12 @@ def shown(value: object, longest: int = 60) -> str:
     """A value as it may be printed: short, one line, no control characters."""
     if isinstance(value, dict | list):
         return f"a{'' if value else 'n empty'} {'table' if isinstance(value, dict) else 'list'}"
-    text = value if isinstance(value, str) else _written(value)
+    if isinstance(value, int) and value not in INTEGERS:  # Python does not agree to print every digit
+        return f"an integer of {value.bit_length()} bits"
+    text = value if isinstance(value, str) else repr(value)
     text = "".join(c if unicodedata.category(c)[0] != "C" else "?" for c in text[: longest + 1])
     text = text if len(text) <= longest else text[: longest - 3] + "..."
     return f'"{text}"' if isinstance(value, str) else text
-
-
-def _written(value: object) -> str:
-    """``repr``, also of an integer with more digits than Python agrees to print."""
-    if isinstance(value, int) and value not in INTEGERS:
-        return f"an integer of {value.bit_length()} bits"
-    return repr(value)
 
 
 def shown_path(path: AnyPath) -> str:
@@ -70,7 +55,6 @@ def shown_path(path: AnyPath) -> str:
 
 
 def as_path(path: AnyPath) -> Path:
-    """A path; what is none is refused."""
     shown_path(path)
     return Path(os.fspath(path))
 
@@ -96,7 +80,6 @@ def open_regular(path: AnyPath, what: str = "file") -> BufferedReader:
 
 
 def _near(path: AnyPath) -> str:
-    """The file of nearly that name in the same folder."""
     folder, name = os.path.split(os.fsdecode(path))
     try:
         near = get_close_matches(name, os.listdir(folder or "."), 1, 0.8)
@@ -151,12 +134,12 @@ def read_toml(
 
 def read_campaign_toml(path: AnyPath) -> Tree:
     """As `read_toml`, for campaign and record files, which list thousands of runs."""
-    return read_toml(path, "campaign or record file", CAMPAIGN_BYTES, CAMPAIGN_VALUES)
+    return read_toml(path, "campaign or record file", bounds.CAMPAIGN_BYTES, bounds.CAMPAIGN_VALUES)
 
 
 def read_json(path: AnyPath, what: str = "report.json") -> Any:
     """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
-    where, text = shown_path(path), read_text(path, what, REPORT_BYTES)
+    where, text = shown_path(path), read_text(path, what, bounds.REPORT_BYTES)
     if not text.strip():
         raise InputError(f"is empty; allowed: a {what}", where=where)
     return parse_json(text, where)
@@ -174,7 +157,7 @@ def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound
             raise InputError(_too_deep("", TOML_DEPTH)) from None
         except (ValueError, OverflowError) as error:
             raise InputError(f"not TOML: {_plain(str(error), 200)}{_hint(text, error)}") from None
-        _walk(tree, TOML_DEPTH, values, TEXT_CHARACTERS)
+        _walk(tree, TOML_DEPTH, values, bounds.TEXT_CHARACTERS)
     return tree
 
 
@@ -221,14 +204,13 @@ def parse_json(text: str, where: str, constant: Callable[[str], float] = _refuse
     """
     with in_file(where):
         try:
-            value = json.loads(
-                text, parse_constant=constant, parse_float=_finite, object_pairs_hook=_no_key_twice
-            )
+            hooks: Any = {"parse_float": _finite, "object_pairs_hook": _no_key_twice}
+            value = json.loads(text, parse_constant=constant, **hooks)
         except RecursionError:
-            raise InputError(_too_deep("", JSON_DEPTH)) from None
+            raise InputError(_too_deep("", bounds.JSON_DEPTH)) from None
         except (ValueError, OverflowError) as error:
             raise InputError(f"not JSON: {_plain(str(error), 200)}") from None
-        _walk(value, JSON_DEPTH, None, None)
+        _walk(value, bounds.JSON_DEPTH, None, None)
     return value
 
 
@@ -249,12 +231,11 @@ def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
 def _refuse_long_keys(text: str) -> None:
     for number, line in enumerate(text.splitlines(), 1):
         head = line.partition("=")[0]
-        if head.count(".") > KEY_PARTS.most and not head.lstrip().startswith("#"):
+        if head.count(".") > bounds.KEY_PARTS.most and not head.lstrip().startswith("#"):
             raise InputError(f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels")
 
 
 def _plain(text: str, longest: int = 60) -> str:
-    """A text as `shown`, without quotes."""
     return shown(text, longest)[1:-1]
 
 
@@ -296,7 +277,5 @@ def _check_text(text: str, path: str, refused: tuple[str, ...], length: Bound | 
         raise InputError(f"{_plain(path)}: {len(text)} characters; allowed: {length.allowed}")
     for character in () if text.isprintable() else text:
         if unicodedata.category(character) in refused and character not in "\n\t":
-            code = f"U+{ord(character):04X}"
-            raise InputError(
-                f"{_plain(path)} = {shown(text)}: holds the control character {code}; allowed: printable text"
-            )
+            held = f"the control character U+{ord(character):04X}"
+            raise InputError(f"{_plain(path)} = {shown(text)}: holds {held}; allowed: printable text")

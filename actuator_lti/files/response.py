@@ -113,14 +113,13 @@ def read_response(source: Path | str | Any, averages: int | None = None) -> Reco
     if not isinstance(source, (str, Path)):
         raise InputError(f"{shown(source)}: allowed: a path or control.FrequencyResponseData")
     with in_file(shown_path(source)):
-        titled = True
-        if Path(source).suffix.lower() != ".mat":
-            columns, titled = _table(read_text(source, column.WHAT, TABLE_BYTES))
-        else:
+        if titled := Path(source).suffix.lower() == ".mat":
             content = read_mat5(read_bytes(source, column.WHAT, MAT_BYTES))
             columns = {name: values.ravel() for name, values in content.arrays.items()}
             for name, values in content.complexes.items():
                 columns |= {f"{name}.real": values.real.ravel(), f"{name}.imag": values.imag.ravel()}
+        else:
+            columns, titled = _table(read_text(source, column.WHAT, TABLE_BYTES))
         read = _response(columns, Path(source).name, averages)
         return read if titled else replace(read, read_as=f"without a heading, {read.read_as}")
 
@@ -141,9 +140,8 @@ def _table(text: str) -> tuple[dict[str, Floats], bool]:
         raise InputError(f"line {places[0]} is no row of a table; allowed: a {column.TABLE}")
     for line, row in zip(places, rows, strict=True):
         if len(row) != width:
-            raise InputError(
-                f"{len(row)} columns in line {line}, {width} in the first; allowed: a {column.TABLE}"
-            )
+            there = f"{len(row)} columns in line {line}, {width} in the first"
+            raise InputError(f"{there}; allowed: a {column.TABLE}")
     head = rows.pop(0) if any(np.isnan(_number(word, cut)) for word in rows[0]) else None
     for line, row in zip(places[len(places) - len(rows) :], rows, strict=True):
         if wrong := [word for word in row if word.lower() not in NO_VALUE and np.isnan(_number(word, cut))]:
@@ -216,9 +214,8 @@ def _averaged(read: RecordedResponse) -> RecordedResponse:
     if not z.all():
         raise InputError("repeats whose mean is 0; allowed: values that do not cancel")
     size, own = np.abs(z), np.abs(once.response)
-    deviation, radius = (
-        np.sqrt(mean((one * own) ** 2) / count) / size for one in (once.deviation, once.radius)
-    )
+    told = (once.deviation, once.radius)
+    deviation, radius = (np.sqrt(mean((one * own) ** 2) / count) / size for one in told)
     f, coherence = once.frequency_hz[first], mean(once.coherence)
     made = replace(once, frequency_hz=f, response=z, deviation=deviation, coherence=coherence, radius=radius)
     if np.isfinite(radius).all():

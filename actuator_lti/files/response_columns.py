@@ -103,11 +103,8 @@ def refuse_contradiction(
     """Refuse a response z at frequencies f, in Hz, that columns beside it tell otherwise."""
     for name, values in beside.items():
         role = next((role for role, (like, _) in _UNITS.items() if like.search(name)), "")
-        if (
-            _ERROR.search(name)
-            or values.size != good.size
-            or (off := _off(role, name, values[good], f, z)) is None
-        ):
+        other = _ERROR.search(name) or values.size != good.size
+        if other or (off := _off(role, name, values[good], f, z)) is None:
             continue
         off = np.abs(off[np.isfinite(off)])
         if off.size and np.quantile(off, 0.9) > _APART:
@@ -165,10 +162,8 @@ def _deviation(table: Mapping[str, Floats], units: Mapping[str, str]) -> Floats:
         return told[0][1] * SI[kinds[0]]
     if kinds not in (("dB",), ("deg",), ("rad",), ("dB", "deg"), ("dB", "rad")):
         words = " and ".join(unit or "no unit" for unit in kinds)
-        allowed = (
-            "over the size of the value (a ratio or %), or of the gain in dB, of the phase in deg, or both"
-        )
-        raise InputError(f"deviations in {words}; allowed: one {allowed}")
+        allowed = "one over the size of the value (a ratio or %), or of the gain in dB, of the phase in deg"
+        raise InputError(f"deviations in {words}; allowed: {allowed}, or both")
     parts = [np.expm1(values * _DB) if unit == "dB" else SI[unit] * values for unit, values in told]
     return np.sqrt(2.0 / len(parts) * np.sum(np.square(parts), axis=0))
 

@@ -8,13 +8,6 @@ from actuator_lti.loops.periodic import ExactMargins, PeriodicLoop, exact_margin
 from actuator_lti.loops.result import Form, InnerLoops, Loop, Loops
 
 __all__ = [
-    "ExactMargins",
-    "Form",
-    "InnerLoops",
-    "Loop",
-    "Loops",
-    "PeriodicLoop",
-    "assemble_loops",
-    "exact_margins",
-    "periodic_loop",
-]
+    "ExactMargins", "Form", "InnerLoops", "Loop", "Loops", "PeriodicLoop", "assemble_loops", "exact_margins",
+    "periodic_loop"
+]  # fmt: skip

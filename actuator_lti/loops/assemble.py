@@ -15,18 +15,11 @@ from actuator_lti.loops.result import Form, InnerLoops, Loops
 
 
 def assemble_loops(
-    design: Design | str | PathLike[str],
-    form: Form = "sampled",
-    operating_point: OperatingPoint = "sliding",
-    load_Nm: float = 0.0,
-    speed_amplitude_rad_s: float | None = None,
-    direction: int = 1,
-    rotor: RotorState = "free",
-    inner_loops: InnerLoops = "closed",
-    speed_rad_s: float = 0.0,
-    angle_rad: float = 0.0,
-    twist_rad: float = 0.0,
-) -> Loops:
+    design: Design | str | PathLike[str], form: Form = "sampled", operating_point: OperatingPoint = "sliding",
+    load_Nm: float = 0.0, speed_amplitude_rad_s: float | None = None, direction: int = 1,
+    rotor: RotorState = "free", inner_loops: InnerLoops = "closed", speed_rad_s: float = 0.0,
+    angle_rad: float = 0.0, twist_rad: float = 0.0
+) -> Loops:  # fmt: skip
     """All loops of a design as named python-control systems (model.md section 3).
 
     ``design``: a design, a shipped name, or the path of a design file.
@@ -58,22 +51,15 @@ def assemble_loops(
     Loops(ilr33-amber: current, velocity, position; sampled, sliding, 0 N m, rotor free)
     """
     at = Operating(
-        point=operating_point,
-        load_Nm=load_Nm,
-        speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction,
-        rotor=rotor,
-        speed_rad_s=speed_rad_s,
-        angle_rad=angle_rad,
-        twist_rad=twist_rad,
-    )
+        point=operating_point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_amplitude_rad_s,
+        direction=direction, rotor=rotor, speed_rad_s=speed_rad_s, angle_rad=angle_rad, twist_rad=twist_rad,
+    )  # fmt: skip
     return loops_at(as_design(design), at, form, inner_loops)
 
 
 def loops_at(
     design: Design, at: Operating, form: Form = "sampled", inner_loops: InnerLoops = "closed"
 ) -> Loops:
-    """The same at an `Operating`, see `assemble_loops`."""
     if form not in get_args(Form):
         raise InputError(f"form = {form!r}: one of {', '.join(get_args(Form))}")
     wired = wire(design, at)
@@ -93,20 +79,15 @@ def loops_at(
     stages = {stage: time.loop(wired, stage, *more, opened[stage]) for stage in wired.stages}
     whole, sampled_form = at.rotor == "free", form == "sampled"
     return Loops(
-        design=design,
-        form=form,
-        operating=at,
-        inner_loops=inner_loops,
-        current=stages.get("current"),
-        velocity=stages.get("velocity"),
-        position=stages.get("position"),
+        design=design, form=form, operating=at, inner_loops=inner_loops, current=stages.get("current"),
+        velocity=stages.get("velocity"), position=stages.get("position"),
         break_points={point: time.loop(wired, point, *more) for point in wired.points},
         limiters=time.limiters(wired, *more) if whole else {},
         plain_response=time.reference_to_output(wired, *more) if whole else None,
         moment_system=partial(time.moment_to_output, wired, *more) if whole else None,
         tick_system=time.tick_system(wired) if whole and sampled_form else None,
-        period_s=wired.tick_s if sampled_form else None,
-    )
+        period_s=wired.tick_s if sampled_form else None
+    )  # fmt: skip
 
 
 def _assembled_again(loops: Loops) -> Any:

@@ -32,13 +32,9 @@ OUTPUTS = {"current": "i", "speed": "w", "angle": "th", "output_angle": "output_
 
 
 def plant(
-    design: Design | str | PathLike[str],
-    form: Form = "sampled",
-    rotor: RotorState = "free",
-    command: PlantInput = "u",
-    operating_point: OperatingPoint = "sliding",
-    load_Nm: float = 0.0,
-) -> control.StateSpace | DelaySystem:
+    design: Design | str | PathLike[str], form: Form = "sampled", rotor: RotorState = "free",
+    command: PlantInput = "u", operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0
+) -> control.StateSpace | DelaySystem:  # fmt: skip
     """The drive without its velocity and position controller, as a python-control system.
 
     ``design``: a design, a shipped name, or the path of a design file.

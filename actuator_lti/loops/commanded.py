@@ -50,13 +50,10 @@ def commanded_bandwidth(response: Any, mean: CommandMean) -> Bandwidth:
         peak = 1.0 / (least * dc)
     peak_db = 20.0 * math.log10(peak)
     return replace(
-        own,
-        minus3db_rad_s=crossings[0],
-        crossings_rad_s=tuple(crossings),
+        own, minus3db_rad_s=crossings[0], crossings_rad_s=tuple(crossings),
         minus90deg_rad_s=zero_rad_s if turn is None else min(turn, zero_rad_s),
-        resonance_peak_db=peak_db if peak_db > 1e-9 else 0.0,
-        resonance_rad_s=place if peak_db > 1e-9 else 0.0,
-    )
+        resonance_peak_db=peak_db if peak_db > 1e-9 else 0.0, resonance_rad_s=place if peak_db > 1e-9 else 0.0
+    )  # fmt: skip
 
 
 class _Gain:
@@ -73,11 +70,9 @@ class _Gain:
         zeros = 1j * np.tan(math.pi / n * k[2 * k != n])  # one at z = -1 lies at infinity
         roots, weights = np.append(zeros, -1.0), np.append(np.ones(zeros.size), 1.0 - n)
         self.factors = replace(
-            own,
-            roots=np.concatenate((own.roots, roots)),
-            weights=np.concatenate((own.weights, weights)),
-            log_gain=own.log_gain - math.log(dc) - float(np.log(np.abs(zeros)).sum()),
-        )
+            own, roots=np.concatenate((own.roots, roots)), weights=np.concatenate((own.weights, weights)),
+            log_gain=own.log_gain - math.log(dc) - float(np.log(np.abs(zeros)).sum())
+        )  # fmt: skip
 
     def at(self, w: float) -> float:
         """The gain at w = tan(angle/2)."""
@@ -127,12 +122,8 @@ def commanded_step(response: Any, own: StepFigures, mean: CommandMean) -> StepFi
     peak = int(np.argmax(part))
     over = 100.0 * (part[peak] - 1.0)
     return replace(
-        own,
-        rise_time_s=rise,
-        overshoot_percent=float(over) if over > 100.0 * _OVER else 0.0,
+        own, rise_time_s=rise, overshoot_percent=float(over) if over > 100.0 * _OVER else 0.0,
         settling_time_s=(int(outside[-1]) + 1) * period if outside.size else 0.0,
-        peak_value=float(part[peak] * own.final_value),
-        peak_time_s=peak * period,
-        time_s=np.arange(count) * period,
-        response=part * own.final_value,
-    )
+        peak_value=float(part[peak] * own.final_value), peak_time_s=peak * period,
+        time_s=np.arange(count) * period, response=part * own.final_value
+    )  # fmt: skip

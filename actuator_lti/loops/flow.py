@@ -50,7 +50,6 @@ class FlowProgram(Program):
     delays: frozenset[str] = ALL  # which are kept: none is the form ``ideal``; some, for the delay budget
 
     def flow(self) -> Flow:
-        """Walk once."""
         return FlowWalk(self).finish()
 
 
@@ -82,7 +81,6 @@ class FlowWalk(Walk):
         return True
 
     def late(self, name: str, value: Row, delay_s: float) -> Row:
-        """A value as it was some time ago."""
         if not delay_s > 0:
             return value
         self.delay[name], self.waiting[name] = delay_s, value
@@ -109,8 +107,7 @@ class FlowWalk(Walk):
         self.rate[name] = value
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
-        names = [f"{name}.{k}" for k in range(len(block.continuous.B))]
-        return self.realised(names, block.continuous, value)
+        return self.realised([f"{name}.{k}" for k in range(len(block.continuous.B))], block.continuous, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """The difference over the period; ideal: the derivative, by the chain rule."""
@@ -119,7 +116,6 @@ class FlowWalk(Walk):
         return total(gain * self.derivative_of(source) for source, gain in value.terms.items())
 
     def derivative_of(self, name: str) -> Row:
-        """Derivative of a state or an input."""
         if name in self.rate and name not in ("i", "w", "W"):
             return self.rate[name]
         if f"{name}_rate" in SOURCES:
@@ -132,13 +128,10 @@ class FlowWalk(Walk):
         return self.late("speed", self.apply("estimate", block, speed), age)
 
     def finish(self) -> Flow:
-        """Matrices over all states that there are."""
         states, waits = tuple(self.rate), tuple(self.delay)
         names = (*states, *(f"z:{name}" for name in waits), *SOURCES)
         return Flow(
-            states,
-            np.array([self.delay[name] for name in waits]),
-            table(self.rate.values(), names),
+            states, np.array([self.delay[name] for name in waits]), table(self.rate.values(), names),
             table([self.waiting[name] for name in waits], names),
-            {name: table([row], names)[0] for name, row in self.signals.items()},
-        )
+            {name: table([row], names)[0] for name, row in self.signals.items()}
+        )  # fmt: skip

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.systems.as_control import as_control
 
@@ -112,17 +112,12 @@ def loop_of(
     name = place if place in wired.stages else f"at {place}"
     label, unit = name.replace(" ", "_"), wired.unit(error)
     return Loop(
-        name=name,
-        break_point=wired.target.get(place, place),
+        name=name, break_point=wired.target.get(place, place),
         plain_open=named(parts[0], f"{label}_open_loop", error, measured),
         plain_closed=named(parts[1], f"{label}_closed_loop", "reference", measured),
-        plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error),
-        period_s=period_s,
-        unit_in=unit,
-        unit_out=unit,
-        periodic=periodic,
-        rotor=wired.operating.rotor,
-    )
+        plain_sensitivity=named(parts[2], f"{label}_sensitivity", "reference", error), period_s=period_s,
+        unit_in=unit, unit_out=unit, periodic=periodic, rotor=wired.operating.rotor
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, repr=False)
@@ -182,7 +177,6 @@ class Loops:
 
     @property
     def load_Nm(self) -> float:
-        """Load torque at the output shaft."""
         return self.operating.load_Nm
 
     @property
@@ -192,26 +186,21 @@ class Loops:
         return {name: loop for name, loop in named.items() if loop is not None}
 
     def __getitem__(self, name: str) -> Loop:
-        """A loop or break point by its name."""
         known = dict(self.items())
         if name not in known:
             raise InputError(f"loops[{name!r}]: allowed: {', '.join(known)}")
         return known[name]
 
     def __iter__(self) -> Iterator[str]:
-        """The names of the loops, innermost first, and of the break points."""
         return iter(self.keys())
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self.items())
 
     def keys(self) -> list[str]:
-        """The names, as a mapping has them."""
         return [name for name, _ in self.items()]
 
     def values(self) -> list[Loop]:
-        """The loops by themselves."""
         return [loop for _, loop in self.items()]
 
     def items(self) -> list[tuple[str, Loop]]:
@@ -225,7 +214,6 @@ class Loops:
         return list(axes)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
         return draw("loops_html", self)
 
     def __repr__(self) -> str:

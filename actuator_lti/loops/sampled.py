@@ -15,7 +15,6 @@ from actuator_lti.systems.resolvent import states_at
 
 
 def _system(block: Block, name: str, source: str, signal: str, period_s: float) -> PlainSystem:
-    """A block of one design under its names, with its period."""
     return PlainSystem(block.A, block.B, block.C, block.D, period_s, name, source, signal, block.states)
 
 

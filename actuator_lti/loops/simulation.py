@@ -40,7 +40,6 @@ class TickSystem:
 
     @property
     def states(self) -> tuple[str, ...]:
-        """Names of the states, see `actuator_lti.loops.tick`."""
         return self.program.states
 
     def matrices(self, phase: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -62,12 +61,9 @@ class TickSystem:
         return x
 
     def respond(
-        self,
-        reference_rad: np.ndarray,
-        torque_Nm: np.ndarray | float = 0.0,
-        initial: np.ndarray | None = None,
-        moment_Nm: np.ndarray | float = 0.0,
-    ) -> dict[str, np.ndarray]:
+        self, reference_rad: np.ndarray, torque_Nm: np.ndarray | float = 0.0,
+        initial: np.ndarray | None = None, moment_Nm: np.ndarray | float = 0.0
+    ) -> dict[str, np.ndarray]:  # fmt: skip
         """Run the recursion from t_0, see `initial_state`; gives `outputs` at t_k, each of shape (K,).
 
         The command is that at t_k in its own unit (read only where the outermost loop updates), the torque

@@ -9,7 +9,7 @@ states, where one time-invariant system of the same response (`actuator_lti.loop
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.drive.operating import Operating
+from actuator_lti.drive.operating import Operating, OperatingPoint
+from actuator_lti.drive.plant import reaction
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.tick import Block, TickProgram, mean_response, pruned, siso
 
@@ -38,7 +39,8 @@ _AWAY = 1e-3  # of the stiffness at `_SLOW_HZ` is left at `_REST_HZ`: 1e-7 by on
 class StiffnessFigures:
     """What a requirement may limit, each worked out where it is read; floats, or arrays of stacked designs.
 
-    A load changes them only by the piece of a spring that bends: friction slides.
+    A load changes them only by the piece of a spring that bends: friction slides. Of friction by the
+    coupling's torque the smaller of both `ways` counts.
     """
 
     design: Design
@@ -47,12 +49,12 @@ class StiffnessFigures:
     @cached_property
     def static_stiffness_Nm_rad(self) -> Any:
         """Powered, at zero frequency; see `static_stiffness`."""
-        return static_stiffness(self._response)
+        return self._smallest(static_stiffness)
 
     @cached_property
     def least_stiffness_Nm_rad(self) -> Any:
         """Powered, the smallest size at rest and between `LOWEST_HZ` and `HIGHEST_HZ` (or Nyquist)."""
-        size = np.abs(stiffness_at(self._response, weakest_hz(self._response)))[..., 0]
+        size = self._smallest(lambda response: np.abs(stiffness_at(response, weakest_hz(response)))[..., 0])
         return _plain(np.minimum(size, self.static_stiffness_Nm_rad))
 
     @property
@@ -60,9 +62,30 @@ class StiffnessFigures:
         """At +-3 % of the largest load moment, never below the play; 0 of a rigid drive train."""
         return lost_motion_rad(self.design)
 
+    def _smallest(self, read: Callable[[Compliance], Any]) -> Any:
+        found = [np.where(there, read(self._responses[way]), np.inf) for way, there in ways(self.design)]
+        return _plain(np.minimum.reduce(found))
+
     @cached_property
-    def _response(self) -> Compliance:
-        return compliance(self.design, Operating(load_Nm=self.load_Nm))
+    def _responses(self) -> dict[OperatingPoint, Compliance]:
+        at = [Operating(point=way, load_Nm=self.load_Nm) for way, _ in ways(self.design)]
+        return {each.point: compliance(self.design, each) for each in at}
+
+
+def ways(design: Design) -> tuple[tuple[OperatingPoint, Any], ...]:
+    """Operating points at which a load meets friction, and whether each is there (stacked designs: arrays).
+
+    Friction that grows with the coupling's torque T_s makes two of sliding: the motor moves against the load
+    ("driving", T_s (1/N_c + CM')), or the load moves the motor ("driven", 1/N_c - CM'), if it can.
+
+    >>> from actuator_lti.design import load_design
+    >>> [[way for way, there in ways(load_design(name)) if there] for name in ("emps", "fin")]
+    [['sliding'], ['driving', 'driven']]
+    """
+    if design.coupling is None or not np.any(design.friction.load_coefficient > 0.0):
+        return (("sliding", True),)
+    moved = reaction(design, Operating(point="driven")) > 0.0
+    return (("driving", True), ("driven", moved)) if np.any(moved) else (("driving", True),)
 
 
 def frequencies_hz(response: Compliance) -> npt.NDArray[np.float64]:
@@ -100,8 +123,7 @@ def static_stiffness(response: Compliance) -> Any:
     """K at zero frequency, by its slope near there: below 0 of a drive that pushes away, 0 of a free one, inf
     with an integral.
     """
-    hertz = [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]
-    K = np.moveaxis(stiffness_at(response, hertz), -1, 0)
+    K = np.moveaxis(stiffness_at(response, [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]), -1, 0)
     rest, low, high = np.abs(K)
     gone = ~np.isfinite(low) | (high < 0.5 * low)
     return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, np.copysign(rest, K[0].real))))
@@ -134,7 +156,6 @@ class Compliance:
 
     @property
     def moves(self) -> bool:
-        """Whether a moment moves the output at all."""
         return bool(self.blocks[0].states)
 
     def __call__(self, z: npt.ArrayLike) -> npt.NDArray[np.complex128]:
@@ -160,7 +181,6 @@ class Compliance:
 
     @cached_property
     def _poles(self) -> npt.NDArray[np.complex128]:
-        """Poles over a period of all ticks."""
         over = np.eye(len(self.blocks[0].states))
         for block in self.blocks:
             over = block.A @ over

@@ -52,7 +52,6 @@ class TickProgram(Program):
 
     @cached_property
     def states(self) -> tuple[str, ...]:
-        """Names of the states, see the module."""
         names = dict.fromkeys(name for walk in self._walked.values() for name in walk.next)
         return tuple(sorted(names, key=self._order))
 
@@ -124,7 +123,6 @@ class TickWalk(Walk):
         return self.realised([f"{name}.{state}" for state in block.states], block.sampled, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
-        """(x_k - x_{k-1})/T."""
         before = self.state(f"{name}_prev")
         self.next[f"{name}_prev"] = value
         return (value - before) / period_s
@@ -169,7 +167,6 @@ class TickWalk(Walk):
             self.next["acc"] += total(value * change[name] for name, value in angle.terms.items())
 
     def finish(self, states: tuple[str, ...]) -> Tick:
-        """Matrices over the states of the whole program."""
         n, names = len(states), (*states, *INPUTS)
         rows = table([self.next.get(name, Row.of(name)) for name in states], names)
         signals = table(self.signals.values(), names)
@@ -212,7 +209,6 @@ class Block:
         return replace(self, A=A, B=B, C=C, D=D)
 
     def pruned(self) -> Block:
-        """Without the states that are not used, see `pruned`."""
         return pruned([self])[0]
 
     def shown(self) -> Block:
@@ -246,7 +242,6 @@ def used(blocks: Sequence[Block]) -> np.ndarray:
 
 
 def pruned(blocks: Sequence[Block]) -> list[Block]:
-    """The blocks without the states that none of them uses."""
     kept = used(blocks)
     names = tuple(name for name, there in zip(blocks[0].states, kept, strict=True) if there)
     return [
@@ -256,7 +251,6 @@ def pruned(blocks: Sequence[Block]) -> list[Block]:
 
 
 def compose(ticks: Sequence[Tick]) -> tuple[np.ndarray, np.ndarray]:
-    """State and input matrix over several ticks with all inputs held."""
     A, B = ticks[0].A, ticks[0].B
     for tick in ticks[1:]:
         A, B = tick.A @ A, tick.A @ B + tick.B

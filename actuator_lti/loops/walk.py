@@ -16,9 +16,9 @@ from functools import cached_property
 from typing import Any
 
 from actuator_lti.design.law import Law, Matrices, twist_of
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive import blocks
 from actuator_lti.drive.blocks import Block, Realisation
-from actuator_lti.drive.steady import standing_gain
 from actuator_lti.drive.wiring import ERRORS, LAW_OUTPUT, Drive, present
 from actuator_lti.loops.rows import Row, total
 
@@ -43,7 +43,6 @@ class Program:
 
     @cached_property
     def stages(self) -> tuple[str, ...]:
-        """Stages that run, innermost first."""
         names = self.drive.stages
         return names[: names.index(self.outer) + 1] if names else ()
 
@@ -182,9 +181,8 @@ class Walk(ABC):
         """P, PI or PID on the angle, and the feed-forward of speed and acceleration."""
         law, N, T = self.control.position_loop, self.drive.ratio, self.drive.period_s("position")
         command = N * reference
-        sensed = self.signals["output_angle" if law.sensor == "output" else "th"]
-        own = sensed if law.sensor == "output" else sensed / N
-        own = self.at_cut("output", own)
+        measured = self.signals["output_angle"] if law.sensor == "output" else self.signals["th"] / N
+        own = self.at_cut("output", measured)
         error = self.at_cut("e_th", command - N * own)
         if law.law is not None:
             seen = {"output_angle": own} if law.sensor == "output" else {"angle": N * own}
@@ -200,7 +198,7 @@ class Walk(ABC):
             rate = self.derivative("ref", command, T)
             value = value + law.feedforward * rate
         if present(law.acceleration_feedforward):
-            needed = self.design.inertia_kgm2 / standing_gain(self.design)  # J/kM
+            needed = self.design.inertia_kgm2 / torque_per_command(self.design)  # J/kM
             made = law.acceleration_feedforward * needed * self.derivative("rate", rate, T)
             if "velocity" not in self.program.stages:
                 value = value + made
@@ -292,12 +290,9 @@ class Walk(ABC):
         if self.drive.operating.rotor == "locked":
             return Row()
         every = self.drive.interval["speed"]
-        value = None
-        if self.updates(every):
-            value = self.measured_speed()
+        value = self.measured_speed() if self.updates(every) else None
         return self.held("w_meas", value, every, self.drive.interval[stage])
 
 
 def _sum(gains: Iterable[Any], rows: Iterable[Row]) -> Row:
-    """A product of a row of gains and signals."""
     return total(gain * row for gain, row in zip(gains, rows, strict=True))

@@ -49,7 +49,6 @@ class ControlFace(control.FrequencyResponseData, NonlinearIOSystem):
 
     @property
     def sysname(self) -> str:
-        """The name under which python-control plots it."""
         return str(self.name)
 
     @cached_property

@@ -82,14 +82,12 @@ class DelaySystem(ControlFace):
 
     @classmethod
     def of(cls, plain: PlainDelaySystem, **names: Any) -> DelaySystem:
-        """The python-control system of matrices and names."""
         if plain.states:
             names["states"] = list(plain.states)
         return cls(**{part: getattr(plain, part) for part in _PARTS}, **names)
 
     @property
     def plain(self) -> PlainDelaySystem:
-        """The same as matrices."""
         labels = tuple(self.state_labels) if self.nstates else ()
         return PlainDelaySystem(**{part: getattr(self, part) for part in _PARTS}, states=labels)
 
@@ -101,9 +99,8 @@ class DelaySystem(ControlFace):
         if isinstance(system, int | float | np.number):
             return cls([], [], [], [], [], [[float(system)]], [], [], [], [], **names)
         if not isinstance(system, control.StateSpace | control.TransferFunction):
-            raise InputError(
-                f"{type(system).__name__}: a continuous StateSpace or TransferFunction, or a number"
-            )
+            allowed = "a continuous StateSpace or TransferFunction, or a number"
+            raise InputError(f"{type(system).__name__}: {allowed}")
         if not system.isctime():
             raise InputError(f"a sampled system (dt = {system.dt}) cannot be joined to a continuous one")
         labels = {"inputs": system.input_labels, "outputs": system.output_labels} | names
@@ -122,15 +119,13 @@ class DelaySystem(ControlFace):
 
     @property
     def delay_free(self) -> bool:
-        """Whether there is no delay at all."""
         return len(self.delays_s) == 0
 
     def to_state_space(self) -> control.StateSpace:
         """The same as `control.StateSpace`; refused (`InputError`) where there are delays."""
         if not self.delay_free:
-            raise InputError(
-                "to_state_space: the system has delays, which no finite state space holds exactly"
-            )
+            why = "the system has delays, which no finite state space holds exactly"
+            raise InputError(f"to_state_space: {why}")
         labels = {"inputs": self.input_labels, "outputs": self.output_labels, "name": self.name}
         if self.nstates:
             labels["states"] = self.state_labels
@@ -180,11 +175,9 @@ class DelaySystem(ControlFace):
         Zx, Zp, Zu = D @ Vx, C + D @ Vp, D @ Vu
         return control.ss(
             np.block([[self.A + self.B2 @ Zx, self.B2 @ Zp], [B @ Vx, A + B @ Vp]]),
-            np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]),
-            np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
-            self.D11 + self.D12 @ Zu,
-            **({"inputs": self.input_labels, "outputs": self.output_labels} | names),
-        )
+            np.vstack([self.B1 + self.B2 @ Zu, B @ Vu]), np.hstack([self.C1 + self.D12 @ Zx, self.D12 @ Zp]),
+            self.D11 + self.D12 @ Zu, **({"inputs": self.input_labels, "outputs": self.output_labels} | names)
+        )  # fmt: skip
 
     def characteristic(self, s: Any) -> np.ndarray:
         """Characteristic quasi-polynomial det [[sI - A, -B2 E], [-C2, I - D22 E]] at complex s.
@@ -199,11 +192,9 @@ class DelaySystem(ControlFace):
         points = np.atleast_1d(np.asarray(x, dtype=complex))
         if points.ndim != 1:
             raise InputError("a system is evaluated at a number or a 1D array of complex frequencies")
-        y = response(self, points)
-        return control.lti._process_frequency_response(self, x, y, squeeze=squeeze)
+        return control.lti._process_frequency_response(self, x, response(self, points), squeeze=squeeze)
 
     def dcgain(self, warn_infinite: bool = False) -> Any:
-        """Gain at s = 0 (delays play no part there)."""
         return self._dcgain(warn_infinite)
 
     def poles(self) -> np.ndarray:
@@ -223,7 +214,6 @@ class DelaySystem(ControlFace):
         return self * -1.0
 
     def __add__(self, other: Any) -> DelaySystem:
-        """Parallel connection."""
         return DelaySystem.of(in_parallel(self.plain, DelaySystem.from_system(other).plain))
 
     __radd__ = __add__
@@ -250,7 +240,6 @@ class DelaySystem(ControlFace):
         raise InputError(f"{shown(other)} / {self}: no division by a system with delays, it would look ahead")
 
     def __pow__(self, power: Any) -> DelaySystem:
-        """The system in series with itself."""
         return reduce(mul, [self] * whole_number("power", power, 0), DelaySystem.from_system(1.0))
 
     def feedback(self, other: Any = 1, sign: int = -1) -> DelaySystem:

@@ -46,7 +46,6 @@ class PlainSystem:
         return responses(self, asked.reshape(-1)).reshape(asked.shape)[()]
 
     def poles(self) -> np.ndarray:
-        """The eigenvalues of A."""
         return np.asarray(np.linalg.eigvals(self.A).astype(complex) if self.A.size else np.empty(0, complex))
 
 
@@ -82,17 +81,14 @@ class PlainDelaySystem:
 
     @property
     def ninputs(self) -> int:
-        """The number of inputs m."""
         return int(self.D11.shape[1])
 
     @property
     def noutputs(self) -> int:
-        """The number of outputs p."""
         return int(self.D11.shape[0])
 
     @property
     def delay_free(self) -> bool:
-        """Whether there is no delay at all."""
         return len(self.delays_s) == 0
 
     def to_state_space(self) -> PlainSystem:
@@ -122,12 +118,10 @@ class PlainDelaySystem:
         return joined_by(self, back, np.eye(m + p, m), np.eye(p, p + m), loop)
 
     def named(self, name: str, source: str, signal: str) -> PlainDelaySystem:
-        """The same under other names."""
         return replace(self, name=name, source=source, signal=signal)
 
 
 def static(gain: np.ndarray) -> PlainDelaySystem:
-    """A gain without states."""
     p, m = gain.shape
     none, inward, outward = np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0))
     return PlainDelaySystem(
@@ -137,16 +131,13 @@ def static(gain: np.ndarray) -> PlainDelaySystem:
 
 
 def in_series(first: PlainDelaySystem, second: PlainDelaySystem) -> PlainDelaySystem:
-    """Series connection."""
     if first.noutputs != second.ninputs:
         raise InputError(f"series: {first.noutputs} outputs into {second.ninputs} inputs")
     m, q, p = first.ninputs, first.noutputs, second.noutputs
-    loop = np.eye(m + q, q + p, k=-m)
-    return joined_by(first, second, np.eye(m + q, m), np.eye(p, q + p, k=q), loop)
+    return joined_by(first, second, np.eye(m + q, m), np.eye(p, q + p, k=q), np.eye(m + q, q + p, k=-m))
 
 
 def in_parallel(a: PlainDelaySystem, b: PlainDelaySystem) -> PlainDelaySystem:
-    """Parallel connection."""
     if (a.ninputs, a.noutputs) != (b.ninputs, b.noutputs):
         raise InputError("parallel connection: both systems need the same numbers of signals")
     source = np.vstack([np.eye(a.ninputs)] * 2)

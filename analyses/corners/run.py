@@ -1,7 +1,8 @@
 """Make the corners of a design and judge each by the linear loops."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from math import inf
 
 import numpy as np
 
@@ -9,13 +10,19 @@ from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTIT
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.access import with_values
 from actuator_lti.design.checks import contradictions
-from actuator_lti.design.model import Design, Temperature, Tolerance
+from actuator_lti.design.model import Design, Requirement, Temperature, Tolerance
 from actuator_lti.design.tolerances import drawn, together
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Progress
 from analyses.corners.asked import Asked
 from analyses.linear.loop_figures import LoopFigures, all_loop_figures
-from analyses.specification.requirements import RequirementVerdict, judged, tally
+from analyses.specification.requirements import (
+    RequirementVerdict,
+    judged,
+    judged_nominally,
+    tally,
+)
 from analyses.specification.sensitivity import moved, population_figures
 from analyses.studies.sampling import Factor
 
@@ -51,13 +58,16 @@ class Corners:
     design: Design
     asked: Asked
     corners: tuple[Corner, ...]
-    # Requirements on what only an analysis of one design finds; they are not proven at corners
+    # Requirements on what only an analysis of one design finds: not met where the nominal design fails, or
+    # else not proven
     left_out: tuple[RequirementVerdict, ...] = ()
+    over_all: tuple[RequirementVerdict, ...] = ()  # requirements on the worst of all corners
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of all corners, and of what is left out there."""
-        return sum((corner.tally for corner in self.corners), tally(self.left_out)).verdict
+        """The worst of all corners, of the requirements over all of them, and of what is left out there."""
+        beside = tally((*self.over_all, *self.left_out))
+        return sum((corner.tally for corner in self.corners), beside).verdict
 
     @property
     def passed(self) -> bool:
@@ -65,24 +75,19 @@ class Corners:
         return self.verdict.passes()
 
 
-def corners(design: Design, asked: Asked | None = None) -> Corners:
+def corners(design: Design, asked: Asked | None = None, *, progress: Progress = None) -> Corners:
     """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
 
     Each corner is a design of its own, put through the same loops as the nominal one. Requirements on what an
-    analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are left out: not proven, but for
-    those on the margins at the corners themselves.
+    analysis finds (`actuator_lti.asked.quantities.ANALYSIS_QUANTITIES`) are judged in the nominal design
+    alone, as by Monte Carlo, but for those on the margins at the corners, which are those of all of them.
+    ``progress``: called with (requirements judged so, all of them).
 
     >>> from actuator_lti.design import load_design
     >>> [corner.name for corner in corners(load_design("fin")).corners]
     ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']
     """
     asked = Asked.of(design) if asked is None else asked
-    left_out = tuple(
-        verdict
-        for one in design.requirements
-        if (quantity := QUANTITIES[one.quantity]).scope == "analysis" and not quantity.cornered
-        for verdict in judged(design, one, {}, _not_here)
-    )
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     made = []
     for name, words, there in _made(design, asked):
@@ -91,7 +96,29 @@ def corners(design: Design, asked: Asked | None = None) -> Corners:
         figures = all_loop_figures(assemble_loops(there))
         verdicts = tuple(verdict for one in kept for verdict in judged(there, one, figures, _not_here))
         made.append(Corner(name, words, there, figures, verdicts, refused))
-    return Corners(design, asked, tuple(made), left_out)
+    over_all, left = list[RequirementVerdict](), list[Requirement]()
+    for one in design.requirements:
+        if QUANTITIES[one.quantity].cornered:
+            over_all += judged(design, one, {}, lambda name: (worst_of(made, name), ""))
+        elif one not in kept:
+            left.append(one)
+    untold = "not judged at corners, it takes a computation of one design"
+    left_out = judged_nominally(design, left, made[0].figures, untold, progress)
+    return Corners(design, asked, tuple(made), left_out, tuple(over_all))
+
+
+def worst_of(corners: Iterable[Corner], name: str) -> float:
+    """A figure at the corners (of `ANALYSIS_QUANTITIES`): the worst over loops and corners.
+
+    -inf (or inf) where a loop is not stable.
+    """
+    quantity = QUANTITIES[QUANTITIES[name].cornered]
+    loops = [one.judged for corner in corners for one in corner.figures.values()]
+    if not all(one.stable for one in loops):
+        return -quantity.better * inf
+    found = (quantity.read(one) for one in loops)
+    worst = min((quantity.better * value for value in found if value is not None), default=inf)
+    return quantity.better * worst
 
 
 def _not_here(name: str) -> tuple[None, str]:

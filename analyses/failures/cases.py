@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from actuator_lti.design.model import Command, Design, Instruments, LoadFriction
-from actuator_lti.drive.facts import stall_torque_Nm
+from actuator_lti.drive.facts import held_moment_Nm, stall_torque_Nm
 from actuator_lti.drive.profile import profile_passes_rad_s
 from actuator_lti.drive.steady import motor_torque_Nm
 from actuator_lti.errors import InputError
@@ -40,7 +40,7 @@ class Rig:
         self.controller, self.plant = Drive(design), Drive(plant_of(design), load_Nm=load_Nm)
         self.sensing: Sensing | None = None
         self.driving: Driving | None = None
-        self.moment_Nm = 0.0
+        self.moment_Nm, self.jammed = 0.0, False
 
     def copy(self) -> Rig:
         """Another rig in the same state, nothing failed."""
@@ -76,7 +76,7 @@ class Rig:
 
     def step(self, command: float) -> State:
         """One tick; gives the truth at its start. `moment_Nm` is what the train carried, at the output."""
-        true, design, bus = self.measured(), self.design, self.plant.value("voltage_limit")
+        true, bus = self.measured(), self.plant.value("voltage_limit")
         seen = true if self.sensing is None else self.sensing(true)
         u = self.controller.control(
             command, seen.current_A, seen.motor_speed_rad_s, seen.motor_angle_rad,
@@ -85,11 +85,20 @@ class Rig:
         if self.driving is not None:
             u = self.driving(u, bus)
         self.plant.step(u)
-        if design.coupling is not None:
-            self.moment_Nm = self.plant.noted("coupling_torque") * design.ratio_behind_coupling
-        else:
-            self.moment_Nm = float(motor_torque_Nm(design, true.current_A, u)) * design.total_ratio
+        self.moment_Nm = self._carried_Nm(true, u)
         return true
+
+    def _carried_Nm(self, true: State, u: float) -> float:
+        """Torque of the coupling; rigid, what the output takes over the tick, or presses on a jam with."""
+        design, load = self.design, self.design.load
+        if design.coupling is not None:
+            return self.plant.noted("coupling_torque") * design.ratio_behind_coupling
+        if self.jammed:
+            return held_moment_Nm(design, float(motor_torque_Nm(design, true.current_A, u)))
+        N, now = design.total_ratio, true.motor_speed_rad_s
+        faster = (self.plant.value("speed") - now) / N / design.controller.period_s
+        own = float(load.over_angle.at(true.motor_angle_rad / N)) - load.moment_damping_Nms_rad * now / N
+        return load.inertia_kgm2 * faster - own - self.load_Nm
 
 
 HELD = 1e6  # times the stall torque: no torque of the drive moves a jam
@@ -130,6 +139,7 @@ def cases_of(design: Design, asked: Asked) -> tuple[tuple[Case, ...], dict[str, 
 
     def jam(rig: Rig) -> None:
         rig.fail(jammed(design))
+        rig.jammed = True
 
     def sine(hz: float, where: str) -> Case:
         words = f"a sine of {_size(design, near)} at {hz:.3g} Hz, {where}"

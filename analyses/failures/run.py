@@ -25,7 +25,8 @@ class FailureCase:
 
     name: str  # such as ``"hard-over"``
     words: str  # what happens
-    # Output side; the moment is that in the coupling (rigid: the motor's torque times the reduction)
+    # Output side; the moment is that in the coupling; rigid, what the output takes: its inertia and load, or
+    # on a jam the motor's torque less the train's friction
     time_s: Floats
     deflection_rad: Floats
     current_A: Floats

@@ -10,9 +10,10 @@ import numpy as np
 from scipy.optimize import root_scalar
 
 from actuator_lti.design.model import Command, Design
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import breakaway_torque_Nm, stall_torque_Nm
 from actuator_lti.drive.operating import holding_torque_Nm
-from actuator_lti.drive.steady import motor_torque_Nm, standing_gain, torque_gain_Nm_rad
+from actuator_lti.drive.steady import motor_torque_Nm, torque_gain_Nm_rad
 from analyses.finite import finite
 from nonlinear import Rows, commands, simulate
 from nonlinear.bench.operating_motion import operating_motion_at
@@ -214,7 +215,7 @@ def lost_predicted_rad(design: Design, load_Nm: float, static: StaticThreshold, 
 def _lag_rad(design: Design, load_Nm: float, static: StaticThreshold, rate_rad_s: float) -> float:
     """Command less output while the drive slides through zero of the command at a rate."""
     loop, load, sense = design.controller.position_loop, design.load, math.copysign(1.0, rate_rad_s)
-    fed = sense * loop.friction_feedforward * standing_gain(design) if loop.friction_feedforward else 0.0
+    fed = sense * loop.friction_feedforward * torque_per_command(design) if loop.friction_feedforward else 0.0
 
     def missing(lag: float) -> float:
         moment = load_Nm + float(load.moment_Nm(-lag))

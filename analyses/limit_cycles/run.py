@@ -1,5 +1,6 @@
 """Predict limit cycles, start the simulator in their shape, and wait what the drive as it is ends in."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -15,9 +16,12 @@ from analyses.limit_cycles import describing
 from analyses.motion.settling import Settling, noticed, settlings_of, verdict_of, waiver_of_rest
 from nonlinear import Rows
 from nonlinear.bench.operating_motion import without_counts
+from nonlinear.runs.running import Running
+from nonlinear.settling.rest import MOST_WORK, judge
 
 SCALES = np.geomspace(0.4, 2.5, 41)
 CYCLES_WATCHED = 24
+MOMENTS = 2000  # of a period, between which the output is as good as straight
 AS_PREDICTED = 1.25  # a factor: a describing function knows the fundamental alone
 _STARTS = {**PLACES, **ELASTIC}
 
@@ -106,33 +110,60 @@ def confirm(design: Design, cycle: describing.Cycle) -> Confirmation:
         if name in _STARTS and (tried.coupling is not None or name not in ELASTIC):
             rows[_STARTS[name]] = SCALES * value.real
     rows["speed_command_start"] = SCALES * _speed_command(tried, cycle)
-    size = _sizes(rows, round(period), 2) / cycle.output_rad
-    # What has died out, or failed, from every size is no cycle; what is large now may still fall to it
-    if size.max() >= SCALES[0] and size.min() < np.inf:
-        size = _sizes(rows, round(3.0 * period), CYCLES_WATCHED // 3) / cycle.output_rad
-    grows = size > SCALES
-    turns = np.flatnonzero((grows[1:] != grows[:-1]) & (grows[:-1] == cycle.stable))
-    if not turns.size:
+    turn = _turn(rows, cycle, period)
+    if turn is None:
         return Confirmation(cycle, None, None)
-    ratios = np.sqrt(SCALES[turns] * SCALES[turns + 1])
-    nearest = int(np.argmin(np.abs(np.log(ratios))))
-    row = rows.take(int(turns[nearest]))
-    if not cycle.stable:
-        row["ticks"] = round(3.0 * period)
+    row, ratio = rows.take(turn), float(np.sqrt(SCALES[turn] * SCALES[turn + 1]))
+    row["ticks"] = (CYCLES_WATCHED // 3 if cycle.stable else 1) * round(3.0 * period)
+    row["record_every"] = max(int(period) // MOMENTS, 1)
     run = row.trajectory()
     begin = run.time_s.size // 2 if cycle.stable else 0  # what other motion the start brings is gone by then
     t, w = run.time_s[begin:-1], np.diff(run.output_angle_rad[begin:])
     up = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
     rising = t[up] - w[up] * (t[up + 1] - t[up]) / (w[up + 1] - w[up])
     hertz = float((len(up) - 1) / (rising[-1] - rising[0])) if len(up) > 1 else None
-    return Confirmation(cycle, float(ratios[nearest]), hertz)
+    return Confirmation(cycle, ratio, hertz)
 
 
-def _sizes(rows: Rows, window: int, count: int) -> Floats:
+def _turn(rows: Rows, cycle: describing.Cycle, period: float) -> int | None:
+    """Number of the size beyond which motion turns, of those where it does the nearest to the predicted.
+
+    Every size is watched for two periods, and then, the nearest first, until one is found. Where friction
+    holds the drive for most of a long period, the judge of rest, who leaps over that, tells what it ends in.
+    """
+    rows.window(round(period), 1, 0)
+    drives = [rows.running(k) for k in range(len(rows))]
+    slow = cycle.with_friction and CYCLES_WATCHED * period > MOST_WORK
+    if not slow:
+        size = _sizes(rows, drives, round(period), 2) / cycle.output_rad
+        if size.max() < SCALES[0] or size.min() == np.inf:  # all died out, or failed; the large may yet fall
+            return None
+    watch, window = _ends if slow else _sizes, round(3.0 * period)
+    grows, middle, known = np.zeros(len(rows), dtype=bool), len(rows) // 2, range(0)
+    for reach in range(2, middle + 1, 2):
+        near = range(middle - reach, middle + reach + 1)
+        new = [k for k in near if k not in known]
+        size = watch(rows.take(new), [drives[k] for k in new], window, CYCLES_WATCHED // 3)
+        grows[new], known = size > SCALES[new] * cycle.output_rad, near
+        here = grows[near]
+        turns = near.start + np.flatnonzero((here[1:] != here[:-1]) & (here[:-1] == cycle.stable))
+        if turns.size:
+            return int(turns[np.argmin(np.abs(np.log(SCALES[turns] * SCALES[turns + 1])))])
+    return None
+
+
+def _ends(_: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
+    """Half the span of the output in what motions end in, followed for no more than so many ticks of work."""
+    rests = [judge(drive, count * window) for drive in drives]
+    return np.array([np.inf if one is None or one.verdict == "diverging" else one.amplitude for one in rests])
+
+
+def _sizes(rows: Rows, drives: Sequence[Running], window: int, count: int) -> Floats:
     """Half the span of the output in the last of so many windows, so many ticks each; inf: it failed."""
-    rows.window(window, 1, 0)
     rows["ticks"] = count * window
-    result = rows.run()
+    for drive in drives:
+        drive.change("window", window)
+    result = rows.run(drives=drives)
     low, high = result.span("output_angle_rad")
     return np.where(result.ok, 0.5 * (high - low), np.inf)
 

@@ -47,12 +47,20 @@ def drive_column(quantity: str, load_Nm: float | None) -> str:
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
 
 
-def loop_columns(linear: LinearFigures, quantities: Iterable[str] = LOOP_QUANTITIES) -> dict[str, np.ndarray]:
+def loop_column(design: Design, loop: str, quantity: str) -> str:
+    """Name of the column of a loop's figure; behind the profile's mean a response is not the command's."""
+    unlike = loop == "position" and QUANTITIES[quantity].of_response and command_mean(design)
+    return f"{loop}.{quantity}" + ("_behind_mean" if unlike else "")
+
+
+def loop_columns(
+    linear: LinearFigures, design: Design, quantities: Iterable[str] = LOOP_QUANTITIES
+) -> dict[str, np.ndarray]:
     """Columns of the loops of many designs: whether each is stable (1 or 0), and figures of it."""
     columns: dict[str, np.ndarray] = {}
     for loop in linear.loops:
         columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
-        columns |= {f"{loop}.{quantity}": linear.quantity(quantity, loop) for quantity in quantities}
+        columns |= {loop_column(design, loop, name): linear.quantity(name, loop) for name in quantities}
     return columns
 
 
@@ -86,7 +94,7 @@ def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
     loops = judged_loops(requirement.loop, loops_of(design))
     if not set(loops) <= set(loops_of(design)):
         raise InputError(f"requirement {requirement.id}: the design has no {requirement.loop} loop")
-    return tuple(f"{loop}.{requirement.quantity}" for loop in loops)
+    return tuple(loop_column(design, loop, requirement.quantity) for loop in loops)
 
 
 def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:

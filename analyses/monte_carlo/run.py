@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import QUANTITIES, with_unit
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.quantities import QUANTITIES, judged_loops
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.design.loader import AnyDesign, as_design
@@ -32,7 +31,7 @@ from analyses.monte_carlo.judging import BLOCK, Reduction, Tally
 from analyses.monte_carlo.task import CHUNK, SampleTask, StepCheck, Store
 from analyses.monte_carlo.worst import worst_case
 from analyses.slugs import slug
-from analyses.specification.requirements import RequirementVerdict, evaluate_requirements
+from analyses.specification.requirements import RequirementVerdict, judged_nominally
 from analyses.studies.engine import Chunk, Engine
 from analyses.studies.sampling import Table, sampler_of
 
@@ -94,7 +93,7 @@ def monte_carlo(
     they are kept. The numbers do not depend on engine, workers or chunks.
 
     ``engine``: where to compute; by default threads of this process.
-    ``progress``: called with (samples done, samples to do).
+    ``progress``: called with (samples done, samples to do), then with what is judged in the nominal design.
 
     Raises `InputError`: if nothing has a tolerance, or the folder holds another study.
     """
@@ -125,12 +124,12 @@ def monte_carlo(
     ]  # fmt: skip
     if tallies:
         odds.append(_odds("all", "all requirements together", "", whole.together, whole.count))
-    units = task.units
+    units, left = task.units, _left_out(task, progress)
     return result.MonteCarloResult(
         design.name, task.identity()["design"], settings.samples, settings.seed, sampler.paths,
         {name: result.column_statistics(name, unit, whole.columns[name]) for name, unit in units.items()},
         tuple(odds), tuple(_worst_cases(task, tallies, Path(folder))) if settings.worst_cases else (),
-        Path(folder), {name: float(values[0]) for name, values in nominal.items()}, tuple(_left_out(task)),
+        Path(folder), {name: float(values[0]) for name, values in nominal.items()}, left,
         notes=_notes(task, settings.samples), drivers=_drivers(task, odds), load_unit=design.load_unit,
     )  # fmt: skip
 
@@ -188,7 +187,9 @@ def _worst_cases(
     """The worst case of each requirement, with a design file of it."""
     design = task.design
     for place, (requirement, tally) in enumerate(tallies, 1):
-        quick = replace(task, step=None, time_figures=QUANTITIES[requirement.quantity].timed)
+        judged = judged_loops(requirement.loop, design.controller.stages)
+        timed = judged if QUANTITIES[requirement.quantity].timed else ()
+        quick = replace(task, step=None, time_figures=timed)
         case = worst_case(quick, requirement, np.array([sample for _, sample, _ in tally.worst]))
         name = f"worst-{place:02d}-{slug(requirement.id)}"
         title = f"{design.title or design.name}: worst case for {requirement.id}"
@@ -213,17 +214,12 @@ def _notes(task: SampleTask, samples: int) -> tuple[str, ...]:
     return tuple(words for words, said in notes.items() if said)
 
 
-def _left_out(task: SampleTask) -> Iterator[RequirementVerdict]:
-    """The requirements that figures of many designs do not tell: not met nominally, or else not proven."""
+def _left_out(task: SampleTask, progress: Progress) -> tuple[RequirementVerdict, ...]:
+    """The requirements that figures of many designs do not tell, judged in the nominal design."""
     design = task.design
-    left = tuple(r for r in judging.by_loop(design) if not judging.in_populations(r, design))
+    left = [one for one in judging.by_loop(design) if not judging.in_populations(one, design)]
     if not left:
-        return
+        return ()
     loops = assemble_loops(design, operating_point=task.operating_point, load_Nm=task.load_Nm)
-    for one in evaluate_requirements(replace(design, requirements=left), all_loop_figures(loops)):
-        if one.verdict is Verdict.NOT_MET:
-            found = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".4g")
-            yield replace(one, reason=f"fails in the nominal design: {found}")
-        else:
-            reason, waiver = "not sampled, it takes a computation of one design", design.waiver_of(one.id)
-            yield replace(one, verdict=Verdict.NOT_PROVEN, reason=reason, waiver=waiver)
+    untold = "not sampled, it takes a computation of one design"
+    return judged_nominally(design, left, all_loop_figures(loops), untold, progress)

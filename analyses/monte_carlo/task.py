@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -26,7 +26,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree
-from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
+from analyses.monte_carlo.judging import drive_column, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
@@ -177,7 +177,7 @@ class SampleTask:
     # Of the linear loops
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
-    time_figures: bool = True  # of their steps
+    time_figures: bool | Collection[str] = True  # of their steps, or of which loops
     step: StepCheck | None = None  # a nonlinear one
 
     def __post_init__(self) -> None:
@@ -209,7 +209,7 @@ class SampleTask:
             time_figures=self.time_figures,
             held=True,
         )
-        columns = loop_columns(linear, self._quantities)
+        columns = loop_columns(linear, self.design, self._quantities)
         for quantity, load in self._drive_wanted:
             columns[drive_column(quantity, load)] = drive_figures(population, quantity, load)
         if self.step is not None:
@@ -228,7 +228,8 @@ class SampleTask:
     @property
     def units(self) -> dict[str, str]:
         """Columns of figures (without parameters and stability flags) with their units."""
-        of = {f"{loop}.{name}": name for loop in loops_of(self.design) for name in self._quantities}
+        loops, names = loops_of(self.design), self._quantities
+        of = {loop_column(self.design, loop, name): name for loop in loops for name in names}
         of |= {drive_column(name, load): name for name, load in self._drive_wanted}
         units = {column: QUANTITIES[name].unit_for(self.design.axis) for column, name in of.items()}
         return units | ({} if self.step is None else step_units())

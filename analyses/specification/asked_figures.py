@@ -1,17 +1,17 @@
 """Figures that only an analysis of one design finds: failures, duty, limit cycles, corners, command."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf, log10, pi
 
 import numpy as np
 
-from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, QUANTITIES, Quantity
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES
 from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.corners import corners
+from analyses.corners.run import corners, worst_of
 from analyses.duty import duty
 from analyses.failures import failures
 from analyses.large_signal.tones import linear_steady_state, run_tones, tone
@@ -60,7 +60,7 @@ class AskedFigures:
     failures = cached_property(lambda self: failures(self.design))
     duty = cached_property(lambda self: duty(self.design))
     cycles = cached_property(lambda self: limit_cycles(self.design))
-    corners = cached_property(lambda self: corners(self.design))
+    corners = cached_property(lambda self: corners(replace(self.design, requirements=())))
 
     @property
     def limit_cycle_rad(self) -> float | None:
@@ -68,21 +68,12 @@ class AskedFigures:
         swing = self.cycles.hunting
         return 0.0 if swing is None else swing.limit_cycle_rad
 
-    def at_corners(self, quantity: Quantity) -> float:
-        """The worst of a figure over loops and corners; -inf (or inf) where one is not stable."""
-        loops = [one.judged for corner in self.corners.corners for one in corner.figures.values()]
-        if not all(one.stable for one in loops):
-            return -quantity.better * inf
-        found = (quantity.read(one) for one in loops)
-        worst = min((quantity.better * value for value in found if value is not None), default=inf)
-        return quantity.better * worst
-
     def figure(self, name: str) -> tuple[float | None, str]:
         """A figure in its unit, and what there is to say of it."""
         quantity = ANALYSIS_QUANTITIES[name]
         try:
             if quantity.cornered:
-                return self.at_corners(QUANTITIES[quantity.cornered]), ""
+                return worst_of(self.corners.corners, name), ""
             value = quantity.read(self, self.design.axis)
         except InputError as error:
             return None, error.message

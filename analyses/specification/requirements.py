@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import compress
@@ -12,15 +12,17 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops
+from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops, with_unit
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.design.suspicions import beyond_profile
+from actuator_lti.drive.operating import IN_MOTION, turned
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
+from actuator_lti.types import Progress
 from analyses.linear.loop_figures import HELD, LoopFigures, all_loop_figures
 
 if TYPE_CHECKING:
@@ -28,11 +30,12 @@ if TYPE_CHECKING:
 
 
 def evaluate_requirements(
-    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None
+    design: AnyDesign, figures: Mapping[str, LoopFigures] | None = None, progress: Progress = None
 ) -> tuple[RequirementVerdict, ...]:
     """Judge every requirement of a design.
 
     ``figures`` are those of the sampled, sliding loops, computed where left out.
+    ``progress``: called with (requirements judged, requirements in all).
 
     Raises `InputError`: if a requirement names a quantity or a loop that is not known.
     """
@@ -46,16 +49,45 @@ def evaluate_requirements(
 
         return AskedFigures(design)
 
-    return tuple(
-        _with_limits(design, verdict)
-        for requirement in design.requirements
-        for verdict in judged(design, requirement, figures, lambda name: asked().figure(name))
-    )
+    made: list[RequirementVerdict] = []
+    for done, requirement in enumerate(design.requirements):
+        if progress is not None:
+            progress(done, len(design.requirements))
+        found = judged(design, requirement, figures, lambda name: asked().figure(name))
+        made += [_with_limits(design, verdict) for verdict in found]
+    return tuple(made)
+
+
+def judged_nominally(
+    design: Design,
+    left: Sequence[Requirement],
+    figures: Mapping[str, LoopFigures] | None,
+    untold: str,
+    progress: Progress = None,
+) -> tuple[RequirementVerdict, ...]:
+    """Judge in the nominal design what is not asked of its variants: not met, or else not proven of all.
+
+    ``untold``: why it is not asked of them. The rest is as in `evaluate_requirements`.
+    """
+    if not left:
+        return ()
+
+    def of_all(one: RequirementVerdict) -> RequirementVerdict:
+        if one.verdict is not Verdict.NOT_MET:
+            waiver = design.waiver_of(one.id)
+            return replace(one, verdict=Verdict.NOT_PROVEN, reason=untold, waiver=waiver)
+        found = one.reason if one.value is None else with_unit(one.value, one.requirement.unit, ".4g")
+        return replace(one, reason=f"fails in the nominal design: {found}")
+
+    nominal = replace(design, requirements=tuple(left))
+    return tuple(map(of_all, evaluate_requirements(nominal, figures, progress)))
 
 
 def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
     """Beside a bandwidth, a rate or an acceleration what the profile of the command makes of it."""
     of, value = verdict.requirement, verdict.value
+    if value is not None and (moving := _moving(design, verdict)):
+        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, moving))))
     if value is not None and (profile := beyond_profile(design, of, value)):
         return replace(verdict, reason="; ".join(filter(None, (verdict.reason, profile))))
     limits = (design.command.rate_rad_s, design.command.acceleration_rad_s2)
@@ -64,6 +96,19 @@ def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerd
     from analyses.specification.asked_figures import said_of
 
     return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
+
+
+def _moving(design: Design, verdict: RequirementVerdict) -> str:
+    """Beside a response of a drive that stands in its cogging what it is in a motion over many periods."""
+    of = verdict.requirement
+    there = dict(turned(design)).get(IN_MOTION) if verdict.loop == "position" else None
+    if there is None or not QUANTITIES[of.quantity].of_response:
+        return ""
+    found = all_loop_figures(assemble_loops(there))["position"].asked(of)
+    if not found.stable or (value := QUANTITIES[of.quantity].read(found)) is None:
+        return ""
+    over = with_unit(value, of.unit, ".4g")
+    return f"within a period of its cogging or gear error; in a motion over many {over}"
 
 
 Asked = Callable[[str], tuple[float | None, str]]
@@ -83,12 +128,13 @@ class RequirementVerdict:
     reason: str = ""  # what has to be known to read it
     waiver: Waiver | None = None  # of what is not proven
     rotor: str = ""  # of a current loop: whether its rotor is ``"free"`` or ``"locked"``
+    load_unit: str = ""  # of the requirement's load, where it has one
 
     @property
     def figure(self) -> tuple[object, ...]:
         """What is judged: verdicts of two designs stand side by side where it is the same."""
         of = self.requirement
-        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, of.unit
+        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, self.load_unit, of.unit
 
     @property
     def passes(self) -> bool:
@@ -123,20 +169,22 @@ def judged(
     else:
         loops = judged_loops(requirement.loop, figures)
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
-    waiver = design.waiver_of
-    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+    waivers = [design.waiver_of(one.id) if one.verdict == "not proven" else None for one in verdicts]
+    unit = design.load_unit if requirement.load_Nm else ""
+    return [replace(one, waiver=w, load_unit=unit) for one, w in zip(verdicts, waivers, strict=True)]
 
 
 NOT_STATED = "the design does not state what this needs"
 
 
 def judged_by(design: Design, analysis: str, result: object) -> tuple[RequirementVerdict, ...]:
-    """Judge the requirements on what one analysis finds, ``failures`` or ``duty``, by its result."""
+    """Judge the requirements on what ``failures``, ``duty`` or ``stiffness`` finds, by its result."""
 
     def found(name: str) -> tuple[float | None, str]:
         return QUANTITIES[name].read(SimpleNamespace(**{analysis: result}), design.axis), ""
 
-    own = {name for name, one in QUANTITIES.items() if one.reader.startswith(f"{analysis}.")}
+    of = analysis, f"{analysis}."
+    own = {name for name, one in QUANTITIES.items() if one.source in of or one.reader.startswith(of)}
     asked = (one for one in design.requirements if one.quantity in own)
     return tuple(verdict for one in asked for verdict in judged(design, one, {}, found))
 

@@ -5,6 +5,7 @@ It is put to the simulator: by its own derivative, and by a moment injected at t
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from math import ceil, sqrt
 from typing import Literal
@@ -12,15 +13,16 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from actuator_lti.asked.verdict import Verdict
+from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, LoadFriction
-from actuator_lti.drive.operating import Operating, stiffness_there
+from actuator_lti.drive.operating import Operating, OperatingPoint, stiffness_there
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import stiffness as linear
+from analyses.specification.requirements import RequirementVerdict, judged_by, tally
 from nonlinear import commands, simulate, tangent
 from nonlinear.bench.loop_setup import HELD, LoopSetup
-from nonlinear.bench.operating_motion import on_the_bench, standing
+from nonlinear.bench.operating_motion import creeping, may_stand, on_the_bench, standing
 from nonlinear.loads import series
 
 State = Literal["powered", "shorted", "open"]
@@ -39,6 +41,7 @@ class StiffnessCurve:
     # Limit at zero frequency: below 0 of a drive that pushes away, 0 of a free one, inf of one that returns
     static_Nm_rad: float
     load_Nm: float = 0.0  # at the output: which piece of a spring that bends is used
+    way: OperatingPoint = "sliding"  # of friction by the coupling's torque (`actuator_lti.loops.stiffness`)
 
     @property
     def least(self) -> tuple[float, float]:
@@ -62,7 +65,7 @@ class LostMotion:
 
 @dataclass(frozen=True)
 class Check:
-    """One frequency, by the simulator's own derivative at rest, without dry friction and play.
+    """One frequency, by the simulator's own derivative, without play.
 
     Both are inf where the output does not move, as behind a gear that locks.
     """
@@ -70,6 +73,7 @@ class Check:
     frequency_hz: float
     foreseen_Nm_rad: complex
     seen_Nm_rad: complex
+    way: OperatingPoint = "sliding"
 
     @property
     def difference(self) -> float:
@@ -105,8 +109,18 @@ class Stiffness:
         lost = self.lost_motion
         return None if lost is None or lost.seen_rad is None else abs(lost.seen_rad / lost.foreseen_rad - 1.0)
 
+    @cached_property
+    def requirements(self) -> tuple[RequirementVerdict, ...]:
+        """Those of the design on stiffness and lost motion."""
+        return judged_by(self.design, "stiffness", self)
+
     @property
     def verdict(self) -> Verdict:
+        """The checks and the requirements together."""
+        return (Tally.of([self.checked]) + tally(self.requirements)).verdict
+
+    @property
+    def checked(self) -> Verdict:
         """Whether every check agrees to `AGREED`, and lost motion to `READ`; not proven without a check."""
         if not self.checks:
             return Verdict.NOT_PROVEN
@@ -130,27 +144,36 @@ TIME_CONSTANTS = 20.0  # of the damped load on the spring, waited at each readin
 def check_stiffness(design: Design, frequencies_hz: Sequence[float]) -> tuple[Check, ...]:
     """The simulator's own derivative from the load to the output (`nonlinear.tangent`) beside the loops.
 
-    At rest, without dry friction, play, counts and friction of two slopes.  An output that no moment moves is
-    pushed with the largest load moment.
+    Without play and counts; at rest without dry friction or, where friction has other slopes in motion,
+    creeping with it.  An output that no moment moves is pushed with the largest load moment.
 
     Raises `UnstableError`: for a loop that is not stable.
     """
     coupling, bench = design.coupling, on_the_bench(design)
-    friction = replace(design.friction, load_coefficient=0.0, points=(), viscous_reverse_Nms_rad=None)
-    coupling = None if coupling is None else replace(coupling, play_rad=0.0)
-    bench = replace(bench, coupling=coupling, friction=friction)
-    setup = LoopSetup(bench, "load", standing(bench), limits_on=False)
-    response = linear.compliance(bench, setup.bias.operating(bench))
-    hertz = np.asarray(frequencies_hz, dtype=float)
+    bench = replace(bench, coupling=None if coupling is None else replace(coupling, play_rad=0.0))
+    return tuple(one for way in _ways(bench) for one in _checked(bench, way, np.array(frequencies_hz, float)))
+
+
+def _checked(bench: Design, way: OperatingPoint, hertz: npt.NDArray[np.float64]) -> tuple[Check, ...]:
+    moving = way != "sliding" or not may_stand(bench)
+    motion = creeping(bench, driven=way == "driven") if moving else standing(bench)
+    at = replace(motion.operating(bench), point=way, speed_rad_s=0.0, angle_rad=motion.output_rad(bench))
+    response = linear.compliance(bench, at)
     if float(response.slowest) >= 1.0:
-        raise UnstableError("stiffness: the closed loop is not stable")
+        at_load = "" if way == "sliding" else f", friction by load {way}"
+        raise UnstableError(f"stiffness: the closed loop is not stable{at_load}")
     if not response.moves:
-        pushed = stiffness_at_rest(bench, [(each, design.load.moment_max_Nm or 1.0) for each in hertz])
-        return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad) for one in pushed)
-    found = tangent(bench, "load", setup=setup)
-    seen = 1.0 / found.closed(np.exp(2j * np.pi * hertz * found.hold_s))
-    foreseen = [complex(linear.stiffness_at(response, each)[0]) for each in hertz]
-    return tuple(map(Check, hertz.tolist(), foreseen, seen.tolist()))
+        pushed = stiffness_at_rest(bench, [(each, bench.load.moment_max_Nm or 1.0) for each in hertz])
+        return tuple(Check(one.frequency_hz, complex(np.inf), one.seen_Nm_rad, way) for one in pushed)
+    own = tangent(bench, "load", setup=LoopSetup(bench, "load", motion, limits_on=False))
+    seen = 1.0 / own.closed(np.exp(2j * np.pi * hertz * own.hold_s))
+    foreseen = linear.stiffness_at(response, hertz)
+    found = zip(hertz.tolist(), foreseen.tolist(), seen.tolist(), strict=True)
+    return tuple(Check(*each, way) for each in found)
+
+
+def _ways(design: Design) -> list[OperatingPoint]:
+    return [way for way, there in linear.ways(design) if there]
 
 
 def stiffness_at_rest(design: Design, asked: Sequence[tuple[float, float]]) -> tuple[AtRest, ...]:
@@ -258,21 +281,24 @@ def _telling_loads(design: Design) -> tuple[float, ...]:
 
 
 def stiffness_curves(design: Design) -> tuple[StiffnessCurve, ...]:
-    """Powered and unpowered stiffness, friction sliding (its share by load as where the motor drives).
+    """Powered and unpowered stiffness, friction sliding, by load both ways (`actuator_lti.loops.stiffness`).
 
-    Unpowered nothing samples: slopes of torques over the angle act at every instant.
+    Unpowered nothing samples: slopes of torques over the angle act at every instant; what moves the motor is
+    the load, if it can.
     A spring that bends has them at each of its pieces that a load of ``validation.loads`` reaches.
 
     >>> from actuator_lti.design import load_design
-    >>> [f"{curve.state} {curve.static_Nm_rad:.0f}" for curve in stiffness_curves(load_design("fin"))]
-    ['powered 1324', 'shorted 30', 'open 30']
+    >>> [f"{curve.way} {curve.static_Nm_rad:.0f}" for curve in stiffness_curves(load_design("fin"))]
+    ['driving 1324', 'driven 1618', 'driven 30', 'driven 30']
     """
     curves = []
     for load, state in product(_telling_loads(design), STATES):
         if state != "shorted" or design.motor.has_electrical_dynamics:
             seen = design if state == "powered" else unpowered(design, state)
-            response = linear.compliance(seen, Operating(load_Nm=load, torques_at_once=state != "powered"))
-            hertz = np.union1d(linear.frequencies_hz(response), linear.weakest_hz(response))
-            K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
-            curves.append(StiffnessCurve(state, hertz, K, static, load))
+            for way in _ways(design)[0 if state == "powered" else -1 :]:
+                at = Operating(point=way, load_Nm=load, torques_at_once=state != "powered")
+                response = linear.compliance(seen, at)
+                hertz = np.union1d(linear.frequencies_hz(response), linear.weakest_hz(response))
+                K, static = linear.stiffness_at(response, hertz), linear.static_stiffness(response)
+                curves.append(StiffnessCurve(state, hertz, K, static, load, way))
     return tuple(curves)

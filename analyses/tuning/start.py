@@ -17,8 +17,9 @@ import numpy as np
 from actuator_lti.design.fields import part_at, with_part
 from actuator_lti.design.model import Design, Filter
 from actuator_lti.design.objects import OBJECTS, KnownObject, step_of
+from actuator_lti.design.plant import torque_per_command
 from actuator_lti.drive.facts import resonance_rad_s
-from actuator_lti.drive.steady import own_drag_Nms_rad, standing_gain
+from actuator_lti.drive.steady import own_drag_Nms_rad
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
 
@@ -74,7 +75,7 @@ def rule_gains(design: Design) -> RuleGains:
 def _by_rule(design: Design) -> Iterator[tuple[str, float, float | None, str]]:
     """Loop, gain, integral time where it has one, and the rule in words, from the inner loop out."""
     control, motor, encoder = design.controller, design.effective_motor, design.encoder
-    T, inner_s, torque, J = control.period_s, 0.0, standing_gain(design), design.inertia_kgm2
+    T, inner_s, torque, J = control.period_s, 0.0, torque_per_command(design), design.inertia_kgm2
     small = control.computing_delay_s + 0.5 * T  # T_sigma: delays of all that lies inside
     if control.current is not None:
         assert motor.resistance_ohm is not None

@@ -124,6 +124,25 @@ def may_stand(design: Design) -> bool:
     return follows_angle(design) or not (uneven or needs_press(design))
 
 
+def creeping(design: Design, *, driven: bool = False) -> OperatingMotion:
+    """Forward so slowly that no torque over an angle changes: every friction slides on its first slope.
+
+    A load against the motion, or with it (``driven``), keeps a coupling on the first piece of its spring. A
+    torque at the motor shaft carries all: no controller needs an error for it.
+    """
+    pressed, coupling = 0.0, design.coupling
+    if coupling is not None:
+        pressed = min(PRESSED[0] * full_torque_Nm(design) * design.ratio_to_coupling, _piece_Nm(coupling))
+        pressed *= design.ratio_behind_coupling * (1.0 if driven else -1.0)
+    motion = operating_motion_at(design, SLOWEST * FASTEST_RAD_S, pressed)
+    current, voltage = steady_input(design, 0.0, motion.speed_rad_s)
+    torque = motor_torque_Nm(design, motion.current_A - current, motion.voltage_V - voltage)
+    angle = motion.output_rad(design)
+    torque += holding_torque_Nm(design, angle, motion.twist_rad)
+    load_Nm = pressed + holding_moment_Nm(design, angle)
+    return replace(motion, current_A=current, voltage_V=voltage, load_Nm=load_Nm, extra_Nm=torque)
+
+
 def on_its_stand(design: Design, like: Design | None = None) -> Design:
     """A drive without friction that would give it two slopes where it is tested; others as they are.
 
@@ -162,8 +181,12 @@ def standing(design: Design) -> OperatingMotion:
 
 def _closing_Nm(coupling: Coupling) -> float:
     """What presses a coupling past its play, on its first piece."""
-    piece = inf if coupling.torque_1_Nm is None else 0.5 * coupling.torque_1_Nm
-    return min(CLOSED * coupling.play_rad * coupling.stiffness_Nm_rad, piece)
+    return min(CLOSED * coupling.play_rad * coupling.stiffness_Nm_rad, _piece_Nm(coupling))
+
+
+def _piece_Nm(coupling: Coupling) -> float:
+    """Half the torque of the first piece of a spring that bends."""
+    return inf if coupling.torque_1_Nm is None else 0.5 * coupling.torque_1_Nm
 
 
 def _closed(design: Design, motion: OperatingMotion) -> OperatingMotion:

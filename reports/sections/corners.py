@@ -3,6 +3,7 @@
 from collections import Counter
 
 from actuator_lti.asked.quantities import CORNERED, QUANTITIES, Quantity
+from actuator_lti.asked.verdict import Verdict
 from analyses.corners.run import Corner, Corners
 from reports import document as doc
 from reports.charts import style
@@ -30,8 +31,11 @@ def section(result: Corners) -> doc.Section:
 
 def summary(result: Corners) -> str:
     failed = [corner.name for corner in result.corners if not corner.passed]
-    open_ones = [one.id for one in result.left_out if not one.passes]
-    more = f" Not judged at corners: {', '.join(open_ones)}." if open_ones else ""
+    open_ones = [one for one in result.left_out if not one.passes]
+    unmet = [one for one in (*result.over_all, *open_ones) if one.verdict is Verdict.NOT_MET]
+    untold = ", ".join(one.id for one in open_ones if one not in unmet)
+    more = "".join(f" Not met: {one.id}{f', {one.reason}' * bool(one.reason)}." for one in unmet)
+    more += f" Not judged at corners: {untold}." * bool(untold)
     count = len(result.corners)
     if not failed:
         every = "every other requirement" if more else "every requirement"

@@ -35,9 +35,14 @@ def section(result: Failures) -> doc.Section:
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
         f"Deflection counts from where the output was; the stop is {out.of(asked.stop_rad, 4)} away, and "
-        f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling; in a rigid "
-        "train the motor's, through the gears."
+        f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling"
     )
+    if result.design.coupling is None:
+        intro += (
+            ": of this rigid train what it passes to the output, to its inertia and load or, jammed, what "
+            "the motor presses with, less dry friction and gear losses, without an impact"
+        )
+    intro += "."
     left = [f"{NAMES[name]}: not for this drive, as {why}." for name, why in result.left_out.items()]
     own = requirements.table(result.requirements, result.design.load_unit)
     blocks = [_table(result, out), *own, _figure(result, out), *map(doc.text, left)]

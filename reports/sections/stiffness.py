@@ -6,11 +6,12 @@ from typing import Any
 import numpy as np
 
 from actuator_lti.design.model import Design
-from analyses.stiffness import Stiffness, StiffnessCurve, stiffness
+from analyses.stiffness import Check, Stiffness, StiffnessCurve, stiffness
 from analyses.stiffness.run import AGREED, READ
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import short
+from reports.sections import requirements
 from reports.sections.names import output_unit, push_words
 
 STATES = {
@@ -18,6 +19,7 @@ STATES = {
     "shorted": "unpowered, winding shorted",
     "open": "unpowered, winding open",
 }
+WAYS = {"driving": "motor against the load", "driven": "load moving the motor"}
 
 
 def of_design(design: Design) -> doc.Section:
@@ -28,6 +30,7 @@ def section(result: Stiffness) -> doc.Section:
     unit = f"{result.design.load_unit}/{'m' if result.design.axis == 'linear' else 'rad'}"
     blocks = [
         *(*_figure(result, unit), _table(result, unit)),
+        *requirements.table(result.requirements, result.design.load_unit),
         *([_lost_motion(result)] if result.lost_motion else []),
         *([_at_rest(result, unit)] if result.at_rest else []),
         *([_checks(result, unit)] if result.checks else []),
@@ -37,26 +40,34 @@ def section(result: Stiffness) -> doc.Section:
         "of the linear response from load to output. Friction slides; dry friction and play are not in the "
         "curves."
     )
+    if result.curves[0].way != "sliding":
+        intro += (
+            " Friction by load adds to a load that the motor moves against, and takes from one that moves "
+            "the motor; a requirement is judged on the smaller stiffness of both."
+        )
     status, words = result.verdict.role(), _result(result, unit)
     return doc.section("stiffness", "Stiffness", blocks, result=words, intro=intro, status=status)
 
 
 def _result(result: Stiffness, unit: str) -> str:
     words = f"A load {push_words(result.design)} does not move the output of this drive"
-    powered = result.curves[0]
-    if np.isfinite(powered.stiffness_Nm_rad).any():
-        (least, at), static = powered.least, powered.static_Nm_rad
+    first = result.curves[0]
+    if np.isfinite(first.stiffness_Nm_rad).any():
+        powered = [one for one in result.curves if (one.state, one.load_Nm) == ("powered", first.load_Nm)]
+        static = min(one.static_Nm_rad for one in powered)
+        weak = min(powered, key=lambda one: one.least)
         words = f"{short(static, 4)} {unit}" if math.isfinite(static) else "infinite (the drive comes back)"
-        words = f"Powered{_at_load(result, powered)}, the static stiffness is {words}"
-        words += f"; the least is {short(least, 4)} {unit} at {at:.3g} Hz"
+        words = f"Powered{_at_load(result, first)}, the static stiffness is {words}; the least is "
+        words += f"{short(weak.least[0], 4)} {unit} at {weak.least[1]:.3g} Hz{_way(weak, ' ({})')}"
     if result.checks:
         most, lost = max(check.difference for check in result.checks), result.lost_motion_difference
-        words += f"; small loads at {len(result.checks)} frequencies agree to {most:.1e}, allowed {AGREED:g}"
+        count = len({check.frequency_hz for check in result.checks})
+        words += f"; small loads at {count} frequencies agree to {most:.1e}, allowed {AGREED:g}"
         words += "" if lost is None else f", the lost motion to {lost:.1e}, allowed {READ:g}"
         words += " (relative)"
     elif result.unproven:
         words += f"; nothing is compared: {result.unproven}"
-    return f"{words}."
+    return f"{words}. {requirements.told(result.requirements)}".rstrip()
 
 
 def _figure(result: Stiffness, unit: str) -> list[doc.Block]:
@@ -92,8 +103,12 @@ def _table(result: Stiffness, unit: str) -> doc.Block:
 
 
 def _state(result: Stiffness, curve: StiffnessCurve) -> str:
-    """With the load, where one is not 0."""
-    return STATES[curve.state] + _at_load(result, curve)
+    """With the load, where one is not 0, and the way of the friction, where there are two."""
+    return STATES[curve.state] + _at_load(result, curve) + _way(curve, ", {}")
+
+
+def _way(one: StiffnessCurve | Check, form: str) -> str:
+    return form.format(WAYS[one.way]) if one.way in WAYS else ""
 
 
 def _at_load(result: Stiffness, curve: StiffnessCurve) -> str:
@@ -139,9 +154,9 @@ def _at_rest(result: Stiffness, unit: str) -> doc.Block:
 
 def _checks(result: Stiffness, unit: str) -> doc.Block:
     note = (
-        "The simulator's own derivative from a load, at rest, without play, counts, dry friction or "
-        "friction by load: predicted here is the linear stiffness of that drive, without that "
-        "friction, which the curves have."
+        "The simulator's own derivative from a load, without play and counts: at rest without dry friction "
+        "or, where friction has another slope in motion, creeping forward with it. Predicted is the linear "
+        "stiffness there."
     )
     size: dict[str, Any] = {"unit": unit, "format": "sig:6"}
     columns = [
@@ -149,5 +164,6 @@ def _checks(result: Stiffness, unit: str) -> doc.Block:
         doc.of(lambda one: _or_infinite(abs(one.foreseen_Nm_rad)), "foreseen", "Predicted", **size),
         doc.of(lambda one: _or_infinite(abs(one.seen_Nm_rad)), "seen", "Simulated", **size),
         doc.of("difference", "difference", "Relative difference", format="sig:2"),
+        *([doc.of(lambda one: _way(one, "{}"), "way", "Friction")] if _way(result.checks[0], "{}") else []),
     ]
     return doc.listing("Small loads", result.checks, columns, note)

@@ -126,7 +126,7 @@ def test_a_declared_analysis_stands_in_its_group_and_in_the_report() -> None:
 def test_the_json_of_a_result_is_its_fields_and_properties() -> None:
     design = load_design("emps")
     result = stiffness(design)
-    told, derived = as_json(result), {"verdict", "passed", "lost_motion_difference"}
+    told, derived = as_json(result), {"verdict", "passed", "checked", "lost_motion_difference"}
     assert set(told) == {field.name for field in fields(Stiffness)} | derived
     assert told["design"] == {"name": "emps", "hash": design_hash(design)}
     own, seen = told["checks"][0], result.checks[0]

@@ -8,11 +8,15 @@ import numpy as np
 import pytest
 
 from actuator_lti.batch import Population
-from actuator_lti.design import load_design, with_overrides
+from actuator_lti.design import design_tree, load_design, read_design_text, with_overrides, write_design
+from actuator_lti.design.access import with_values
+from actuator_lti.design.loader import design_from_tree
 from actuator_lti.design.model import Requirement
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
+from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.specification.capability import drive_figures
+from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import population_figures
 from reports.sections.corners import chart, section
 from tests.refusals import refused
@@ -121,3 +125,44 @@ def test_a_value_set_to_zero_loses_its_relative_tolerance() -> None:
     changed = with_overrides(load_design("ballscrew"), {"coupling.damping": "0 N*s/m"})
     assert changed.coupling.damping_Nms_rad == 0.0
     assert changed.parameters["coupling.damping"].tolerance is None
+
+
+@pytest.mark.parametrize(("value", "stays"), [(9.0, True), (10.0, True), (20.0, False)])
+def test_a_value_beyond_the_limits_of_its_tolerance_loses_it(value: float, stays: bool) -> None:
+    """A file that says both is refused, so what is written would not be read again."""
+    key, cut = "control.position.gain", {"kind": "truncated-normal", "std": "1 1/s"}
+    cut |= {"lower": "6 1/s", "upper": "10 1/s"}
+    tree = design_tree(load_design("joint"))
+    tree["control"]["position"]["gain"]["tolerance"] = cut
+    moved = with_values(design_from_tree(tree, "cut"), {key: value})
+    assert (moved.parameters[key].tolerance is not None) == stays
+    assert read_design_text(write_design(moved)).controller.position_loop.gain == value
+
+
+def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path) -> None:
+    """The duty takes 10 mA and more, less than 1 kA: the one fails, the other is known of one design."""
+    limits = {"less": 1e-3, "more": 1e3}
+    asked = tuple(Requirement(id=id, quantity="duty_current", unit="A", maximum=limit)
+                  for id, limit in limits.items())  # fmt: skip
+    design = replace(load_design("ilr33-amber"), requirements=asked)
+    told: list[tuple[int, int]] = []
+    at_corners = corners(design, progress=lambda done, total: told.append((done, total)))
+    sampled = monte_carlo(design, tmp_path, MonteCarloSettings(samples=2, worst_cases=False), progress=(
+        lambda done, total: told.append((done, total))
+    ))  # fmt: skip
+    assert told[:2] == told[-2:] == [(0, 2), (1, 2)]
+    for found in (at_corners, sampled):
+        assert [one.verdict for one in found.left_out] == ["not met", "not proven"]
+        assert found.verdict == "not met"
+    assert at_corners.left_out[0].reason == sampled.left_out[0].reason
+    assert "Not met: less, fails in the nominal design: " in section(at_corners)["result"]
+
+
+@pytest.mark.parametrize(("least", "verdict"), [(0.0, "met"), (1e3, "not met")])
+def test_a_margin_at_the_corners_is_judged_by_the_corners(least: float, verdict: str) -> None:
+    asked = Requirement(id="worst", quantity="corner_phase_margin", unit="deg", minimum=least)
+    design = replace(EMPS, requirements=(asked,))
+    found = corners(design)
+    assert found.verdict == found.over_all[0].verdict == verdict
+    (margins,) = evaluate_requirements(design)
+    assert (margins.verdict, margins.value) == (verdict, found.over_all[0].value)

@@ -69,7 +69,7 @@ def test_an_open_phase_leaves_the_output_to_its_load() -> None:
 
 
 def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
-    """The moment is N kM i; I2t from rest: tau ln(r^2/(r^2 - 1)) at the peak is the stated peak time."""
+    """I2t from rest: tau ln(r^2/(r^2 - 1)) at the peak is the stated peak time."""
     slow = {"limits.peak_time": "0.2 s", "control.position.gain": "30 1/s"}
     design = with_overrides(load_design("joint"), slow)
     result = failures(design, Asked.of(design, stop_rad=1.0, watched_s=0.3)).case("jam")
@@ -77,6 +77,26 @@ def test_a_jam_stalls_at_the_peak_current_until_the_protection_acts() -> None:
     assert result.current_A[np.searchsorted(result.time_s, 0.15)] == pytest.approx(15.0, rel=1e-3)
     assert 0.1 < result.protected_s < 0.2  # a little was used on the way
     assert result.current_A[-1] == pytest.approx(6.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("path", "efficiency", "load_Nm"), [
+    ("self-locking", 0.315, 0.0), ("back-drivable", 0.88, 0.0), ("back-drivable", 0.88, -4.0),
+])  # fmt: skip
+def test_a_rigid_train_passes_the_motors_torque_less_its_friction(path, efficiency, load_Nm) -> None:
+    """Jammed (kM i - C0) N eta; else what the load takes: by its inertia, its slope and its moment."""
+    N, slope = AMBER.total_ratio, -30.0
+    CM = (1.0 / efficiency - (path == "back-drivable")) / N
+    load = {"path": path, "moment_slope_Nm_rad": slope, "inertia_kgm2": 2e-3}
+    design = changed(AMBER, load=load, friction={"load_coefficient": CM})
+    result = failures(design, Asked.of(design, load_Nm=load_Nm))
+    jam, free = result.case("jam"), result.case("hard-over")
+    torque = design.motor.torque_constant_Nm_A * np.abs(jam.current_A) - design.friction.dry_torque_Nm
+    assert np.abs(jam.moment_Nm) == pytest.approx(np.maximum(torque, 0.0) * N * efficiency, rel=1e-12)
+    taken = free.moment_Nm - free.moment_Nm[0] + slope * free.deflection_rad  # at rest the slope's alone
+    gained = 2e-3 * np.gradient(free.deflection_rad[:-1], free.time_s[:-1])[1:-1]  # the last is at the stop
+    summed = np.cumsum(taken)[: gained.size] * free.time_s[1]  # what the inertia takes
+    assert summed == pytest.approx(gained, abs=0.005 * np.abs(gained).max())
+    assert result.failure_moment_Nm < 0.9 * N * design.motor.torque_constant_Nm_A * free.peak_current_A
 
 
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:

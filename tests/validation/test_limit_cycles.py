@@ -219,15 +219,41 @@ def test_a_cycle_of_an_hour_is_told_and_not_tried(cli) -> None:
     assert "Not tried: 24 periods take more ticks" in " ".join(said.split())
 
 
-def test_a_cycle_that_is_nowhere_at_once_is_not_watched_for_24_periods(monkeypatch) -> None:
+@pytest.fixture
+def watched(monkeypatch) -> list[float]:
+    """Ticks that every batch of runs simulates, one after the other."""
+    ticks, run = [0.0], Rows.run
+
+    def counted(rows, *, drives, **more):
+        before = sum(drive.value("TICK") for drive in drives)
+        result = run(rows, drives=drives, **more)
+        ticks.append(sum(drive.value("TICK") for drive in drives) - before)
+        return result
+
+    monkeypatch.setattr(Rows, "run", counted)
+    return ticks
+
+
+def test_a_cycle_that_is_nowhere_at_once_is_not_watched_for_24_periods(watched) -> None:
     """Nothing moves in a drive that is not set in motion: two periods of 20 s show it, at 41 sizes."""
-    watched, run = [], Rows.run
-    monkeypatch.setattr(Rows, "run", lambda rows: watched.append(rows["ticks"].sum()) or run(rows))
-    assert (
-        confirm(FIN, Cycle("play", True, 1e-6, 1e-3, 0.05, False, {"th": 0j, "twist": 0j})).verdict
-        == "refuted"
-    )
-    assert watched == [41 * 2 * 20.0 / FIN.controller.period_s]
+    still = Cycle("play", False, 1e-6, 1e-3, 0.05, False, {"th": 0j, "twist": 0j})
+    assert confirm(FIN, still).verdict == "refuted"
+    assert sum(watched) == 41 * 2 * 20.0 / FIN.controller.period_s
+
+
+def test_of_a_slow_cycle_with_friction_waits_are_leapt_over(watched) -> None:
+    """The same held by friction: the judge of rest sees it at once."""
+    still = Cycle("play", True, 1e-6, 1e-3, 0.025, False, {"th": 0j, "twist": 0j})
+    assert confirm(FIN, still).verdict == "refuted"
+    assert sum(watched) == 0.0
+
+
+def test_sizes_near_the_predicted_are_watched_first_and_nothing_twice(watched) -> None:
+    """The fin's cycle is between the five sizes about it: two periods of all 41, 22 more of these."""
+    _, attracting = cycles_of_play(FIN, friction=False)
+    assert confirm(FIN, attracting).verdict == "confirmed"
+    period = 1.0 / (attracting.frequency_hz * FIN.controller.period_s)
+    assert sum(watched) <= (41 * 2 + 9 * 22) * period * 1.01
 
 
 @pytest.mark.parametrize("inertia", [0.3, 0.6, 1.8])

@@ -54,11 +54,39 @@ def test_an_open_winding_gives_way_at_the_resonance() -> None:
 
 
 def test_the_fin_by_hand() -> None:
-    """N^2 kM Kp Kv / (R (1 + CM N)) less the slope: P controllers, the output's sensor, motor driving."""
-    powered, shorted, open_winding = stiffness_curves(FIN)
-    by_hand = 60**2 * 0.03 * 0.12 * 110 / (1.0 * (1 + 1.7e-3 * 60)) + 30
-    assert powered.static_Nm_rad == pytest.approx(by_hand, rel=1e-6)
+    """N^2 kM Kp Kv / (R (1 +- CM N)) less the slope: P controllers, the output's sensor; less is judged."""
+    *powered, shorted, open_winding = stiffness_curves(FIN)
+    by_hand = [60**2 * 0.03 * 0.12 * 110 / (1.0 * (1 + way * 1.7e-3 * 60)) + 30 for way in (1, -1)]
+    assert [one.static_Nm_rad for one in powered] == pytest.approx(by_hand, rel=1e-6)
+    assert [one.way for one in powered] == ["driving", "driven"]
+    assert drive_figure(FIN, "static_stiffness") == pytest.approx(by_hand[0], rel=1e-6)
     assert [shorted.static_Nm_rad, open_winding.static_Nm_rad] == pytest.approx([30.0, 30.0], rel=1e-6)
+
+
+@pytest.mark.parametrize("derivative", [0.0, 1e-3])
+@pytest.mark.parametrize("efficiency", [0.4, 0.62])
+def test_the_simulator_checks_the_stiffness_that_is_quoted(efficiency: float, derivative: float) -> None:
+    """Behind a gear of this efficiency, CM N = 1/eta - 1: below one half no load moves the motor."""
+    position = {"derivative_time_s": derivative, "derivative_filter_s": 2e-3}
+    lossy = {"load_coefficient": (1.0 / efficiency - 1.0) / 60}
+    design = changed(FIN, friction=lossy, controller={"position": position})
+    ways = ["driving", "driven"][: 1 + (efficiency > 0.5)]
+    powered = [one for one in stiffness_curves(design) if one.state == "powered"]
+    checks = check_stiffness(design, [2.0, 50.0])
+    assert [one.way for one in powered] == ways
+    assert [check.way for check in checks] == [way for way in ways for _ in (2.0, 50.0)]
+    for check in checks:
+        curve = powered[ways.index(check.way)]
+        at = np.interp(check.frequency_hz, curve.frequency_hz, abs(curve.stiffness_Nm_rad))
+        assert abs(check.seen_Nm_rad) == pytest.approx(at, rel=1e-3)  # the curve is drawn at points
+        assert check.difference < 1e-8
+    least = min(curve.least[0] for curve in powered)
+    assert drive_figure(design, "least_stiffness") == pytest.approx(least, rel=1e-9)
+    shares = np.array([0.9, 1.0, 1.1])  # of many at once, some of which a load moves
+    values = shares * design.friction.load_coefficient
+    found = many(Population(design, {"friction.load_coefficient": values}, 3), "least_stiffness")
+    alone = [changed(design, friction={"load_coefficient": value}) for value in values]
+    assert found == pytest.approx([drive_figure(one, "least_stiffness") for one in alone], rel=1e-9)
 
 
 def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_move() -> None:
@@ -77,7 +105,7 @@ def test_an_integral_on_the_output_comes_back_and_a_self_locking_gear_does_not_m
 @pytest.mark.parametrize("name", ["joint", "ballscrew", "fin", "ilr33-amber-compliant", "emps"])
 def test_the_simulator_confirms_every_shipped_design(name: str) -> None:
     result = stiffness(load_design(name))
-    assert len(result.checks) == 3
+    assert len(result.checks) == 3 * len({one.way for one in result.curves if one.state == "powered"})
     assert max(check.difference for check in result.checks) < 1e-6
     assert result.passed
     wrong = replace(result.checks[0], foreseen_Nm_rad=1.00001 * result.checks[0].foreseen_Nm_rad)
@@ -119,7 +147,7 @@ def test_at_rest_dry_friction_holds_a_small_moment(mass: float) -> None:
 def test_command_section_and_figure(cli) -> None:
     told = cli.data("stiffness", "fin")
     assert told["passed"] is True
-    assert [curve["state"] for curve in told["curves"]] == ["powered", "shorted", "open"]
+    assert [curve["state"] for curve in told["curves"]] == ["powered", "powered", "shorted", "open"]
     assert told["lost_motion"]["play_rad"] == 1.5e-3
     assert "infinite" in cli.text("stiffness")
     figure = next(block for block in section(stiffness(FIN))["blocks"] if block["kind"] == "figure")
@@ -140,7 +168,7 @@ def test_without_a_position_loop_nothing_is_proven_and_that_is_no_pass(tmp_path,
 
 def test_the_least_stiffness_is_never_above_the_static_one() -> None:
     """A shorted winding damps a spring of 40 N m/rad: stiffer at every frequency than at rest."""
-    _, shorted, _ = stiffness_curves(FIN)
+    *_, shorted, _ = stiffness_curves(FIN)
     assert abs(FIN.load.moment_slope_Nm_rad) == pytest.approx(shorted.static_Nm_rad, rel=1e-3)
     assert shorted.least == (shorted.static_Nm_rad, 0.0)
     curves = stiffness_curves(drive_e())  # a velocity integral holds the motor, or nothing does
