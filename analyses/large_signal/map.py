@@ -11,13 +11,8 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-<<<<<<< HEAD
-from actuator_lti.drawing.faces import draw
-from actuator_lti.errors import whole_numbers
-=======
 from actuator_lti.drawing import draw
-from actuator_lti.errors import whole_number
->>>>>>> main
+from actuator_lti.errors import whole_numbers
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
