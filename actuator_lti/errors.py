@@ -122,7 +122,7 @@ def whole_numbers(name: str, values: Any, many: int, least: int = 1) -> tuple[in
     actuator_lti.errors.InputError: counts = 5: must be 2 whole numbers, at least 1
     """
     given = values if isinstance(values, Sequence) and len(values) == many else ()
-    if not given or not all(isinstance(one, Integral) and one >= least for one in given):
+    if not given or not all(isinstance(one, Integral) and int(one) >= least for one in given):
         raise InputError(f"{name} = {shown(values)}: must be {many} whole numbers, at least {least}")
     return tuple(map(int, given))
 
