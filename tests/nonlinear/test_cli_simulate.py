@@ -148,6 +148,17 @@ def without(stages: tuple[str, ...], folder: Path) -> Path:
     return folder / "drive.toml"
 
 
+def test_a_drive_without_a_loop_says_so_and_has_corners_and_a_report(tmp_path, cli) -> None:
+    drive = without(VOLTAGE, tmp_path)
+    head = "the drive has no loop, so there are no margins. The design states no requirements."
+    said = [cli.text("margins", drive, "--quiet"), cli.text("corners", drive, "--quiet")]
+    assert head in " ".join(said[0].split())
+    assert "Phase margin" not in said[0]
+    assert "The drive has no loop at all" in said[1]
+    cli.text("report", drive, "--no-validation", "--out", tmp_path)
+    assert (tmp_path / "report.html").exists()
+
+
 def test_volts_and_amperes(run, tmp_path) -> None:
     """At rest of the transient U = R i + kE w, with i from the dry friction."""
     facts, rows = run(f"{without(VOLTAGE, tmp_path)} --amplitude 6 --duration 2")
