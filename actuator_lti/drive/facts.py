@@ -139,7 +139,8 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
         more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     if present(damping):
         more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
-    return [(start, slope + more) for start, slope in friction_slopes(design, direction)]
+    pieces = friction_slopes(design, direction)
+    return [(start, slope + more) for start, slope in pieces] if present(more) else pieces
 
 
 def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design.model import Design, Requirement
@@ -77,9 +78,12 @@ def by_loop(design: Design) -> list[Requirement]:
 def in_populations(requirement: Requirement, design: Design) -> bool:
     """Whether the figures of many designs at once have what a requirement is on.
 
-    They know the free rotor, and the response behind the profile's mean, through the filter.
+    They know the free rotor, and the response behind the profile's mean, through the filter; of a drive what
+    it has.
     """
     quantity, command = QUANTITIES[requirement.quantity], design.command
+    if quantity.scope == "drive":
+        return not np.isnan(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
     if quantity.scope == "analysis" or requirement.rotor == "locked":
         return False
     loops = judged_loops(requirement.loop, design.controller.stages)

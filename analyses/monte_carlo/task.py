@@ -26,7 +26,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree
-from analyses.monte_carlo.judging import drive_column, loop_column, loop_columns, loops_of
+from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
@@ -223,7 +223,7 @@ class SampleTask:
     @cached_property
     def _drive_wanted(self) -> list[tuple[str, float]]:
         asked = (r for r in self.design.requirements if r.quantity in DRIVE_QUANTITIES)
-        return sorted({(r.quantity, r.load_Nm or 0.0) for r in asked})
+        return sorted({(r.quantity, r.load_Nm or 0.0) for r in asked if in_populations(r, self.design)})
 
     @property
     def units(self) -> dict[str, str]:
