@@ -174,7 +174,7 @@ def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp
 
 
 def test_a_search_for_the_worst_case_computes_what_its_requirement_is_on_alone():
-    """Of a ball screw with a stiffness asked for, 9 of 10 searches computed that besides, and all loops."""
+    """Each computed the stiffness that another asks for besides, and all loops."""
     own = load_design("fin")
     asked = {"least_stiffness": "N*m/rad", "lost_motion": "deg"}
     more = (Requirement(id=name, quantity=name, unit=unit, minimum=0.1) for name, unit in asked.items())
