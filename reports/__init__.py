@@ -3,11 +3,7 @@
 ``reports.report(design, "out")`` is the command ``actuator-lti report``.
 """
 
-from actuator_lti.start.on_first_use import on_first_use
+from actuator_lti.start.on_first_use import from_rooms
 
-_PUBLIC = {"report": "reports.build"}
-
-__all__ = sorted(_PUBLIC)
-
-
-__getattr__, __dir__ = on_first_use(__name__, _PUBLIC)
+__all__ = ["report"]
+__getattr__, __dir__ = from_rooms(__name__, build="report")

@@ -125,11 +125,7 @@ DESIGNS, LINEAR, NONLINEAR = "Designs", "Linear loops", "Nonlinear checks"
 RECORDS, STUDIES, EXPORTS = "Bench records", "Variants and history", "Out of Python"
 ANALYSES = (
     Analysis(
-        "designs",
-        DESIGNS,
-        alone=True,
-        function="reports.design_files.run.designs",
-        words="""
+        "designs", DESIGNS, alone=True, function="reports.design_files.run.designs", words="""
         List the shipped designs: name, title, and the stages that each drive has.
 
         Try: actuator-lti designs
@@ -139,10 +135,7 @@ ANALYSES = (
     Analysis("keys", DESIGNS, AskedKeys, alone=True),
     Analysis("margins", LINEAR, MarginsAsked),
     Analysis(
-        "stiffness",
-        LINEAR,
-        function="analyses.stiffness.stiffness",
-        words="""
+        "stiffness", LINEAR, function="analyses.stiffness.stiffness", words="""
         Dynamic and static stiffness and lost motion, checked by the simulator.
 
         Met where the simulator agrees and the requirements on them are met; not proven where no
@@ -156,11 +149,7 @@ ANALYSES = (
     Analysis("failures", NONLINEAR, FailuresAsked, also=True),
     Analysis("duty", NONLINEAR, DutyAsked, also=True),
     Analysis(
-        "cycles",
-        NONLINEAR,
-        also=True,
-        function="analyses.limit_cycles.limit_cycles",
-        words="""
+        "cycles", NONLINEAR, also=True, function="analyses.limit_cycles.limit_cycles", words="""
         Predict limit cycles of play and of a quantised output sensor, and seek them in the simulator.
 
         Each is predicted by describing function in the exact sampled loop, then the simulator is
@@ -171,62 +160,34 @@ ANALYSES = (
         """,
     ),
     Analysis(
-        "validate",
-        NONLINEAR,
-        ValidationAsked,
-        function="analyses.validation.validate",
-        shown="validation",
-        doing="validating",
-        written="large",
-        stem="validation",
+        "validate", NONLINEAR, ValidationAsked, function="analyses.validation.validate", shown="validation",
+        doing="validating", written="large", stem="validation",
     ),
     Analysis(
-        "identify",
-        RECORDS,
-        IdentificationAsked,
-        doing="identifying",
-        stem="identification",
+        "identify", RECORDS, IdentificationAsked, doing="identifying", stem="identification",
         example="analyses.records.campaign_file",
     ),
     Analysis(
-        "correlate", RECORDS, CorrelationAsked, shown="correlation", doing="simulating", stem="correlation"
+        "correlate", RECORDS, CorrelationAsked, shown="correlation", doing="simulating", stem="correlation",
     ),
     Analysis(
-        "compare",
-        STUDIES,
-        StudyAsked,
-        function="analyses.studies.study_asked.compared",
-        doing="comparing",
-        study=True,
-        keeps=True,
-        out="out/compare",
-        example="analyses.studies.study",
+        "compare", STUDIES, StudyAsked, function="analyses.studies.study_asked.compared", doing="comparing",
+        study=True, keeps=True, out="out/compare", example="analyses.studies.study",
     ),
     Analysis(
-        "montecarlo",
-        STUDIES,
-        MonteCarloAsked,
-        function="analyses.monte_carlo.asked.study",
-        shown="monte_carlo",
-        doing="sampling",
-        keeps=True,
-        out="out/montecarlo",
+        "montecarlo", STUDIES, MonteCarloAsked, function="analyses.monte_carlo.asked.study",
+        shown="monte_carlo", doing="sampling", keeps=True, out="out/montecarlo",
     ),
     Analysis("tune", STUDIES, TuningAsked, doing="tuning", out="out/tune"),
     Analysis(
-        "nightly",
-        STUDIES,
-        NightlyAsked,
-        alone=True,
-        function="reports.nightly.night.nightly",
-        shown="nightly",
-        doing="building",
+        "nightly", STUDIES, NightlyAsked, alone=True, function="reports.nightly.night.nightly",
+        shown="nightly", doing="building",
     ),
     Analysis("export c", EXPORTS, AskedC),
     Analysis("export controller", EXPORTS, AskedController),
     Analysis("export fmu", EXPORTS, AskedFmu),
     Analysis("export linear", EXPORTS, AskedLinear),
-)
+)  # fmt: skip
 COMMANDS_IN = {"export": "The drive outside of Python: C99, FMU, controller for firmware, linear models."}
 """Words of a name that stands before others."""
 BY_NAME = {one.name: one for one in ANALYSES}

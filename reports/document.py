@@ -105,12 +105,9 @@ def table(
     keys = [one["key"] for one in columns]
     named = [row if isinstance(row, Mapping) else dict(zip(keys, row, strict=True)) for row in rows]
     return {
-        "kind": "table",
-        "caption": caption,
-        "columns": list(columns),
-        "rows": list(map(plain, named)),
+        "kind": "table", "caption": caption, "columns": list(columns), "rows": list(map(plain, named)),
         "note": prose(note),
-    }
+    }  # fmt: skip
 
 
 def of(
@@ -162,13 +159,9 @@ def figure(name: str, chart: Chart, caption: str, *, alt: str = "", layout: Layo
     seen; ``layout``: wide, half of the page's width, or tall (half as wide, two rows high).
     """
     return {
-        "kind": "figure",
-        "figure": name,
-        "chart": chart_data(chart),
-        "caption": prose(caption),
-        "alt": prose(alt or caption),
-        "layout": layout,
-    }
+        "kind": "figure", "figure": name, "chart": chart_data(chart), "caption": prose(caption),
+        "alt": prose(alt or caption), "layout": layout,
+    }  # fmt: skip
 
 
 def with_columns(block: Block, keys: Collection[str]) -> Block:
@@ -225,18 +218,11 @@ def verdict(
     if distance is None and value is not None and limit is not None and comparison in COMPARISONS:
         distance = value - limit if comparison == ">=" else limit - value
     return {
-        "id": id,
-        "label": label,
-        "value": plain(value),
-        "limit": plain(limit),
-        "comparison": COMPARISONS.get(comparison, comparison),
-        "unit": unit,
-        "distance": plain(distance),
-        "verdict": Verdict.of(passed).value,
-        "waiver": waiver.words if waiver else "",
-        "source": source,
+        "id": id, "label": label, "value": plain(value), "limit": plain(limit),
+        "comparison": COMPARISONS.get(comparison, comparison), "unit": unit, "distance": plain(distance),
+        "verdict": Verdict.of(passed).value, "waiver": waiver.words if waiver else "", "source": source,
         "reason": prose(reason),
-    }
+    }  # fmt: skip
 
 
 def waived(sections: Iterable[Section], design: Design) -> None:
@@ -295,16 +281,10 @@ def document(
     and columns may hold anything: what cannot be seen in them is made visible.
     """
     made: Document = {
-        "schema": SCHEMA,
-        "version": VERSION,
-        "kind": kind,
-        "title": visible(title),
-        "subtitle": visible(subtitle),
-        "design": _seen(plain(design)),
-        "provenance": _seen(plain(provenance)),
-        "verdict": verdict_of(sections, kind),
-        "sections": [_seen(certain(part)) for part in sections],
-    }
+        "schema": SCHEMA, "version": VERSION, "kind": kind, "title": visible(title),
+        "subtitle": visible(subtitle), "design": _seen(plain(design)), "provenance": _seen(plain(provenance)),
+        "verdict": verdict_of(sections, kind), "sections": [_seen(certain(part)) for part in sections],
+    }  # fmt: skip
     check(made)
     return made
 

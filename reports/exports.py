@@ -145,13 +145,9 @@ def check_text(check: CodeCheck | None, *, single_precision: bool = False) -> st
 
     What is measured is the code in double precision, also where the files are in single.
     """
-    words = {"summary": summary, "loop_name": loop_name, "quantity_name": quantity_name, "digits": _digits}
+    words = {"summary": summary, "loop_name": loop_name, "quantity_name": quantity_name}
     template = environment().get_template("compiled_code.md.j2")
     return template.render(check=check, single_precision=single_precision, **words)
-
-
-def _digits(value: float | None) -> str:
-    return "" if value is None else f"{value:.6g}"
 
 
 def summary(check: CodeCheck) -> str:

@@ -215,15 +215,14 @@ def _figure(block: Mapping[str, Any], svg: str) -> Tree:
 
 def _table(block: Mapping[str, Any]) -> Tree:
     columns: Sequence[Mapping[str, Any]] = block["columns"]
-    heads = [
-        {"label": clean(c["label"], 120), "unit": clean(c["unit"], 30), "align": c["align"]} for c in columns
-    ]
+    texts = [{"label": clean(c["label"], 120), "unit": clean(c["unit"], 30)} for c in columns]
+    heads = [{**text, "align": c["align"]} for text, c in zip(texts, columns, strict=True)]
     rows = []
     for row in block["rows"]:
         cells = [_cell(row.get(c["key"]), c["format"]) for c in columns]
         rows.append({"status": row.get("_status") or "", "cells": cells})
-    texts = {"caption": clean(block["caption"], 1000), "note": clean(block.get("note"), 2000)}
-    return {"kind": "table", **texts, "columns": heads, "rows": rows}
+    caption, note = clean(block["caption"], 1000), clean(block.get("note"), 2000)
+    return {"kind": "table", "caption": caption, "note": note, "columns": heads, "rows": rows}
 
 
 def _cell(value: Any, form: str) -> dict[str, str]:

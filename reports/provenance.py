@@ -26,14 +26,10 @@ def provenance(design_hash: str | None = None) -> Tree:
     input gives the same bytes; an InputError where it is no number.
     """
     return {
-        "version": package_version(),
-        "commit": commit(),
-        "design_hash": design_hash,
-        "time": build_time(),
-        "python": platform.python_version(),
-        "platform": f"{platform.system()} {platform.machine()}",
+        "version": package_version(), "commit": commit(), "design_hash": design_hash, "time": build_time(),
+        "python": platform.python_version(), "platform": f"{platform.system()} {platform.machine()}",
         "libraries": {name: package_version(name) for name in LIBRARIES},
-    }
+    }  # fmt: skip
 
 
 def build_time() -> str:

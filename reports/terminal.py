@@ -1,6 +1,6 @@
 """Blocks of a document as tables on a terminal."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,6 +23,7 @@ from reports.verdict_summary import judged, role, tally, walk, why
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
 VERDICT_WRAPPED = 18
+CONTINUED = ", continued"  # of a table whose columns take several
 SIGNS = {"pass": "✓", "fail": "✗", "warn": "?", "info": "–"}
 HEADS = {"met": "PASS", "not met": "FAIL", "not proven": "NOT PROVEN"}
 
@@ -68,8 +69,8 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     if block["kind"] == "verdicts":
         block, wrapped = verdict_table(block), VERDICT_WRAPPED
     if block["kind"] == "table":
-        laid = _laid(block, wrapped, out)
-        out.print(laid if _fits(laid, out) else stacked(block))
+        for part in _parts(block, wrapped, out):
+            out.print(part)
         if block.get("note"):
             out.print(Text(block["note"], style="dim"))
     elif block["kind"] == "facts":
@@ -82,6 +83,20 @@ def _print(block: Mapping[str, Any], out: Console) -> None:
     elif block["kind"] == "details":
         for inner in block["blocks"]:
             _print(inner, out)
+
+
+def _parts(block: Mapping[str, Any], wrapped: int, out: Console) -> Iterator[Table | Text]:
+    """The table where it fits; else what is behind its ``heads`` in two parts, each likewise; or stacked."""
+    laid, heads = _laid(block, wrapped, out), block.get("heads", 0)
+    first, others = block["columns"][:heads], block["columns"][heads:]
+    if _fits(laid, out):
+        yield laid
+    elif not heads or len(others) == 1:
+        yield stacked(block)
+    else:
+        middle, caption = -(-len(others) // 2), f"{block['caption'].removesuffix(CONTINUED)}{CONTINUED}"
+        yield from _parts({**block, "columns": [*first, *others[:middle]]}, wrapped, out)
+        yield from _parts({**block, "columns": [*first, *others[middle:]], "caption": caption}, wrapped, out)
 
 
 def _laid(block: Mapping[str, Any], wrapped: int, out: Console) -> Table:

@@ -11,11 +11,12 @@ from __future__ import annotations
 import os
 import random
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from filelock import FileLock
 from hypothesis import HealthCheck, settings
 
 from tests.command_line import Command
@@ -60,6 +61,23 @@ def browser() -> Iterator[Browser]:
         started = running.chromium.launch(executable_path=path, args=["--no-sandbox"])
         yield started
         started.close()
+
+
+@pytest.fixture(scope="session")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Callable[[Path], object]], Path]:
+    """A file or folder that the first who asks for it makes, for all workers of this run."""
+    own = tmp_path_factory.getbasetemp()
+    folder = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
+
+    def path_of(name: str, make: Callable[[Path], object]) -> Path:
+        path, part = folder / name, folder / f"{name}.part"
+        with FileLock(f"{path}.lock"):
+            if not path.exists():
+                make(part)
+                part.rename(path)
+        return path
+
+    return path_of
 
 
 @pytest.fixture

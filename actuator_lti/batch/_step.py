@@ -15,7 +15,7 @@ FORGOTTEN = 25.0  # time constants after which the second slowest pole leaves no
 def step_figures(n, a, b, c, lead, poles, row, state, after):
     """Rise 10-90 % and settling 2 % in ticks, overshoot in percent, of the closed loop a - b c.
 
-    Where lead is NaN, of a, b, c as they are.
+    a is in Hessenberg form. Where lead is NaN, of a, b, c as they are.
 
     All are times of samples; the response is followed until it has stayed within the band for nine time
     constants of the slowest pole, however far above it a resonance was. Where that pole is real and far
@@ -48,7 +48,7 @@ def step_figures(n, a, b, c, lead, poles, row, state, after):
             error += lead  # the command has jumped since the sample before
         for i in range(n):
             value = b[i] * error
-            for j in range(n):
+            for j in range(max(i - 1, 0), n):
                 value += a[i * n + j] * state[j]
             after[i] = value
         y = 0.0

@@ -1,6 +1,6 @@
 """Margins, bandwidths and step figures of many designs at once."""
 
-from collections.abc import Callable
+from collections.abc import Collection
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -102,8 +102,8 @@ class LinearFigures:
 
 def linear_figures(
     population: Population, *, operating_point: OperatingPoint = "sliding", load_Nm: float = 0.0,
-    speed_amplitude_rad_s: float | None = None, direction: int = 1, time_figures: bool = True,
-    held: bool = False, threads: int = 1, progress: Callable[[int, int], None] | None = None
+    speed_amplitude_rad_s: float | None = None, direction: int = 1,
+    time_figures: bool | Collection[str] = True, held: bool = False, threads: int = 1,
 ) -> LinearFigures:  # fmt: skip
     """Figures of the sampled loops of every design of a population.
 
@@ -114,41 +114,35 @@ def linear_figures(
 
     ``operating_point``, ``load_Nm``, ``speed_amplitude_rad_s``, ``direction``: as in
     `actuator_lti.assemble_loops`.
-    ``time_figures``: whether to follow the step responses as well (most of the time).
+    ``time_figures``: whether to follow the step responses as well (most of the time), or of which loops.
     ``held``: give an inner loop that its load, or what holds its torque over a tick, drives away by itself,
     in a drive that is stable as a whole, the figures of the same loop with the rotor held (current) or the
     load moment held (velocity), if stable.
     ``threads``: that share the designs.
-    ``progress``: called with (designs done, designs in all).
 
     Raises `InputError`: for loops of more states than `actuator_lti.bounds.LOOP_STATES`.
     """
-    at = Operating(
-        point=operating_point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction
-    )  # fmt: skip
+    more: Any = {"speed_amplitude_rad_s": speed_amplitude_rad_s, "direction": direction}
+    at = Operating(point=operating_point, load_Nm=load_Nm, **more)
     out = np.full((population.count, len(LOOPS), fig.COLUMNS), np.nan)
+    every = LOOPS if time_figures is True else ()
+    timed = every if isinstance(time_figures, bool) else time_figures
     chunks = [
         group[first : first + _CHUNK]
         for group in population.alike()
         for first in range(0, len(group), _CHUNK)
     ]
 
-    def fill(chosen: np.ndarray) -> int:
-        _fill(wire(population.part(chosen).stacked, at), chosen, time_figures, out)
-        return len(chosen)
+    def fill(chosen: np.ndarray) -> None:
+        _fill(wire(population.part(chosen).stacked, at), chosen, timed, out)
 
-    done = 0
     with ThreadPoolExecutor(max(1, threads)) as pool:
-        for finished in pool.map(fill, chunks):
-            done += finished
-            if progress is not None:
-                progress(done, population.count)
+        list(pool.map(fill, chunks))
     wired = wire(population.stacked, at)
     if held:
         for loop in wired.stages:
             if loop != wired.outermost and loop != "position":
-                _hold(population, at, loop, out, time_figures)
+                _hold(population, at, loop, out, timed)
     periods = [
         np.broadcast_to(wired.period_s(loop) if loop in wired.stages else np.nan, population.count)
         for loop in LOOPS
@@ -156,7 +150,7 @@ def linear_figures(
     return LinearFigures(wired.stages, population.count, out, np.column_stack(periods))
 
 
-def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, time_figures: bool) -> None:
+def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, timed: Collection[str]) -> None:
     """Put the figures of a held loop in the place of one that is unstable only by itself."""
     place, stable = LOOPS.index(loop), out[:, :, fig.STABLE] == 1.0
     outermost = LOOPS.index(population.design.controller.outermost)
@@ -165,7 +159,7 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
     def rows(chosen: np.ndarray, operating: Operating) -> np.ndarray:
         some, result = population.part(chosen), np.full((len(chosen), *out.shape[1:]), np.nan)
         for group in some.alike():
-            _fill(wire(some.part(group).stacked, operating), group, time_figures, result, only=loop)
+            _fill(wire(some.part(group).stacked, operating), group, timed, result, only=loop)
         return result[:, place]
 
     away = lost & pushes_away(population.stacked, at)
@@ -181,17 +175,16 @@ def _hold(population: Population, at: Operating, loop: str, out: np.ndarray, tim
 
 
 def _fill(
-    wired: Drive, chosen: np.ndarray, time_figures: bool, out: np.ndarray, only: str | None = None
+    wired: Drive, chosen: np.ndarray, timed: Collection[str], out: np.ndarray, only: str | None = None
 ) -> None:
     """Figures of every loop of stacked designs, or of one."""
     for stage in wired.stages if only is None else (only,):
-        rows = np.full((len(chosen), out.shape[2]), np.nan)
+        rows, time_figures = np.full((len(chosen), out.shape[2]), np.nan), stage in timed
         rows[:, [fig.GAIN_CROSSOVERS, fig.PHASE_CROSSOVERS]] = 0.0
         lead, response = _command_path(wired) if stage == "position" else (0.0, None)
         blocks = stage_blocks(wired, stage)
         _figures_of(fundamental(blocks), lead, time_figures and response is None, rows)
-        unjudged = np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1))
-        for k in unjudged:
+        for k in np.flatnonzero(np.isnan(rows[:, fig.STABLE]) & (len(blocks) > 1)):
             alone = shown([block.of(int(k)) for block in blocks])  # a mode at rest that moves is taken out
             _figures_of(fundamental(alone).shown(), lead, time_figures, rows[k : k + 1])
         if response is not None:

@@ -82,8 +82,7 @@ def compile_library(text: str, output: str, target: str, *, portable: bool = Fal
     there is no compiler, or it fails.
     """
     more = ["-target", TARGETS[target].zig] if target in TARGETS else []
-    allowed = "gcc, clang, or pip install ziglang"
-    command = _chosen(target, more, allowed, own=target == HERE and not portable)
+    command = _chosen(target, more, "gcc, clang, or pip install ziglang", own=target == HERE and not portable)
     flags = (*LIBRARY_FLAGS, "-shared", "-s" if output.endswith(".dll") else "-fPIC")
     return compile_files({"kernels.c": text}, output, target, flags, command=command)
 

@@ -161,8 +161,7 @@ class Expressions:
         self.want(once, node, "a chained comparison evaluates its middle once; give it a name")
         parts = []
         for left, op, right in zip(values, node.ops, values[1:], strict=False):
-            known = type(op) in _COMPARE
-            self.want(known, node, f"the comparison {type(op).__name__} is not in the subset")
+            self.want(type(op) in _COMPARE, node, f"the comparison {type(op).__name__} is not in the subset")
             parts.append(self._compared(left, _COMPARE[type(op)], right))
         return "(" + " && ".join(f"({part})" if len(parts) > 1 else part for part in parts) + ")", "bool"
 

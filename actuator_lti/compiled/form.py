@@ -78,8 +78,7 @@ class Known(ast.NodeTransformer):
 
     def visit_Assign(self, node: ast.Assign) -> ast.stmt | list[ast.stmt] | None:
         self.generic_visit(node)
-        alone = len(node.targets) == 1
-        return None if alone and self.told(node.targets[0], node.value) else node
+        return None if len(node.targets) == 1 and self.told(node.targets[0], node.value) else node
 
     def told(self, target: ast.expr, value: ast.expr) -> bool:
         """Note a variable that is assigned here alone, and known."""

@@ -109,8 +109,7 @@ class Library:
     def text(self) -> str:
         from actuator_lti.compiled.program import emit_c
 
-        entries = {entry.function: entry.arguments for entry in self.entries}
-        return emit_c(entries, forms=self.forms()).source
+        return emit_c({entry.function: entry.arguments for entry in self.entries}, forms=self.forms()).source
 
     def build(self) -> Path:
         """Emit, compile and keep the library, if it is not there; older ones of this kind of machine go.

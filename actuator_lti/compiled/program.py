@@ -83,15 +83,13 @@ class Program:
         return "\n".join(lines)
 
 
-def emit_c(
-    entries: Mapping[Any, Sequence[Kind]], prefix: str = "drive_", forms: Sequence[Form] = ()
-) -> Program:
+def emit_c(entries: Mapping[Any, Sequence[Kind]], forms: Sequence[Form] = ()) -> Program:
     """C99 for compiled functions, with the kinds of their arguments, and everything that they call.
 
     ``forms`` are second forms of functions that these call; the function itself chooses by its row, at every
     call. `EmitError`: the first construct outside the subset, with its file and line.
     """
-    collector = Collector(prefix)
+    collector = Collector("drive_")
     names = [collector.call(python, list(kinds), None, None).name for python, kinds in entries.items()]
     return program_of(collector, names, [_Formed(collector, form) for form in forms])
 

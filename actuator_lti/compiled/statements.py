@@ -104,9 +104,8 @@ class Statements(Expressions):
     def _results(self, targets: ast.Tuple, call: ast.Call) -> None:
         callee, texts = self.called(call)
         kinds = callee.returns or ()
-        self.want(
-            len(kinds) == len(targets.elts), call, "the number of results differs from the number of targets"
-        )
+        fits = len(kinds) == len(targets.elts)
+        self.want(fits, call, "the number of results differs from the number of targets")
         name = self._named_result(callee, texts)
         for index, (target, kind) in enumerate(zip(targets.elts, kinds, strict=True)):
             if not (isinstance(target, ast.Name) and target.id.startswith("_")):

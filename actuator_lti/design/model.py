@@ -58,7 +58,7 @@ from actuator_lti.design.plant import (
     Screw,
     Temperature,
 )
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -171,8 +171,7 @@ class Design:
 
     def waiver_of(self, id: str) -> Waiver | None:
         """The waiver of a requirement or check by its id; one for ``id`` holds for every ``id/loop`` too."""
-        names = (id, id.rpartition("/")[0])
-        return next((item for item in self.waivers if item.requirement in names), None)
+        return next((item for item in self.waivers if item.requirement in (id, id.rpartition("/")[0])), None)
 
     @property
     def load_unit(self) -> str:

@@ -60,8 +60,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     reader = Reader(tree, findings)
     head, _ = reader.values("design", tree.get("design"), "design")
     tables = [item.key for item in (schema.HEAD, *schema.children(""), *schema.RECORDS)]
-    meant = reader.known(tree, [*tables, "objects"], "")
-    parts = reader.tables("", tree, meant)
+    parts = reader.tables("", tree, reader.known(tree, [*tables, "objects"], ""))
     records = {record.attribute: reader.items(record, tree.get(record.key, [])) for record in schema.RECORDS}
     objects = reader.objects(tree.get("objects"))
     # 10 deg (0.01 m) without a load where the file does not say what to validate
@@ -71,8 +70,7 @@ def read_tree(tree: Tree, origin: str, findings: Findings) -> model.Design:
     design = reader.with_gains(
         model.Design(**{**head, "validation": fallback, **parts, **records}, objects=objects, origin=origin)
     )
-    written = frozenset(reader.written)
-    design = replace(design, parameters=FrozenMap(reader.parameters), written=written)
+    design = replace(design, parameters=FrozenMap(reader.parameters), written=frozenset(reader.written))
     sheet = DataSheet(reader.stated, tree)
     contradicted = tuple(sheet.refusals(design))
     findings.extend(contradicted)
@@ -92,9 +90,8 @@ class Reader:
         self.parameters: dict[str, model.Parameter] = {}
         self.stated: dict[str, model.Parameter] = {}
         self.gains: dict[str, tuple[Field, Tree, float, Per]] = {}
-        head, control, motor = (
-            tree[key] if isinstance(tree.get(key), dict) else {} for key in ("design", "control", "motor")
-        )
+        tables = (tree.get(key) for key in ("design", "control", "motor"))
+        head, control, motor = (each if isinstance(each, dict) else {} for each in tables)
         stages = {meant_of(f"{key}", LOOPS) or key_for("control", f"{key}") for key in control}
         self.structure = Structure(_meant(head, "design.axis"), "velocity" in stages, "current" in stages)
         self.frame = Frame(self.structure, _meant(motor, "motor.constants"))
@@ -212,8 +209,7 @@ class Reader:
 
     def words(self, field: Field, raw: Any, path: str) -> Any:
         known, allowed = raw if isinstance(raw, list) else [], ", ".join(field.choices)
-        texts = all(isinstance(word, str) for word in known)
-        if not known or not texts or len({*known}) != len(known):
+        if not known or not all(isinstance(word, str) for word in known) or len({*known}) != len(known):
             return self.refuse(path, raw, f"allowed: a list of {allowed}, each at most once")
         strange = [word for word in known if word not in field.choices]
         for word in strange:

@@ -134,8 +134,7 @@ def placed(element: Element, depth: int = 0) -> Iterator[tuple[ObjectPlace, Elem
             yield from placed(child, depth + 1)
         return
     index = _hex(element, "index", 4)
-    subs = [child for child in element if _is(child, "CANopenSubObject")]
-    for one in (element, *subs):
+    for one in (element, *[child for child in element if _is(child, "CANopenSubObject")]):
         yield ObjectPlace(index=index, subindex=0 if one is element else _hex(one, "subIndex", 2)), one
 
 

@@ -255,8 +255,7 @@ def kept_gains(design: Design) -> Iterator[str]:
 
 def _encoder(design: Design) -> Iterator[str]:
     quantum, encoder, top = design.angle_quantum_rad, design.encoder, design.limits.speed_rad_s
-    velocity = design.controller.velocity
-    if encoder.speed != "difference" or quantum is None or velocity is None:
+    if encoder.speed != "difference" or quantum is None or design.controller.velocity is None:
         return
     step = quantum / (encoder.difference_samples * design.controller.period_of("velocity"))
     if isfinite(top) and step > 0.05 * top:

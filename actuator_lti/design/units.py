@@ -36,52 +36,24 @@ _BASE = {
 }  # fmt: skip
 # What each is, in units that stand above it.
 _DERIVED = {
-    "percent": ("0.01", "1"),
-    "ppm": ("0.000001", "1"),
-    "g gram gm": ("0.001", "kg"),
-    "in inch inches": ("0.0254", "m"),
-    "ft foot": ("0.3048", "m"),
-    "lb lbm pound": ("0.45359237", "kg"),
-    "mil": ("0.0000254", "m"),
-    "micron": ("0.000001", "m"),
-    "oz ounce": ("0.028349523125", "kg"),
-    "min minute": ("60", "s"),
-    "h hour": ("3600", "s"),
-    "N newton": ("1", "kg*m/s^2"),
-    "lbf pound_force": ("4.4482216152605", "N"),
-    "slug": ("1", "lbf*s^2/ft"),
-    "ozf ounce_force": ("0.27801385095378125", "N"),
-    "kgf kp kilogram_force": ("9.80665", "N"),
-    "gf gram_force": ("0.00980665", "N"),
-    "dyn dyne": ("0.00001", "N"),
-    "J joule": ("1", "N*m"),
-    "Nm newton_meter": ("1", "N*m"),
-    "Ncm": ("0.01", "N*m"),
-    "Nmm": ("0.001", "N*m"),
-    "Nms": ("1", "N*m*s"),
-    "Ns": ("1", "N*s"),
-    "ozin": ("1", "ozf*in"),
-    "lbin inlb": ("1", "lbf*in"),
-    "lbft ftlb": ("1", "lbf*ft"),
-    "kgcm": ("1", "kgf*cm"),
-    "kgfm": ("1", "kgf*m"),
-    "kgfcm": ("1", "kgf*cm"),
-    "W watt": ("1", "J/s"),
-    "V volt": ("1", "W/A"),
-    "ohm Ω Ohm": ("1", "V/A"),
-    "H henry henries Henry Henries": ("1", "V*s/A"),
-    "F farad": ("1", "A*s/V"),
-    "Vs": ("1", "V*s"),
-    "As": ("1", "A*s"),
-    "deg degree": ("0.017453292519943295", "rad"),
-    "arcmin arcminute": ("0.0002908882086657216", "rad"),
-    "arcsec arcsecond": ("4.84813681109536e-06", "rad"),
-    "rev turn revolution": ("6.283185307179586", "rad"),
-    "rpm RPM": ("0.10471975511965977", "rad/s"),
-    "KV Kv": ("0.10471975511965977", "rad/(V*s)"),
+    "percent": ("0.01", "1"), "ppm": ("0.000001", "1"), "g gram gm": ("0.001", "kg"),
+    "in inch inches": ("0.0254", "m"), "ft foot": ("0.3048", "m"), "lb lbm pound": ("0.45359237", "kg"),
+    "mil": ("0.0000254", "m"), "micron": ("0.000001", "m"), "oz ounce": ("0.028349523125", "kg"),
+    "min minute": ("60", "s"), "h hour": ("3600", "s"), "N newton": ("1", "kg*m/s^2"),
+    "lbf pound_force": ("4.4482216152605", "N"), "slug": ("1", "lbf*s^2/ft"),
+    "ozf ounce_force": ("0.27801385095378125", "N"), "kgf kp kilogram_force": ("9.80665", "N"),
+    "gf gram_force": ("0.00980665", "N"), "dyn dyne": ("0.00001", "N"), "J joule": ("1", "N*m"),
+    "Nm newton_meter": ("1", "N*m"), "Ncm": ("0.01", "N*m"), "Nmm": ("0.001", "N*m"), "Nms": ("1", "N*m*s"),
+    "Ns": ("1", "N*s"), "ozin": ("1", "ozf*in"), "lbin inlb": ("1", "lbf*in"), "lbft ftlb": ("1", "lbf*ft"),
+    "kgcm": ("1", "kgf*cm"), "kgfm": ("1", "kgf*m"), "kgfcm": ("1", "kgf*cm"), "W watt": ("1", "J/s"),
+    "V volt": ("1", "W/A"), "ohm Ω Ohm": ("1", "V/A"), "H henry henries Henry Henries": ("1", "V*s/A"),
+    "F farad": ("1", "A*s/V"), "Vs": ("1", "V*s"), "As": ("1", "A*s"),
+    "deg degree": ("0.017453292519943295", "rad"), "arcmin arcminute": ("0.0002908882086657216", "rad"),
+    "arcsec arcsecond": ("4.84813681109536e-06", "rad"), "rev turn revolution": ("6.283185307179586", "rad"),
+    "rpm RPM": ("0.10471975511965977", "rad/s"), "KV Kv": ("0.10471975511965977", "rad/(V*s)"),
     "Hz hertz": ("6.283185307179586", "rad/s"),
     "line": ("4", "count"),  # of an encoder: two edges of two tracks
-}
+}  # fmt: skip
 _FLUX = (
     'is of a flux linkage psi: with motor.constants = "peak-phase" and p pole pairs back_emf_constant is '
     "p psi in V*s/rad, torque_constant 1.5 p psi in N*m/A"
@@ -176,8 +148,7 @@ def _units() -> Units:
     for names, (number, definition) in _DERIVED.items():
         factor, powers = _product(definition, units)
         units |= dict.fromkeys(names.split(), (Fraction(number) * factor, powers))
-    minute = units["min"][1] + Counter({_MINUTE: 1})
-    return units | dict.fromkeys(("min", "minute"), (Fraction(60), minute))
+    return units | dict.fromkeys(("min", "minute"), (Fraction(60), units["min"][1] + Counter({_MINUTE: 1})))
 
 
 def _named(name: str, units: Units) -> Exact:

@@ -269,8 +269,7 @@ def design_hash(design: Design) -> str:
     content |= {"waivers": [asdict(item) for item in design.waivers]} if design.waivers else {}
     content["correlations"] = sorted((_canonical(item) for item in design.correlations), key=str)
     content["tolerances"] = {path: _canonical(tolerance) for path, _, tolerance in tolerances(design)}
-    text = json.dumps(content, sort_keys=True, separators=(",", ":"))
-    return hashlib.sha256(text.encode()).hexdigest()
+    return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
 
 def _canonical(value: Any) -> Any:

@@ -39,18 +39,10 @@ __all__ = [
 COLOURS = ("#0072b2", "#c46200", "#00805f", "#8e4585", "#c0392b", "#3a8fc4", "#7a5c1e", "#1f2933", "#66727f")
 RED, GREEN, INK, MUTED = "#c0392b", "#00805f", "#1f2933", "#66727f"
 STYLE: dict[str, Any] = {
-    "axes.grid": True,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlesize": "medium",
-    "figure.figsize": (6.4, 4.6),
-    "grid.alpha": 0.35,
-    "grid.linewidth": 0.6,
-    "legend.fontsize": "small",
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-    "svg.fonttype": "none",
-}
+    "axes.grid": True, "axes.spines.right": False, "axes.spines.top": False, "axes.titlesize": "medium",
+    "figure.figsize": (6.4, 4.6), "grid.alpha": 0.35, "grid.linewidth": 0.6, "legend.fontsize": "small",
+    "legend.frameon": False, "lines.linewidth": 1.6, "svg.fonttype": "none",
+}  # fmt: skip
 _POINTS = 600
 
 
@@ -139,8 +131,7 @@ def plot_bode(
     magnitude, phase = _panels(axes, 2)
     omega, L = _curve(system, margins)
     hertz = omega / (2.0 * np.pi)
-    along = is_measured(system)  # the shorter turn from point to point
-    turned = np.degrees(np.unwrap(np.angle(L))) if along else unwrapped_phase_deg(system, omega)
+    turned = np.degrees(np.unwrap(np.angle(L))) if is_measured(system) else unwrapped_phase_deg(system, omega)
     with np.errstate(divide="ignore"):
         magnitude.semilogx(hertz, 20.0 * np.log10(np.abs(L)), label=label or None)
     phase.semilogx(hertz, turned)
@@ -222,8 +213,7 @@ def plot_step(system: Any, *, duration_s: float | None = None, label: str = "", 
     sampled = system.isdtime(strict=True)
     times = np.arange(0.0, duration_s, system.dt) if sampled else np.linspace(0.0, duration_s, _POINTS)
     values = np.asarray(control.step_response(system, times).y).ravel()
-    held = "steps-post" if sampled else "default"
-    panel.plot(1e3 * times, values, drawstyle=held, label=label or None)
+    panel.plot(1e3 * times, values, drawstyle="steps-post" if sampled else "default", label=label or None)
     panel.axhline(1.0, color=INK, linewidth=0.8)
     panel.set(xlabel="time, ms", ylabel="response to a unit step")
     if label:

@@ -139,7 +139,8 @@ def _speed_slopes(design: Design, direction: int) -> list[tuple[float, Any]]:
         more = _through_train(design) * behind.viscous_Nms_rad / design.ratio_to_coupling
     if present(damping):
         more = more + _through_train(design) * damping / (design.total_ratio * design.ratio_behind_coupling)
-    return [(start, slope + more) for start, slope in friction_slopes(design, direction)]
+    pieces = friction_slopes(design, direction)
+    return [(start, slope + more) for start, slope in pieces] if present(more) else pieces
 
 
 def _top_speed(design: Design, against: Any, slopes: list[tuple[float, Any]]) -> tuple[Any, Any, Any]:
@@ -206,8 +207,7 @@ def _one_way(design: Design, load_Nm: float, direction: int) -> Capability:
     speed, cause, torque = _top_speed(design, against, _speed_slopes(design, direction))
     stall, kM = stall_torque_Nm(design), design.effective_motor.torque_constant_Nm_A
     needed = _held_torque(design, load_Nm, direction) + passed_moment_Nm(design, abs(load_Nm))
-    starts = (stall > needed) & (stall > against)
-    gain = where(starts, (stall - against) / driven_inertia_kgm2(design), 0.0)
+    gain = where((stall > needed) & (stall > against), (stall - against) / driven_inertia_kgm2(design), 0.0)
     held = larger(needed, against)
     holds = held > 0.0
     margin = where(holds, stall / where(holds, held, 1.0), math.inf)

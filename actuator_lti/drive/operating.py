@@ -6,6 +6,7 @@ themselves (`OverAngle`).
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
@@ -185,6 +186,26 @@ def averaged(design: Design) -> Design:
     """The same drive without what a motion averages, cogging and gear error, if it is one in motion."""
     load = replace(design.load, gear_error_Nm=0.0)
     return replace(design, motor=design.motor.straight(), load=load) if runs(design) else design
+
+
+IN_MOTION = "in motion"
+
+
+def turned(design: Design) -> Iterator[tuple[str, Design]]:
+    """The drive where its cogging or gear error is steepest, and in a motion that averages them.
+
+    On a crest it drives the rotor away, in a notch it holds it: margins are extreme there.
+    """
+    motor, load = design.motor, design.load
+    if runs(design) or not (motor.cogging_Nm or load.gear_error_Nm):
+        return
+    for where, phase in (("on a crest", 0.0), ("in a notch", pi)):
+        if motor.cogging_Nm:
+            yield f"{where} of the cogging", replace(design, motor=replace(motor, cogging_phase_rad=phase))
+        if load.gear_error_Nm:
+            at = replace(load, gear_error_phase_rad=phase)
+            yield f"{where} of the gear error", replace(design, load=at)
+    yield IN_MOTION, replace(design, motor=motor.straight(), load=replace(load, gear_error_Nm=0.0))
 
 
 def _moving(design: Design, at: Operating) -> bool:

@@ -112,9 +112,8 @@ def _electrical(motor: Motor) -> tuple[MatrixEntries, Entries]:
     """Equation (1): entries of the current's row, and of B_u."""
     R, L, kE = motor.resistance_ohm, motor.inductance_H, motor.back_emf_constant_Vs_rad
     if R is None or L is None or kE is None or motor.torque_constant_Nm_A is None:
-        raise InputError(
-            "motor: resistance, inductance, torque_constant and back_emf_constant, or source_gain"
-        )
+        needed = "resistance, inductance, torque_constant and back_emf_constant, or source_gain"
+        raise InputError(f"motor: {needed}")
     return {("i", "i"): -R / L, ("i", "w"): -kE / L}, {"i": 1 / L}
 
 

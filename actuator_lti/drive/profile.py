@@ -34,10 +34,8 @@ class CommandMean:
         """``sin(n w T/2)/(n sin(w T/2)) exp(-j w (n - 1) T/2)``."""
         half = 0.5 * np.asarray(omega_rad_s, dtype=float) * self.period_s
         with np.errstate(divide="ignore", invalid="ignore"):
-            gain = np.where(
-                np.sin(half) == 0.0, 1.0, np.sin(self.samples * half) / (self.samples * np.sin(half))
-            )
-        gain = np.where(np.abs(gain) < RESOLVED, 0.0, gain)
+            gain = np.sin(self.samples * half) / (self.samples * np.sin(half))
+        gain = np.where(np.sin(half) == 0.0, 1.0, np.where(np.abs(gain) < RESOLVED, 0.0, gain))
         return np.asarray(gain * np.exp(-1j * half * (self.samples - 1)))
 
     @property

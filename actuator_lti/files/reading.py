@@ -19,18 +19,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from actuator_lti.bounds import (
-    CAMPAIGN_BYTES,
-    CAMPAIGN_VALUES,
-    JSON_DEPTH,
-    KEY_PARTS,
-    REPORT_BYTES,
-    TEXT_CHARACTERS,
-    TOML_BYTES,
-    TOML_DEPTH,
-    TOML_VALUES,
-    Bound,
-)
+from actuator_lti import bounds
+from actuator_lti.bounds import TOML_BYTES, TOML_DEPTH, TOML_VALUES, Bound
 from actuator_lti.errors import InputError, in_file
 
 AnyPath = str | PathLike[str]
@@ -144,12 +134,12 @@ def read_toml(
 
 def read_campaign_toml(path: AnyPath) -> Tree:
     """As `read_toml`, for campaign and record files, which list thousands of runs."""
-    return read_toml(path, "campaign or record file", CAMPAIGN_BYTES, CAMPAIGN_VALUES)
+    return read_toml(path, "campaign or record file", bounds.CAMPAIGN_BYTES, bounds.CAMPAIGN_VALUES)
 
 
 def read_json(path: AnyPath, what: str = "report.json") -> Any:
     """The value of a JSON file, checked like a TOML file; NaN and Infinity are refused."""
-    where, text = shown_path(path), read_text(path, what, REPORT_BYTES)
+    where, text = shown_path(path), read_text(path, what, bounds.REPORT_BYTES)
     if not text.strip():
         raise InputError(f"is empty; allowed: a {what}", where=where)
     return parse_json(text, where)
@@ -167,7 +157,7 @@ def parse_toml(text: str, where: str, *, size: Bound = TOML_BYTES, values: Bound
             raise InputError(_too_deep("", TOML_DEPTH)) from None
         except (ValueError, OverflowError) as error:
             raise InputError(f"not TOML: {_plain(str(error), 200)}{_hint(text, error)}") from None
-        _walk(tree, TOML_DEPTH, values, TEXT_CHARACTERS)
+        _walk(tree, TOML_DEPTH, values, bounds.TEXT_CHARACTERS)
     return tree
 
 
@@ -217,10 +207,10 @@ def parse_json(text: str, where: str, constant: Callable[[str], float] = _refuse
             hooks: Any = {"parse_float": _finite, "object_pairs_hook": _no_key_twice}
             value = json.loads(text, parse_constant=constant, **hooks)
         except RecursionError:
-            raise InputError(_too_deep("", JSON_DEPTH)) from None
+            raise InputError(_too_deep("", bounds.JSON_DEPTH)) from None
         except (ValueError, OverflowError) as error:
             raise InputError(f"not JSON: {_plain(str(error), 200)}") from None
-        _walk(value, JSON_DEPTH, None, None)
+        _walk(value, bounds.JSON_DEPTH, None, None)
     return value
 
 
@@ -241,7 +231,7 @@ def _no_key_twice(pairs: list[tuple[str, Any]]) -> Tree:
 def _refuse_long_keys(text: str) -> None:
     for number, line in enumerate(text.splitlines(), 1):
         head = line.partition("=")[0]
-        if head.count(".") > KEY_PARTS.most and not head.lstrip().startswith("#"):
+        if head.count(".") > bounds.KEY_PARTS.most and not head.lstrip().startswith("#"):
             raise InputError(f"line {number}: a key nested too deeply; allowed: {TOML_DEPTH.most} levels")
 
 

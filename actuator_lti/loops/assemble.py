@@ -52,7 +52,7 @@ def assemble_loops(
     """
     at = Operating(
         point=operating_point, load_Nm=load_Nm, speed_amplitude_rad_s=speed_amplitude_rad_s,
-        direction=direction, rotor=rotor, speed_rad_s=speed_rad_s, angle_rad=angle_rad, twist_rad=twist_rad
+        direction=direction, rotor=rotor, speed_rad_s=speed_rad_s, angle_rad=angle_rad, twist_rad=twist_rad,
     )  # fmt: skip
     return loops_at(as_design(design), at, form, inner_loops)
 

@@ -106,8 +106,7 @@ def open_loop(
 def loop(wired: Drive, place: str, delays: frozenset[str], opened: tuple[str, ...] = ()) -> Loop:
     """The same with its closed loop and its sensitivity."""
     system = open_loop(wired, place, delays, opened)
-    parts = (system, system.feedback(), static(np.eye(1)).feedback(system))
-    return loop_of(wired, place, parts, finished)
+    return loop_of(wired, place, (system, system.feedback(), static(np.eye(1)).feedback(system)), finished)
 
 
 def _whole(wired: Drive, delays: frozenset[str]) -> Flow:

@@ -11,7 +11,7 @@ phase of the exact sampled loop:
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from os import PathLike
 
@@ -37,32 +37,15 @@ class DelayBudget:
 
     loop: str
     frequency_rad_s: float
-    controller_deg: float  # PI(s), or 0 for P
-    plant_deg: float  # motor and load, with the inner loops closed and ideal
-    # Age of a speed taken by difference (0 where w itself is measured; the lag of a tracking loop is in the
-    # plant's item)
-    measurement_deg: float
-    hold_deg: float  # holds of all rates inside this loop
-    computing_delay_deg: float
-    sampling_deg: float  # the rest up to the exact sampled loop: digital instead of continuous PI, aliasing
-    total_deg: float  # phase of the sampled loop, the sum of the items
+    # Which sum to the total: ``controller``: PI(s), or 0 for P; ``plant``: motor and load, with the inner
+    # loops closed and ideal; each of `filters_deg`; ``measurement``: age of a speed taken by difference
+    # (0 where w itself is measured; the lag of a tracking loop is in the plant's item); ``hold``: of all
+    # rates inside this loop; ``computing delay``; ``sampling``: digital instead of continuous PI, aliasing
+    items: Mapping[str, float]
+    total_deg: float  # phase of the sampled loop
     one_more_sample_deg: float  # what one more base period of computing delay would add (not in the total)
-    rotor: RotorState = "free"  # of a current loop
-    # Each filter in or inside the loop, in the order of the signal, by kind and frequency
-    filters_deg: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def items(self) -> dict[str, float]:
-        """The items that sum to `total_deg`, in degrees."""
-        return {
-            "controller": self.controller_deg,
-            "plant": self.plant_deg,
-            **self.filters_deg,
-            "measurement": self.measurement_deg,
-            "hold": self.hold_deg,
-            "computing delay": self.computing_delay_deg,
-            "sampling": self.sampling_deg,
-        }
+    rotor: RotorState  # of a current loop
+    filters_deg: Mapping[str, float]  # in or inside the loop, in the signal's order, by kind and frequency
 
 
 def delay_budget(
@@ -79,16 +62,13 @@ def delay_budget(
     Raises `InputError`: for a loop that the design does not have, or a frequency out of range.
     """
     design = as_design(design)
-    wired = wire(
-        design, Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor, torques_held=torques_held)
-    )
+    at = Operating(point=operating_point, load_Nm=load_Nm, rotor=rotor, torques_held=torques_held)
+    wired = wire(design, at)
     if loop_name not in wired.stages:
         raise InputError(f"loop {loop_name!r}: one of {', '.join(wired.stages)}")
     if design.controller.own_law is not None:
-        stage = design.controller.own_law[0]
-        raise InputError(
-            f"control.{stage}.law: a delay budget is of gains and filters; allowed: without a law"
-        )
+        law = f"control.{design.controller.own_law[0]}.law"
+        raise InputError(f"{law}: a delay budget is of gains and filters; allowed: without a law")
     nyquist = np.pi / wired.period_s(loop_name)
     if not 0 < finite_number("frequency_rad_s", frequency_rad_s) < nyquist:
         raise InputError(f"frequency_rad_s = {frequency_rad_s}: between 0 and Nyquist, {nyquist:g} rad/s")
@@ -98,19 +78,13 @@ def delay_budget(
     ideal, held, measured, full = (_continuous(wired, loop_name, kind, omega) for kind in kinds)
     sampled, later = (_sampled(each, loop_name, omega) for each in (wired, wired.later(wired.tick_s)))
     controller = wired.law(loop_name).at_s(omega)
-    items = {
-        "controller_deg": float(np.degrees(np.angle(controller[-1]))),
-        "plant_deg": _from_low(bare / controller),
-        "hold_deg": _from_low(held / ideal),
-        "measurement_deg": _from_low(measured / held),
-        "computing_delay_deg": _from_low(full / measured),
-        "sampling_deg": _from_low(sampled / full),
-    }
-    return DelayBudget(
-        loop=loop_name, rotor=rotor, frequency_rad_s=frequency_rad_s,
-        total_deg=sum(items.values()) + sum(steps.values()), one_more_sample_deg=_from_low(later / sampled),
-        filters_deg=steps, **items
-    )  # fmt: skip
+    controlled = float(np.degrees(np.angle(controller[-1])))
+    behind = {"measurement": measured / held, "hold": held / ideal, "computing delay": full / measured}
+    behind["sampling"] = sampled / full
+    items = {"controller": controlled, "plant": _from_low(bare / controller), **steps}
+    items |= {name: _from_low(each) for name, each in behind.items()}
+    one_more = _from_low(later / sampled)
+    return DelayBudget(loop_name, frequency_rad_s, items, sum(items.values()), one_more, rotor, steps)
 
 
 def _built_up(wired: Drive, stage: str, omega: np.ndarray) -> tuple[np.ndarray, dict[str, float]]:

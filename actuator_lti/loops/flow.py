@@ -107,8 +107,7 @@ class FlowWalk(Walk):
         self.rate[name] = value
 
     def apply(self, name: str, block: Block, value: Row) -> Row:
-        names = [f"{name}.{k}" for k in range(len(block.continuous.B))]
-        return self.realised(names, block.continuous, value)
+        return self.realised([f"{name}.{k}" for k in range(len(block.continuous.B))], block.continuous, value)
 
     def derivative(self, name: str, value: Row, period_s: Any) -> Row:
         """The difference over the period; ideal: the derivative, by the chain rule."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.systems.as_control import as_control
 

@@ -62,8 +62,7 @@ def table(rows: Iterable[Row], names: tuple[str, ...]) -> np.ndarray:
     listed = list(rows)
     place = {name: k for k, name in enumerate(names)}
     values = (v for row in listed for v in row.terms.values() if not isinstance(v, float))
-    stack = np.broadcast_shapes(*{np.shape(v) for v in values})
-    out = np.zeros((*stack, len(listed), len(names)))
+    out = np.zeros((*np.broadcast_shapes(*{np.shape(v) for v in values}), len(listed), len(names)))
     for r, row in enumerate(listed):
         for name, value in row.terms.items():
             if name in place:

@@ -123,8 +123,7 @@ def static_stiffness(response: Compliance) -> Any:
     """K at zero frequency, by its slope near there: below 0 of a drive that pushes away, 0 of a free one, inf
     with an integral.
     """
-    hertz = [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]
-    K = np.moveaxis(stiffness_at(response, hertz), -1, 0)
+    K = np.moveaxis(stiffness_at(response, [_REST_HZ, _SLOW_HZ, 10.0 * _SLOW_HZ]), -1, 0)
     rest, low, high = np.abs(K)
     gone = ~np.isfinite(low) | (high < 0.5 * low)
     return _plain(np.where(gone, np.inf, np.where(rest < _AWAY * low, 0.0, np.copysign(rest, K[0].real))))

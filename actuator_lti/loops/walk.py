@@ -181,9 +181,8 @@ class Walk(ABC):
         """P, PI or PID on the angle, and the feed-forward of speed and acceleration."""
         law, N, T = self.control.position_loop, self.drive.ratio, self.drive.period_s("position")
         command = N * reference
-        own = self.at_cut(
-            "output", self.signals["output_angle"] if law.sensor == "output" else self.signals["th"] / N
-        )
+        measured = self.signals["output_angle"] if law.sensor == "output" else self.signals["th"] / N
+        own = self.at_cut("output", measured)
         error = self.at_cut("e_th", command - N * own)
         if law.law is not None:
             seen = {"output_angle": own} if law.sensor == "output" else {"angle": N * own}

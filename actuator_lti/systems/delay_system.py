@@ -99,9 +99,8 @@ class DelaySystem(ControlFace):
         if isinstance(system, int | float | np.number):
             return cls([], [], [], [], [], [[float(system)]], [], [], [], [], **names)
         if not isinstance(system, control.StateSpace | control.TransferFunction):
-            raise InputError(
-                f"{type(system).__name__}: a continuous StateSpace or TransferFunction, or a number"
-            )
+            allowed = "a continuous StateSpace or TransferFunction, or a number"
+            raise InputError(f"{type(system).__name__}: {allowed}")
         if not system.isctime():
             raise InputError(f"a sampled system (dt = {system.dt}) cannot be joined to a continuous one")
         labels = {"inputs": system.input_labels, "outputs": system.output_labels} | names
@@ -125,9 +124,8 @@ class DelaySystem(ControlFace):
     def to_state_space(self) -> control.StateSpace:
         """The same as `control.StateSpace`; refused (`InputError`) where there are delays."""
         if not self.delay_free:
-            raise InputError(
-                "to_state_space: the system has delays, which no finite state space holds exactly"
-            )
+            why = "the system has delays, which no finite state space holds exactly"
+            raise InputError(f"to_state_space: {why}")
         labels = {"inputs": self.input_labels, "outputs": self.output_labels, "name": self.name}
         if self.nstates:
             labels["states"] = self.state_labels
@@ -194,8 +192,7 @@ class DelaySystem(ControlFace):
         points = np.atleast_1d(np.asarray(x, dtype=complex))
         if points.ndim != 1:
             raise InputError("a system is evaluated at a number or a 1D array of complex frequencies")
-        y = response(self, points)
-        return control.lti._process_frequency_response(self, x, y, squeeze=squeeze)
+        return control.lti._process_frequency_response(self, x, response(self, points), squeeze=squeeze)
 
     def dcgain(self, warn_infinite: bool = False) -> Any:
         return self._dcgain(warn_infinite)

@@ -52,9 +52,8 @@ def shown(exact: ExactLoop, loop: RationalLoop) -> ExactLoop:
             residues.append(above(p) / beside(p))
             above = (above - residues[-1] * beside) // flint.acb_poly([-p, 1])
         below = flint.acb_poly.from_roots(others)
-        most = (
-            _UNSEEN * slowest * abs(complex(above(0) / below(0))) / (2.0 if loop.in_z else 1.0)
-        )  # dz = 2 ds
+        at_dc = abs(complex(above(0) / below(0))) / (2.0 if loop.in_z else 1.0)  # dz = 2 ds
+        most = _UNSEEN * slowest * at_dc
         if any(abs(complex(r)) > most for r in residues):
             return exact
         N, D = _middle(above), _middle(below)

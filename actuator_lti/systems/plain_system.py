@@ -134,8 +134,7 @@ def in_series(first: PlainDelaySystem, second: PlainDelaySystem) -> PlainDelaySy
     if first.noutputs != second.ninputs:
         raise InputError(f"series: {first.noutputs} outputs into {second.ninputs} inputs")
     m, q, p = first.ninputs, first.noutputs, second.noutputs
-    loop = np.eye(m + q, q + p, k=-m)
-    return joined_by(first, second, np.eye(m + q, m), np.eye(p, q + p, k=q), loop)
+    return joined_by(first, second, np.eye(m + q, m), np.eye(p, q + p, k=q), np.eye(m + q, q + p, k=-m))
 
 
 def in_parallel(a: PlainDelaySystem, b: PlainDelaySystem) -> PlainDelaySystem:

@@ -107,15 +107,20 @@ class LargeSignal:
 
 def beside(base: Design, design: Design, figures: Figures) -> dict[str, float | None]:
     """Figures by their keys; of another axis, or of another command, by keys of their own ("... linear")."""
-    pairs = [*zip(_kind(design), _kind(base), strict=True)]
-    ends = {group: "".join(f" {own}" for own, _ in told) if any(own != its for own, its in told) else ""
-            for group, told in {"drive": pairs[:1], "large": pairs}.items()}  # fmt: skip
-    return {key + ends.get(key.partition(".")[0], ""): value for key, value in figures.items()}
+    return {key + _apart(key, base, design): value for key, value in figures.items()}
 
 
-def _kind(design: Design) -> tuple[str, str]:
-    """The axis, which figures of the drive have their units of, and what is commanded."""
-    return design.axis, design.controller.outermost
+def _apart(key: str, base: Design, design: Design) -> str:
+    """What sets a figure apart from the base's: an axis with other units or loads, another command."""
+    group, _, rest = key.partition(".")
+    quantity, _, load = rest.partition("@")
+    own, its = ((one.axis, one.controller.outermost) for one in (design, base))
+    if group == "large" and own != its:
+        return " ".join(("", *own))
+    if group != "drive" or own[0] == its[0]:
+        return ""
+    units = {QUANTITIES[quantity].unit_for(one.axis) for one in (design, base)}
+    return "" if len(units) == 1 and float(load) == 0.0 else f" {own[0]}"
 
 
 def figure_names(found: Iterable[tuple[Figures, Design]]) -> tuple[FigureName, ...]:

@@ -127,12 +127,17 @@ def events_of(w: Floats, noise: Floats) -> Information:
     Methodology 28, 2002), as one event bends the values towards itself.
     """
     size = np.maximum(np.linalg.norm(w, axis=0), 1e-300)
-    parts = np.array_split(np.column_stack([w / size, noise]), max(int(np.sqrt(len(noise))), 2))
+    parts = np.array_split(np.column_stack([w / size, noise]), event_blocks(len(noise)))
     tables = np.array([part.T @ part for part in parts])
     gram, own, sums = np.sum(tables, axis=0)[:-1, :-1], tables[:, :-1, :-1], tables[:, :-1, -1]
     moved = np.linalg.pinv(gram - own, hermitian=True) @ sums[:, :, None]
     sums = size * (gram @ moved)[:, :, 0] * np.sqrt(1.0 - 1.0 / len(parts))
     return Information(gram=w.T @ w, noise=sums.T @ sums, rows=len(w), order=0)
+
+
+def event_blocks(rows: int) -> int:
+    """In how many blocks `events_of` takes its rows."""
+    return max(int(np.sqrt(rows)), 2)
 
 
 def wider_covariance(

@@ -11,6 +11,7 @@ from actuator_lti.design.asked import FrozenMap
 from actuator_lti.design.model import Design, Tolerance
 from actuator_lti.errors import InputError
 from actuator_lti.types import Progress
+from analyses.correlation.driving import command_of
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification import to_design, verdict
@@ -223,6 +224,10 @@ def _items(
     why = f"{rows} rows for {len(model.names)} parameters, {least} wanted: take a longer record"
     yield verdict.Item.of("rows", "Rows enough for the parameters", "" if rows >= least else why)
     yield verdict.residual_item(model.relative_residual, settings.residual_limit / 100.0)
+    commanded = all(command_of(design, record) is not None for record in records)
+    yield from verdict.law_items(right.bend, model, design.axis, commanded and bool(model.simulated))
+    yield from verdict.independence_items(residual_tests(model))
+    yield from verdict.noise_items(model)
     yield from verdict.offset_items(design, model)
     yield from verdict.kept_items(model, held, design.axis)
     yield from verdict.lag_items(right.late_s, max(record.period_s for record in records))

@@ -13,6 +13,7 @@ from analyses.correlation.following import Followed, followed
 from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.estimation.parameters import Parameter, parameter
+from analyses.identification.friction_law import Bend, bend_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
@@ -51,6 +52,7 @@ class Diagnosed:
     records: tuple[Record, ...]
     late_s: float  # how much a drive signal was late, or how closely that is told, whichever is more
     followed: Mapping[str, Followed]
+    bend: Bend | None  # of the friction over the speed; None of the benchmark, whose law is published
     findings: Mapping[str, tuple[Finding, ...]]
 
 
@@ -91,8 +93,12 @@ def diagnosed(
             told, added = _drift(part, model, parameter("offset", design.axis))
             found[record.name] += told
             model = replace(model, covariance=model.covariance + added)
+    bend = None if any(map(is_benchmark, used)) else bend_of(model)
+    if bend is not None:
+        model = _widened(model, np.sqrt(1.0 - bend.chance) * bend.moved)
     return Diagnosed(
         model=model,
+        bend=bend,
         records=tuple(used),
         late_s=late,
         followed={name: one for name, one in seen.items() if one is not None},

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from actuator_lti.design.model import Design
-from actuator_lti.types import Floats
+from actuator_lti.types import Floats, Mask
 from analyses.estimation.means import correlation_time
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, LawChoice, Recipe, RecordFit, linear_basis
@@ -29,16 +29,18 @@ def fit_map(
 ) -> JointModel:
     """Fit friction maps with one to four break points, and take one only where it is clearly better.
 
-    The break points are found one after the other, each where it lowers the residual most among 24 speeds
-    (evenly spaced in the logarithm), and then moved in turn.
+    The break points are found one after the other, each where it lowers the residual most among
+    `speeds_tried`, and then moved in turn.
     """
 
     def fitted(knots: tuple[float, ...] | None) -> JointModel:
         return fit_records(design, records, recipe=recipe, fixed=fixed, gravity=gravity, knots_rad_s=knots)
 
     plain = fitted(None)
-    clear = [_away_from_reversals(part) for part in plain.records]
-    speed, rest = (np.concatenate(parts) for parts in zip(*clear, strict=True))
+    clear = [(part, away_from_reversals(part)) for part in plain.records]
+    speed, rest = (
+        np.concatenate([getattr(part, name)[rows] for part, rows in clear]) for name in ("speed", "friction")
+    )
     top, n = float(np.max(np.abs(speed))), len(rest) / correlation_time(plain.residual)
     breaks: tuple[float, ...] = ()
     models, laws = [plain], [_law((), plain, n)]
@@ -68,18 +70,23 @@ def _law(breaks: tuple[float, ...], model: JointModel, independent: float) -> La
     )
 
 
-def _away_from_reversals(part: RecordFit) -> tuple[Floats, Floats]:
-    """Speed and friction of rows with no reversal beside: the decimation's filter mixes both sides."""
+def away_from_reversals(part: RecordFit) -> Mask:
+    """Rows with no reversal beside: the decimation's filter mixes both sides."""
     side = np.sign(part.speed)
     turns = np.concatenate([[False], side[1:] != side[:-1], [False]])
     clear = ~(turns[1:] | turns[:-1])
     clear[1:-1] &= clear[2:] & clear[:-2]
-    return part.speed[clear], part.friction[clear]
+    return clear
+
+
+def speeds_tried(top: float) -> Floats:
+    """Where a friction law may bend, evenly spaced in the logarithm, up to near the largest speed."""
+    return np.geomspace(LEAST_SHARE * top, 0.95 * top, GRID)
 
 
 def _one_more(speed: Floats, rest: Floats, top: float, result: tuple[float, ...]) -> tuple[float, ...]:
     """The break points with the best one more, then each moved in turn."""
-    grid = np.geomspace(LEAST_SHARE * top, 0.95 * top, GRID)
+    grid = speeds_tried(top)
     size, side = np.abs(speed), np.sign(speed)
 
     def misfit(breaks: Sequence[float]) -> float:

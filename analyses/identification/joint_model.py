@@ -6,7 +6,7 @@ Models of EMPS", Workshop on Nonlinear System Identification Benchmarks, 2019.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from actuator_lti.types import Floats, Mask
 from analyses.estimation.fit import Fit
-from analyses.records.differentiation import Motion, filtered_motion
+from analyses.records.differentiation import Motion, filtered_motion, low_pass
 from analyses.records.record import Record
 
 FrictionForm = Literal["symmetric", "per-direction"]
@@ -33,9 +33,11 @@ class Recipe:
     filter_order: int = 4
     skip_samples: int = 49
     decimation: int = 10
-    # left out where a record ends in motion: there the filter, without further samples, bends the position
+    # left out at the end: there the filter, without further samples, bends the position
     skip_end_samples: int = 0
     points: int = 3  # over which it differentiates
+    # whether what drives and what turns with the direction are filtered as the position is
+    both_sides: bool = False
 
     def motion(self, values: Floats, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
@@ -43,18 +45,33 @@ class Recipe:
             values, period_s, cutoff_hz=self.cutoff_hz, order=self.filter_order, points=self.points
         )
 
+    def other_side(self, values: Floats, period_s: float) -> Floats:
+        """A torque that is not made of the filtered position."""
+        if not self.both_sides:
+            return values
+        return low_pass(values, period_s, cutoff_hz=self.cutoff_hz, order=self.filter_order)
+
 
 def friction_columns(
-    motion: Motion, form: FrictionForm, knots_rad_s: Sequence[float] | None
+    motion: Motion,
+    form: FrictionForm,
+    knots_rad_s: Sequence[float] | None,
+    filtered: Callable[[Floats], Floats],
 ) -> tuple[list[str], Floats]:
-    """Names and columns of inertia, friction (of a form, or a map over the speed) and offset."""
+    """Names and columns of inertia, friction (of a form, or a map over the speed) and offset.
+
+    What jumps where the motion turns back is ``filtered`` as the torques are.
+    """
     velocity, side = motion.velocity, np.sign(motion.velocity)
-    names, own = list(NAMES[form]), [velocity, side, np.ones_like(side)]
+    names, own = list(NAMES[form]), [velocity, filtered(side), np.ones_like(side)]
     if knots_rad_s is not None:
         names = ["inertia", *(f"map_{k}" for k in range(len(knots_rad_s))), "offset"]
+        jump = own[1] - side
         own[:2] = (linear_basis(np.abs(velocity), knots_rad_s) * side[:, None]).T
+        own[0] = own[0] + jump
     elif form == "per-direction":
-        own = [values * (turn * side > 0.0) for turn in (1.0, -1.0) for values in (velocity, side)]
+        turns = [turn * side > 0.0 for turn in (1.0, -1.0)]
+        own = [values for turn in turns for values in (velocity * turn, filtered(side * turn))]
     return names, np.column_stack([motion.acceleration, *own])
 
 
@@ -176,6 +193,7 @@ class JointModel(Fit):
     weights: tuple[float, ...] = ()
     bias: Mapping[str, float] = field(default_factory=dict)  # taken off each value as the fit's own
     bias_told: str = ""  # how, or why not
+    noise_share: float = 0.0  # of what tells the inertia: noise of recorded motions, taken off as well
     # the records as the design simulates them that comes of it; none: it cannot
     simulated: tuple[Record, ...] = field(default=(), repr=False)
     laws: tuple[LawChoice, ...] = field(default=(), repr=False)

@@ -28,6 +28,7 @@ from analyses.identification.friction_map import fit_map
 from analyses.identification.held_command import found_together, motion_of, motor_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import NAMES, FrictionForm, JointModel, Recipe
+from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.own_bias import without_bias
 from analyses.records.record import HELD, SMOOTH, Record
 
@@ -281,4 +282,4 @@ def _fitted(
     model = replace(model, records=tuple(parts))
     if both is not None:
         return motion_of(both, start, made, model, records)
-    return without_bias(start, made, model, records)
+    return with_noise_of_motion(start, without_bias(start, made, model, records), records)

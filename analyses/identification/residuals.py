@@ -29,6 +29,7 @@ class ResidualTest:
     lags: Ints = field(repr=False)  # rows
     correlation: Floats = field(repr=False)
     bound: float  # left at any of the lags with a probability of 1 %
+    rows: int = field(repr=False)  # of innovations
 
     @property
     def largest(self) -> float:
@@ -39,6 +40,12 @@ class ResidualTest:
     def lag(self) -> int:
         """Rows by which the residual comes later there."""
         return int(self.lags[int(np.argmax(np.abs(self.correlation)))])
+
+    @property
+    def chance(self) -> float:
+        """Probability of a correlation of that size at one lag or more, where it is chance."""
+        one = float(norm.sf(abs(self.largest) * np.sqrt(self.rows)))
+        return float(-np.expm1(len(self.lags) * np.log1p(-2.0 * one)))
 
     @property
     def within(self) -> bool:
@@ -77,6 +84,7 @@ def _of_record(part: RecordFit) -> Iterator[ResidualTest]:
             name="independence" if of else "whiteness",
             input=of,
             lags=lags,
+            rows=count,
             correlation=products / size,
             bound=float(norm.isf(0.5 * (1.0 - (1.0 - LEVEL) ** (1.0 / len(lags)))) / np.sqrt(count)),
         )

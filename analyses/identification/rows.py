@@ -7,13 +7,22 @@ from functools import partial
 import numpy as np
 from scipy.fft import rfft, rfftfreq
 from scipy.ndimage import minimum_filter1d
+from scipy.stats import chi2
 from scipy.stats import f as variance_ratio
 
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Mask
+from analyses.estimation.least_squares import solve
 from analyses.estimation.parameters import default_value, pendulum_angle
-from analyses.identification.joint_model import FrictionForm, JointModel, Recipe, Rows, friction_columns
+from analyses.identification.joint_model import (
+    NAMES,
+    FrictionForm,
+    JointModel,
+    Recipe,
+    Rows,
+    friction_columns,
+)
 from analyses.identification.load_side import two_sides
 from analyses.identification.sampled_current import held_s, mean_current
 from analyses.records.consistency import NO_CHANCE, place_of
@@ -23,7 +32,6 @@ from analyses.records.record import Record, lasting, period_of, prepared
 
 REST_SHARE = 0.005
 REST_TIME_S = 0.03
-END_SHARE = 0.02
 SHORTEST_S = 0.2
 
 
@@ -31,9 +39,9 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     """The published recipe, moved to another sampling period.
 
     100 Hz or a tenth of the sampling frequency, whichever is lower; decimated to the cut-off; 49 ms dropped
-    at the start and, where a record ends in motion, at the end; differences over seven points, as three
-    would make the inertia too small by some tenths of a per cent. The record of the EMPS benchmark has the
-    published recipe to the letter, which keeps the end.
+    at both ends; differences over seven points, as three
+    would make the inertia too small by some tenths of a per cent; torques filtered as the position is. The
+    record of the EMPS benchmark has the published recipe to the letter, which keeps the end.
     """
     period = period_of(record)
     if cutoff_hz is None and decimation is None and is_benchmark(record):
@@ -45,7 +53,14 @@ def recipe_for(record: Record, cutoff_hz: float | None = None, decimation: int |
     if factor < 1:
         raise InputError(f"decimation = {factor}: must be 1 or more")
     skip = max(round(0.049 / period), 5)
-    return Recipe(cutoff_hz=cutoff, decimation=factor, skip_samples=skip, skip_end_samples=skip, points=7)
+    return Recipe(
+        cutoff_hz=cutoff,
+        decimation=factor,
+        skip_samples=skip,
+        skip_end_samples=skip,
+        points=7,
+        both_sides=True,
+    )
 
 
 def is_benchmark(record: Record) -> bool:
@@ -97,10 +112,7 @@ def motion_of(design: Design, record: Record, recipe: Recipe) -> tuple[Motion, s
 
 
 def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool:
-    """Whether a record shows no motion: nothing but noise, as much above the recipe's cut-off as below it.
-
-    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
-    """
+    """Whether a record shows no motion: noise that is white, or that nothing of the drive's torque moves."""
     place, rate = place_of(design, record), RATES[design.axis]
     if _too_short(record) or (place is None and rate not in record.signals):
         return False  # it is refused for that
@@ -109,13 +121,40 @@ def stands(design: Design, record: Record, recipe: Recipe | None = None) -> bool
     else:
         moved = place[1] - place[1][0]  # exactly zero of a constant angle
         values = moved - moved.mean()
+    recipe = recipe or recipe_for(record)
+    return _is_white(values, record, recipe) or _is_unmoved(design, record, recipe)
+
+
+def _is_white(values: Floats, record: Record, recipe: Recipe) -> bool:
+    """Whether a signal has as much power above the cut-off as below it, line by line.
+
+    By the F-test of the two mean powers, of which each line of white noise is chi-square of two degrees.
+    """
     power = np.abs(rfft(values)) ** 2
-    below = rfftfreq(len(values), period_of(record)) <= (recipe or recipe_for(record)).cutoff_hz
+    below = rfftfreq(len(values), period_of(record)) <= recipe.cutoff_hz
     count, rest = np.count_nonzero(below), np.count_nonzero(~below)
     if not rest:
         return not np.any(values)
     most = float(variance_ratio.isf(NO_CHANCE, 2 * count, 2 * rest))
     return bool(power[below].mean() <= most * power[~below].mean())
+
+
+def _is_unmoved(design: Design, record: Record, recipe: Recipe) -> bool:
+    """Whether a drive that is more than noise moves nothing: its torque has no inertia and no friction.
+
+    By Wald's test of all three, with the correlation in time of what they leave. Noise of a speed behind a
+    filter is not white, but no torque goes into it.
+    """
+    try:
+        drive = drive_of(design, record)[0]
+        if _is_white(drive, record, recipe):
+            return False
+        rows = record_rows(design, record, "symmetric", recipe)
+        found = solve(rows.columns(NAMES["symmetric"]), rows.y)
+    except (InputError, np.linalg.LinAlgError):
+        return False
+    values, covariance = found.values[:-1], found.correlated[:-1, :-1]
+    return bool(chi2.sf(values @ np.linalg.solve(covariance, values), len(values)) > NO_CHANCE)
 
 
 def moment_of(
@@ -157,9 +196,17 @@ def record_rows(
     recipe = recipe_for(record) if recipe is None else recipe
     own = _balance(design, record, recipe, gravity=gravity)
     motion, angle = own.motion, own.angle
-    names, columns = friction_columns(motion, form, knots_rad_s)
+    filtered = partial(recipe.other_side, period_s=period)
+    names, columns = friction_columns(motion, form, knots_rad_s, filtered)
     turned = angle + pendulum_angle(shared)
-    others = [np.sin(turned), np.cos(turned), motion.velocity, np.sign(motion.velocity), own.known, own.drive]
+    others = [
+        np.sin(turned),
+        np.cos(turned),
+        motion.velocity,
+        filtered(np.sign(motion.velocity)),
+        own.known,
+        own.drive,
+    ]
     part = _part(motion, recipe)
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
@@ -213,8 +260,9 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
     if design.coupling is not None:
         sides = two_sides(design, record, place, motion, moment_of(design, record, angle)[0], recipe)
         motion, angle = sides.motor, np.asarray(sides.load.position / design.ratio_behind_coupling)
-    drive, driven_by, told = _torque(design, record, motion)
+    drive, driven_by, told = _torque(design, record, motion, recipe)
     known, source = moment_of(design, record, angle, gravity=not gravity)
+    known = recipe.other_side(known, period_of(record)) if source else known
     used = {place: "motion", driven_by: f"drive: {told}"}
     if source:
         used[source] = "load" + (", its friction and its torque M/N" if free else ", its friction")
@@ -235,10 +283,9 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
 
 
 def _part(motion: Motion, recipe: Recipe) -> slice:
-    """The samples without those dropped at the start, and at the end of a record that ends in motion."""
-    pace, skip = np.abs(motion.velocity), recipe.skip_end_samples
-    in_motion = float(pace[-1]) > END_SHARE * float(np.max(pace)) and len(pace) > 4 * skip
-    return slice(recipe.skip_samples, len(pace) - (skip if in_motion else 0))
+    """The samples without those dropped at both ends; a short record keeps its end."""
+    rows, skip = len(motion.velocity), recipe.skip_end_samples
+    return slice(recipe.skip_samples, rows - skip if rows > 4 * skip else rows)
 
 
 def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:
@@ -265,7 +312,7 @@ def _check(record: Record, locked: bool) -> None:
         raise InputError(told)
 
 
-def _torque(design: Design, record: Record, motion: Motion) -> tuple[Floats, str, str]:
+def _torque(design: Design, record: Record, motion: Motion, recipe: Recipe) -> tuple[Floats, str, str]:
     """The drive torque as it acts: a voltage later by the computing delay and half of what it is held for."""
     motor = design.effective_motor
     constant = motor.torque_constant_Nm_A or 0.0
@@ -275,6 +322,7 @@ def _torque(design: Design, record: Record, motion: Motion) -> tuple[Floats, str
         drive = np.interp(record.time_s - late, record.time_s, drive)
     if driven_by == "current":
         drive = constant * mean_current(design, record, record["current"], motion.acceleration)
+    drive = recipe.other_side(drive, period_of(record))
     if back_emf and motor.resistance_ohm is not None:
         back = constant if motor.back_emf_constant_Vs_rad is None else motor.back_emf_constant_Vs_rad
         drive = drive - constant * back / motor.resistance_ohm * motion.velocity

@@ -16,6 +16,9 @@ from analyses.correlation.following import Followed
 from analyses.estimation.fit import Fit
 from analyses.estimation.parameters import UNSTATED, own_std, parameter
 from analyses.identification.design_values import DesignValue, cause
+from analyses.identification.friction_law import Bend
+from analyses.identification.joint_model import JointModel
+from analyses.identification.residuals import ResidualTest
 from analyses.records.consistency import ALIKE, NO_CHANCE, RATE_TOLERANCE, Finding, wrong_of
 from analyses.records.factors import with_factor
 from analyses.records.record import Record
@@ -95,6 +98,48 @@ def residual_item(residual: float, limit: float) -> Item:
     """The relative residual of the fit."""
     why = "the model does not explain these records"
     return share_item("residual", "Relative residual of the fit", residual, limit, why)
+
+
+def law_items(bend: Bend | None, model: JointModel, axis: str, commanded: bool = True) -> Iterator[Item]:
+    """Whether the residual asks for another friction law; beside a map the intervals hold it.
+
+    Reversals that are not simulated with their command may feign a bend.
+    """
+    if bend is None:
+        return
+    unit, sure = "m/s" if axis == "linear" else "rad/s", f"({bend.errors:.1f} standard errors)"
+    told = f"below {bend.speed_rad_s:.3g} {unit} the friction leaves its law over the speed {sure}"
+    cure = "--friction map finds it"
+    if np.isinf(bend.speed_rad_s):
+        told, cure = f"its slope differs by direction {sure}", "--friction per-direction finds it"
+    passed, why = (None, "the intervals hold it") if model.knots_rad_s else (False, cure)
+    if not commanded:
+        passed, why = None, f"{why}, or reversals feign it, which no command tells"
+    label, reason = "Friction law of the fit is that of the records", f"{told}: {why}"
+    if not bend.is_sure:
+        passed, reason = True, ""
+    yield Item(id="law", label=label, passed=passed, reason=reason)
+
+
+def independence_items(tests: Sequence[ResidualTest]) -> Iterator[Item]:
+    """Inputs on which a residual hangs, beyond chance in all that were tried."""
+    asked = [test for test in tests if test.input]
+    for test in asked:
+        if len(asked) * test.chance >= NO_CHANCE:
+            continue
+        told = f"it hangs on the {test.input} (at a lag of {test.lag} rows): something is not modelled"
+        id, label = f"independent-{test.record}-{test.input}", f"{test.record}: residual of chance alone"
+        yield Item(id=id, label=label, passed=None, reason=f"{told}, the intervals need not hold it")
+
+
+def noise_items(model: JointModel) -> Iterator[Item]:
+    """Noise of a recorded motion that took more from the inertia than its standard error."""
+    if model.noise_share * model.get("inertia", 0.0) > model.std("inertia") > 0.0:
+        told = (
+            f"{100.0 * model.noise_share:.2g} % of its square is noise of the recorded motion, white as it "
+        )
+        told += "is from row to row, which took as much from the inertia: given back; a command tells better"
+        yield Item(id="noise", label="Acceleration without noise", passed=None, reason=told)
 
 
 def kept_items(fit: Fit, held: Collection[str], axis: str = "rotary") -> Iterator[Item]:

@@ -61,10 +61,9 @@ class RestSweep(Compared):
 
 
 def sweep_from_rest(
-    design: Design, frequency_hz: npt.ArrayLike, amplitude_rad: npt.ArrayLike, settle_ticks: int, *,
-    described: bool = True,
-) -> RestSweep:  # fmt: skip
-    """Command sines from rest and compare with the describing function of dry friction, where ``described``.
+    design: Design, frequency_hz: npt.ArrayLike, amplitude_rad: npt.ArrayLike, settle_ticks: int
+) -> RestSweep:
+    """Command sines from rest and compare with the describing function of dry friction, where there is some.
 
     The amplitude is that of the command at the output, one for all or one a frequency, shape (K,).
     """
@@ -85,7 +84,7 @@ def sweep_from_rest(
     speed = np.abs(result.phasor("motor_speed_rad_s"))
     moving = np.abs(measured) > NO_MOTION
     expected = np.full(asked.size, np.nan, complex)
-    for k in np.flatnonzero(moving & described):
+    for k in np.flatnonzero(moving & rubs(design)):
         expected[k] = _linear(design, hertz[k : k + 1], float(speed[k]))[0]
     return RestSweep(
         frequency_hz=hertz, amplitude_rad=amplitude, measured=measured, sliding=_linear(design, hertz, None),

@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 from actuator_lti.errors import whole_number
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset

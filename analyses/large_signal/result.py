@@ -87,16 +87,9 @@ def limit_shift(design: Design, loops: Loops, count: int = COUNT) -> LimitShift 
 
     simulated, names = np.full(len(omega), np.nan), np.full(len(omega), "", dtype=object)
     simulated[limited], names[limited] = _bisect(acting, linear, [border.active[k] for k in limited])
-    return LimitShift(
-        omega / (2.0 * np.pi),
-        np.where(there, border.amplitude_rad, np.nan),
-        simulated,
-        border.active,
-        tuple(names),
-        (TRIED[1] / TRIED[0]) ** (0.5**ROUNDS) - 1.0,
-        _command_gain(given, loops, omega),
-        within < count,
-    )
+    resolution, gain = (TRIED[1] / TRIED[0]) ** (0.5**ROUNDS) - 1.0, _command_gain(given, loops, omega)
+    found = np.where(there, border.amplitude_rad, np.nan), simulated, border.active, tuple(names)
+    return LimitShift(omega / (2.0 * np.pi), *found, resolution, gain, within < count)
 
 
 def _command_gain(given: Loops, behind: Loops, omega_rad_s: np.ndarray) -> np.ndarray | float:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drawing.faces import draw
-from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, runs, slope_at
+from actuator_lti.drawing import draw
+from actuator_lti.drive.operating import Operating, OperatingPoint, rubs, slope_at, turned
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.loops import ExactMargins, Loops, assemble_loops, exact_margins
 from actuator_lti.loops.assemble import loops_at
@@ -208,23 +208,6 @@ def operating_points(
 
 
 SLIDING, AT_REST = "sliding", "at rest"
-
-
-def turned(design: Design) -> Iterator[tuple[str, Design]]:
-    """The drive where its cogging or gear error is steepest, and in a motion that averages them.
-
-    On a crest it drives the rotor away, in a notch it holds it: margins are extreme there.
-    """
-    motor, load = design.motor, design.load
-    if runs(design) or not (motor.cogging_Nm or load.gear_error_Nm):
-        return
-    for where, phase in (("on a crest", 0.0), ("in a notch", np.pi)):
-        if motor.cogging_Nm:
-            yield f"{where} of the cogging", replace(design, motor=replace(motor, cogging_phase_rad=phase))
-        if load.gear_error_Nm:
-            at = replace(load, gear_error_phase_rad=phase)
-            yield f"{where} of the gear error", replace(design, load=at)
-    yield "in motion", replace(design, motor=motor.straight(), load=replace(load, gear_error_Nm=0.0))
 
 
 def at_rest(design: Design) -> str:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_lti.asked.drive_figure import drive_figure
 from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design.model import Design, Requirement
@@ -47,12 +48,20 @@ def drive_column(quantity: str, load_Nm: float | None) -> str:
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
 
 
-def loop_columns(linear: LinearFigures, quantities: Iterable[str] = LOOP_QUANTITIES) -> dict[str, np.ndarray]:
+def loop_column(design: Design, loop: str, quantity: str) -> str:
+    """Name of the column of a loop's figure; behind the profile's mean a response is not the command's."""
+    unlike = loop == "position" and QUANTITIES[quantity].of_response and command_mean(design)
+    return f"{loop}.{quantity}" + ("_behind_mean" if unlike else "")
+
+
+def loop_columns(
+    linear: LinearFigures, design: Design, quantities: Iterable[str] = LOOP_QUANTITIES
+) -> dict[str, np.ndarray]:
     """Columns of the loops of many designs: whether each is stable (1 or 0), and figures of it."""
     columns: dict[str, np.ndarray] = {}
     for loop in linear.loops:
         columns[f"{loop}.stable"] = linear.stable(loop).astype(float)
-        columns |= {f"{loop}.{quantity}": linear.quantity(quantity, loop) for quantity in quantities}
+        columns |= {loop_column(design, loop, name): linear.quantity(name, loop) for name in quantities}
     return columns
 
 
@@ -69,9 +78,12 @@ def by_loop(design: Design) -> list[Requirement]:
 def in_populations(requirement: Requirement, design: Design) -> bool:
     """Whether the figures of many designs at once have what a requirement is on.
 
-    They know the free rotor, and the response behind the profile's mean, through the filter.
+    They know the free rotor, and the response behind the profile's mean, through the filter; of a drive what
+    it has.
     """
     quantity, command = QUANTITIES[requirement.quantity], design.command
+    if quantity.scope == "drive":
+        return not np.isnan(drive_figure(design, quantity.name, requirement.load_Nm or 0.0))
     if quantity.scope == "analysis" or requirement.rotor == "locked":
         return False
     loops = judged_loops(requirement.loop, design.controller.stages)
@@ -86,7 +98,7 @@ def source_columns(requirement: Requirement, design: Design) -> tuple[str, ...]:
     loops = judged_loops(requirement.loop, loops_of(design))
     if not set(loops) <= set(loops_of(design)):
         raise InputError(f"requirement {requirement.id}: the design has no {requirement.loop} loop")
-    return tuple(f"{loop}.{requirement.quantity}" for loop in loops)
+    return tuple(loop_column(design, loop, requirement.quantity) for loop in loops)
 
 
 def judge(requirement: Requirement, design: Design, columns: Columns) -> Judged:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import design_hash, with_values
 from actuator_lti.design.model import Design, Requirement
@@ -26,7 +26,7 @@ from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_bytes
 from actuator_lti.files.reading import Tree
-from analyses.monte_carlo.judging import drive_column, loop_columns, loops_of
+from analyses.monte_carlo.judging import drive_column, in_populations, loop_column, loop_columns, loops_of
 from analyses.studies.engine import Arrays, Chunk
 from analyses.studies.proof import code_version
 from analyses.studies.sampling import Sampler, as_values
@@ -178,7 +178,7 @@ class SampleTask:
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
     loops: bool = True  # whether their figures are wanted
-    time_figures: bool = True  # of their steps
+    time_figures: bool | Collection[str] = True  # of their steps, or of which loops
     step: StepCheck | None = None  # a nonlinear one
 
     def __post_init__(self) -> None:
@@ -207,7 +207,7 @@ class SampleTask:
         if self.loops:
             at = {"operating_point": self.operating_point, "load_Nm": self.load_Nm}
             linear = linear_figures(population, **at, time_figures=self.time_figures, held=True)
-            columns = loop_columns(linear, self._quantities)
+            columns = loop_columns(linear, self.design, self._quantities)
         for quantity, load in self._drive_wanted:
             columns[drive_column(quantity, load)] = drive_figures(population, quantity, load)
         if self.step is not None:
@@ -217,7 +217,8 @@ class SampleTask:
     def of(self, requirement: Requirement) -> SampleTask:
         """The same of what one requirement is on alone."""
         quantity, design = QUANTITIES[requirement.quantity], replace(self.design, requirements=(requirement,))
-        loops, timed = quantity.scope == "loop", quantity.timed
+        timed = judged_loops(requirement.loop, design.controller.stages) if quantity.timed else ()
+        loops = quantity.scope == "loop"
         return replace(self, design=design, loops=loops, time_figures=timed, step=None)
 
     @property
@@ -227,12 +228,13 @@ class SampleTask:
     @cached_property
     def _drive_wanted(self) -> list[tuple[str, float]]:
         asked = (r for r in self.design.requirements if r.quantity in DRIVE_QUANTITIES)
-        return sorted({(r.quantity, r.load_Nm or 0.0) for r in asked})
+        return sorted({(r.quantity, r.load_Nm or 0.0) for r in asked if in_populations(r, self.design)})
 
     @property
     def units(self) -> dict[str, str]:
         """Columns of figures (without parameters and stability flags) with their units."""
-        of = {f"{loop}.{name}": name for loop in loops_of(self.design) for name in self._quantities}
+        loops, names = loops_of(self.design), self._quantities
+        of = {loop_column(self.design, loop, name): name for loop in loops for name in names}
         of |= {drive_column(name, load): name for name, load in self._drive_wanted}
         units = {column: QUANTITIES[name].unit_for(self.design.axis) for column, name in of.items()}
         return units | ({} if self.step is None else step_units())

@@ -7,7 +7,7 @@ import numpy as np
 from actuator_lti.errors import InputError, shown
 from actuator_lti.types import Progress
 from analyses.records.campaign_file import Campaign, RunEntry
-from analyses.records.clocks import ClockJoin, Mismatch, join_records, joined_by
+from analyses.records.clocks import ClockJoin, Mismatch, clock_join, joined_by
 from analyses.records.inputs import InputUse, account
 from analyses.records.load_clock import by_current
 from analyses.records.readers import read_record
@@ -134,9 +134,9 @@ def assemble_run(campaign: Campaign, entry: RunEntry, drive: Record, sensor: Rec
             raise InputError(f"run {entry.id}: no torque signal and no sensor file", where=campaign.origin)
         how = campaign.join
         signals = {"first_signal": how.drive_signal, "second_signal": how.sensor_signal}
-        record, join = join_records(drive, sensor, **signals, method=how.method, offset_s=entry.offset_s)
-        if how.method != "given" and (told := by_current(drive, sensor, join, how.sensor_signal)) != join:
-            record, join = joined_by(drive, sensor, told), told
+        join = clock_join(drive, sensor, **signals, method=how.method, offset_s=entry.offset_s)
+        join = join if how.method == "given" else by_current(drive, sensor, join, how.sensor_signal)
+        record = joined_by(drive, sensor, join)
     if not np.any(record["speed"]):
         raise InputError("the speed is zero throughout", where=drive.name)
     return ImportedRun(entry=entry, record=record, join=join, sensor=sensor)

@@ -59,7 +59,7 @@ class Series(NamedTuple):
     values: Floats
 
 
-def join_records(
+def clock_join(
     first: Record,
     second: Record,
     *,
@@ -67,8 +67,8 @@ def join_records(
     second_signal: str,
     method: Method = "correlation",
     offset_s: float | None = None,
-) -> tuple[Record, ClockJoin]:
-    """Put the signals of a second recorder on the time of the first, whose times are kept.
+) -> ClockJoin:
+    """How a second recorder's time goes on that of the first (`joined_by` puts its signals there).
 
     Of the signals that show the shared happening, such as the motor's speed and the clutch's torque, only
     the magnitude is used, and their scale does not matter. By ``event``: the moment when the magnitude
@@ -76,9 +76,6 @@ def join_records(
     of the clock rates too. By ``correlation``: the offset at which the magnitudes fit best (FFT), refined
     together with the rate by least squares. As ``given``: ``offset_s``, the first clock's time at the
     second clock's zero.
-
-    What comes back is the first record with the second one's signals added (linear interpolation), cut to the
-    time both cover; and how it was done.
     """
     if method == "given":
         if offset_s is None:
@@ -92,12 +89,11 @@ def join_records(
         where = f"{first.name} with {second.name}"
         _check_durations(a, b, (first_signal, second_signal), where)
         join = (_by_event if method == "event" else _by_correlation)(a, b, where)
-    join = replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
-    return joined_by(first, second, join), join
+    return replace(join, method=method, first_signal=first_signal, second_signal=second_signal)
 
 
 def joined_by(first: Record, second: Record, join: ClockJoin) -> Record:
-    """The first record with the second one's signals, cut to the time both cover."""
+    """The first record with the second one's signals (linear interpolation), cut to the time both cover."""
     time = join.offset_s + join.rate * second.time_s
     start = int(np.searchsorted(first.time_s, time[0]))
     stop = int(np.searchsorted(first.time_s, time[-1], side="right"))

@@ -50,10 +50,19 @@ def central_difference(values: Floats, period_s: float, points: int = 3) -> Floa
 def filtered_motion(
     position: Floats, period_s: float, *, cutoff_hz: float, order: int, points: int = 3
 ) -> Motion:
-    """Butterworth forward and backward, then central differences over three or seven points twice.
+    """A position behind `low_pass`, then central differences over three or seven points twice."""
+    smooth = low_pass(position, period_s, cutoff_hz=cutoff_hz, order=order)
+    velocity = central_difference(smooth, period_s, points)
+    acceleration = central_difference(velocity, period_s, points)
+    return Motion(position=smooth, velocity=velocity, acceleration=acceleration)
 
-    The signal is extended by 3 * order samples at both ends (odd extension), the usual padding of a filter
-    of this order. A cut-off so low that the filter's coefficients cancel is refused.
+
+def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -> Floats:
+    """Butterworth forward and backward.
+
+    The signal is extended at both ends (odd extension) by 3 * order samples, the usual padding of a filter
+    of this order, or by as long as they last where ten samples make a period of the cut-off: the filter
+    forgets in time, not in samples. A cut-off so low that its coefficients cancel is refused.
     """
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
@@ -62,14 +71,11 @@ def filtered_motion(
             f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows "
             "or a higher cut-off"
         )
-    padding = 3 * order
-    if len(position) <= max(padding, 3):
-        raise InputError(f"{len(position)} samples: more than {padding} are needed")
+    padding = round(3 * order * max(1.0, 0.1 / (cutoff_hz * period_s)))
+    if len(values) <= max(padding, 3):
+        raise InputError(f"{len(values)} samples: more than {padding} are needed")
     b, a = butter(order, 2.0 * cutoff_hz * period_s)
-    smooth = np.asarray(filtfilt(b, a, position, padlen=padding), dtype=np.float64)
-    velocity = central_difference(smooth, period_s, points)
-    acceleration = central_difference(velocity, period_s, points)
-    return Motion(position=smooth, velocity=velocity, acceleration=acceleration)
+    return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
 
 
 def decimated(columns: Floats, factor: int) -> Floats:

@@ -16,17 +16,18 @@ from analyses.records.steady_window import CRITERION, find_steady_window
 
 GRID = 40_000  # points over the longer record, at most
 ROUNDING = 1e-9
+DRIFT = 3  # degree of the polynomial that a slow drift of the current (warming) is taken for
 
 
 def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> ClockJoin:
     """The join, by current and load where these contradict it; else as it is.
 
     Speed and load tell the clock only where the load comes with the motion. While the speed is steady the
-    current is a constant and a share of the load: of all offsets at which the sensor covers half of that
-    time, the one that leaves the least is taken where the likelihood ratio (chi-square, as many tries as
-    offsets, the residual's correlation in time counted) rejects all within four standard deviations of the
-    join's own, whose rate does not hold then either. The standard deviation is the half width where that
-    ratio is 1.
+    current is a share of the load, which is against the motion, and a slow drift: of all offsets at which the
+    sensor covers half of that time, the one that leaves the least is taken where the likelihood ratio
+    (chi-square, as many tries as offsets, the residual's correlation in time counted) rejects all within four
+    standard deviations of the join's own, whose rate does not hold then either. The standard deviation is the
+    half width where that ratio is 1.
     """
     try:
         window = find_steady_window(drive.time_s, drive["speed"], replace(CRITERION, trim_s=0.0))
@@ -38,12 +39,13 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
     time = np.arange(own.time_s[0], own.time_s[-1], period)
     grid = np.arange(sensor_s[0] - half, sensor_s[-1] + half, period)
     current = np.interp(time, own.time_s, own["current"])
-    load = np.interp(grid, sensor_s, sensor[signal])  # outside its record as at its ends
+    load = np.interp(grid, sensor_s, np.abs(sensor[signal]))  # outside its record as at its ends
     if not np.ptp(current) * np.ptp(load):
         return join
-    ratio, quality = _against_the_best(current, load)
-    offsets = time[0] - grid[: len(ratio)]
+    offsets = time[0] - grid[: len(load) - len(current) + 1]
     apart = np.abs(offsets - join.offset_s)
+    current = float(np.sign(current.mean())) * current
+    ratio, quality = _against_the_best(current, load)
     claimed = apart <= max(SURE * join.offset_std_s, float(np.min(apart)))
     if not len(ratio) * chi2.sf(np.min(ratio[claimed]), 1) < NO_CHANCE:
         return join
@@ -64,16 +66,21 @@ def by_current(drive: Record, sensor: Record, join: ClockJoin, signal: str) -> C
 def _against_the_best(current: Floats, load: Floats) -> tuple[Floats, float]:
     """Minus twice the log likelihood of the current at each place of the load, less the least; correlation.
 
+    Drift and load are fitted together; a share of the load below zero is none.
     Shapes (n,) and (m,), m > n; the ratios have shape (m - n + 1,).
     """
-    n, current, load = len(current), current - current.mean(), load - load.mean()
-    sums, squares = (np.concatenate([[0.0], np.cumsum(part)]) for part in (load, load**2))
-    power = squares[n:] - squares[:-n] - (sums[n:] - sums[:-n]) ** 2 / n
-    shared = correlate(load, current, mode="valid", method="fft") ** 2
-    told = np.divide(shared, power, out=np.zeros_like(power), where=power > ROUNDING * power.max())
+    n, load = len(current), load - load.mean()
+    drift = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, n), DRIFT + 1))[0]
+    current = current - drift @ (current @ drift)
+    squares = np.concatenate([[0.0], np.cumsum(load**2)])
+    power = squares[n:] - squares[:-n]
+    for column in drift.T:
+        power = power - correlate(load, column, mode="valid", method="fft") ** 2
+    shared = np.maximum(correlate(load, current, mode="valid", method="fft"), 0.0)
+    told = np.divide(shared**2, power, out=np.zeros_like(power), where=power > ROUNDING * squares[-1])
     total = float(current @ current)
     left = np.maximum(total - told, ROUNDING * total)
     best = int(np.argmin(left))
-    part = load[best : best + n] - load[best : best + n].mean()
-    rest = current - part * (part @ current) / (part @ part)
+    part = load[best : best + n]
+    rest = current - (part - drift @ (part @ drift)) * (shared[best] / max(power[best], 1e-300))
     return n / correlation_time(rest) * np.log(left / left[best]), float(np.sqrt(1.0 - left[best] / total))

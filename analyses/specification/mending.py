@@ -86,9 +86,8 @@ def _reserves(view: View, design: Design, path: str, values: np.ndarray) -> np.n
     """The least reserve of a view for each value of a gain; minus infinity where the loop is not stable."""
     try:
         population = Population(view.design or design, {path: values}, len(values))
-        found = linear_figures(
-            population, operating_point=view.kind, load_Nm=view.load_Nm, time_figures=False, held=True
-        )
+        at = {"operating_point": view.kind, "load_Nm": view.load_Nm}
+        found = linear_figures(population, **at, time_figures=False, held=True)
     except InputError:
         return np.full(len(values), -inf)
     limits = {name: limit_of(design, name, view)[0] for name in CUSTOMARY}
@@ -108,7 +107,7 @@ def _harmless(move: Move, others: Iterable[View], design: Design) -> bool:
         if after < min(before, 0.0):
             return False
     found = linear_figures(Population(design, {move.path: both}, 2), time_figures=True, held=True)
-    columns = loop_columns(found)
+    columns = loop_columns(found, design)
     for item in by_loop(design):
         if item.quantity in LOOP_QUANTITIES and item.loop in found.loops and in_populations(item, design):
             before, after = judge(item, design, columns).passed

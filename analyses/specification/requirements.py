@@ -18,6 +18,7 @@ from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.design.suspicions import beyond_profile
+from actuator_lti.drive.operating import IN_MOTION, turned
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
@@ -85,6 +86,8 @@ def judged_nominally(
 def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
     """Beside a bandwidth, a rate or an acceleration what the profile of the command makes of it."""
     of, value = verdict.requirement, verdict.value
+    if value is not None and (moving := _moving(design, verdict)):
+        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, moving))))
     if value is not None and (profile := beyond_profile(design, of, value)):
         return replace(verdict, reason="; ".join(filter(None, (verdict.reason, profile))))
     limits = (design.command.rate_rad_s, design.command.acceleration_rad_s2)
@@ -93,6 +96,19 @@ def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerd
     from analyses.specification.asked_figures import said_of
 
     return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
+
+
+def _moving(design: Design, verdict: RequirementVerdict) -> str:
+    """Beside a response of a drive that stands in its cogging what it is in a motion over many periods."""
+    of = verdict.requirement
+    there = dict(turned(design)).get(IN_MOTION) if verdict.loop == "position" else None
+    if there is None or not QUANTITIES[of.quantity].of_response:
+        return ""
+    found = all_loop_figures(assemble_loops(there))["position"].asked(of)
+    if not found.stable or (value := QUANTITIES[of.quantity].read(found)) is None:
+        return ""
+    over = with_unit(value, of.unit, ".4g")
+    return f"within a period of its cogging or gear error; in a motion over many {over}"
 
 
 Asked = Callable[[str], tuple[float | None, str]]
@@ -112,12 +128,13 @@ class RequirementVerdict:
     reason: str = ""  # what has to be known to read it
     waiver: Waiver | None = None  # of what is not proven
     rotor: str = ""  # of a current loop: whether its rotor is ``"free"`` or ``"locked"``
+    load_unit: str = ""  # of the requirement's load, where it has one
 
     @property
     def figure(self) -> tuple[object, ...]:
         """What is judged: verdicts of two designs stand side by side where it is the same."""
         of = self.requirement
-        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, of.unit
+        return self.id, of.quantity, self.loop, of.rotor, of.to, of.load_Nm, self.load_unit, of.unit
 
     @property
     def passes(self) -> bool:
@@ -152,8 +169,9 @@ def judged(
     else:
         loops = judged_loops(requirement.loop, figures)
         verdicts = [_judge_loop(design, requirement, name, figures.get(name)) for name in loops]
-    waiver = design.waiver_of
-    return [replace(one, waiver=waiver(one.id)) if one.verdict == "not proven" else one for one in verdicts]
+    waivers = [design.waiver_of(one.id) if one.verdict == "not proven" else None for one in verdicts]
+    unit = design.load_unit if requirement.load_Nm else ""
+    return [replace(one, waiver=w, load_unit=unit) for one, w in zip(verdicts, waivers, strict=True)]
 
 
 NOT_STATED = "the design does not state what this needs"

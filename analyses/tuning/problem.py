@@ -2,14 +2,14 @@
 
 import os
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
 import numpy as np
 
-from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, LOOPS, QUANTITIES, judged_loops
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.batch.figures import LinearFigures
 from actuator_lti.design import parameter_value, paths_of
@@ -135,10 +135,9 @@ class Problem:
         of the loops whose poles are known; inf where nothing bounds the figure. ``factors`` are those of the
         corners, where not those of the problem.
         """
-        timed = any(QUANTITIES[r.quantity].timed for r in self.requirements)
         population = self._looked_at(gains, corners, self.factors if factors is None else factors)
-        linear = _linear_figures(population, timed)
-        columns = loop_columns(linear)
+        linear = _linear_figures(population, self._timed)
+        columns = loop_columns(linear, self.design)
         for name, load in {(r.quantity, r.load_Nm or 0.0) for r in self.requirements}:
             if name in DRIVE_QUANTITIES:
                 columns[drive_column(name, load)] = drive_figures(population, name, load)
@@ -149,10 +148,16 @@ class Problem:
             out[:, k] = np.where(np.isneginf(result), -3.0 - 20.0 * (radius - 1.0), result)
         return out.reshape(len(gains), len(corners), len(self.requirements))
 
+    @cached_property
+    def _timed(self) -> set[str]:
+        """The loops whose steps a requirement is on: no other is followed."""
+        asked = (r.loop for r in self.requirements if QUANTITIES[r.quantity].timed)
+        return {name for loop in asked for name in judged_loops(loop, self.design.controller.stages)}
+
     def figure(self, quantity: str, loop: str, gains: Floats, corners: Floats) -> Floats:
         """One figure of one loop, shape (candidates, corners)."""
         population = self._looked_at(gains, corners, self.factors)
-        linear = _linear_figures(population, QUANTITIES[quantity].timed)
+        linear = _linear_figures(population, {loop} if QUANTITIES[quantity].timed else ())
         return linear.quantity(quantity, loop).reshape(len(gains), len(corners))
 
     def _looked_at(self, gains: Floats, corners: Floats, factors: tuple[Factor, ...]) -> Population:
@@ -179,7 +184,7 @@ class Problem:
         return values
 
 
-def _linear_figures(population: Population, timed: bool) -> LinearFigures:
+def _linear_figures(population: Population, timed: Collection[str]) -> LinearFigures:
     return linear_figures(population, time_figures=timed, held=True, threads=os.cpu_count() or 1)
 
 

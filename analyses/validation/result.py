@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.design.model import Design
-from analyses.friction_effects import FrictionEffects
+from analyses.friction_effects.result import FrictionEffects
 from analyses.large_signal.conditional import Conditional
 from analyses.large_signal.from_rest import AmplitudeMargin, RestSweep
 from analyses.large_signal.result import LargeSignals

@@ -312,9 +312,8 @@ def _figures(place: Place, figures: LoopFigures) -> Iterator[Row]:
     if band is not None and figures.of_feedback:
         level = abs(band.dc_gain) / np.sqrt(2.0)
         yield from _fall(place, "bandwidth", band.minus3db_rad_s, lambda T: np.log(np.abs(T) / level))
-        yield from _fall(
-            place, "bandwidth_90deg", band.minus90deg_rad_s, lambda T: np.angle(T * 1j / band.dc_gain)
-        )
+        at = band.minus90deg_rad_s
+        yield from _fall(place, "bandwidth_90deg", at, lambda T: np.angle(T * 1j / band.dc_gain))
     if peaks is None:
         return
     for name, at, value, read in (

@@ -10,7 +10,6 @@ import numpy as np
 from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.drive.operating import rubs
 from actuator_lti.drive.profile import command_mean
 from actuator_lti.errors import InputError, NumericalError, TooManyTicks
 from actuator_lti.loops import assemble_loops
@@ -214,7 +213,7 @@ class _Work:
         near = np.outer(marks, NEAR).ravel()
         asked = np.sort(np.concatenate([asked, near[near < top]]))
         amplitude = free_amplitude(design, self._whole, asked, min(design.validation.amplitude_fractions))
-        return sweep_from_rest(design, asked, amplitude, self._settle(), described=rubs(design))
+        return sweep_from_rest(design, asked, amplitude, self._settle())
 
 
 def _unproven(name: str, notes: list[str]) -> Row:

@@ -121,8 +121,7 @@ def _signal_words(ours: Controller, member: Member) -> str:
     """A count of which only differences are taken may go round; one that is read as an angle may not."""
     if member.first in SIGNAL_AT:
         return member_words(SIGNAL_AT[member.first])
-    as_angle = f"(double)in->{member.name}" in ours.program.functions
-    return f"count of the encoder; it may {'not ' if as_angle else ''}go round at 2**32"
+    return f"count of the encoder; it may {'not ' * (member.first in ours.angles)}go round at 2**32"
 
 
 def _angles(ours: Controller, upper: str) -> str:

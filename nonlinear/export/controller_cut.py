@@ -1,7 +1,7 @@
 """The controller cut out of the tick of one design: what the kernels leave where its parameters are known."""
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -62,6 +62,7 @@ class Controller:
     state: Struct
     measured: Struct
     out: Struct
+    angles: frozenset[int]  # places of counts that are read as angles, not in differences alone
 
     def counts_per_rad(self, place: int) -> float:
         """Of the motor's sensor or the output's, as `MOTOR_COUNTS` and `OUTPUT_COUNTS` are counted."""
@@ -85,7 +86,8 @@ def controller_of(design: Design, prefix: str, *, single_precision: bool = False
     measured = {each.name: each for row in ("p", "io") for each in structs[row].members}
     structs["io"] = replace(structs["io"], members=tuple(measured.values()))
     state, seen, out = (structs[row] for row in ("s", "io", "to"))
-    return Controller(design=design, p=p, program=program, state=state, measured=seen, out=out)
+    angles = frozenset(_angles(functions.values()))
+    return Controller(design=design, p=p, program=program, state=state, measured=seen, out=out, angles=angles)
 
 
 def _followed(p: Floats, single_precision: bool) -> dict[str, Leftover]:
@@ -122,6 +124,14 @@ def _counts(p: Floats, arguments: list[ast.expr], caller: Leftover) -> ast.expr 
     if speed:
         return count
     return ast.BinOp(ast.Call(ast.Name("float", ast.Load()), [count], []), ast.Div(), scale)
+
+
+def _angles(functions: Iterable[Leftover]) -> Iterator[int]:
+    """Places of the counts that `_counts` made an angle of."""
+    for node in (node for left in functions for node in ast.walk(left.tree)):
+        match node:
+            case ast.Call(func=ast.Name("float"), args=[ast.Subscript(ast.Name("io" | "p"), index)]):
+                yield _begin(index)
 
 
 def begins(p: Floats) -> dict[int, str]:

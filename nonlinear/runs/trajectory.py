@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from actuator_lti.design.control import Stage
 from actuator_lti.design.model import Axis
-from actuator_lti.drawing.faces import draw
+from actuator_lti.drawing import draw
 from actuator_lti.errors import InputError
 from actuator_lti.files.atomic import write_stream
 from actuator_lti.files.reading import shown

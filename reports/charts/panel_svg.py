@@ -192,9 +192,8 @@ def note_svg(item: Rule | Note, panel: Panel, frame: Frame, pen: Pen, room: Room
 
 
 def _boxed(item: Note, box: tuple[float, float, float, float], pen: Pen, tied: str, leader: str = "") -> str:
-    words = pen.words(
-        item.words, box[0] + 3.0, box[1] + 1.0 + NOTE, size=NOTE, colour=item.colour, bold=item.bold
-    )
+    x, y = box[0] + 3.0, box[1] + 1.0 + NOTE
+    words = pen.words(item.words, x, y, size=NOTE, colour=item.colour, bold=item.bold)
     back = (
         f'<rect x="{box[0]:.1f}" y="{box[1]:.1f}" width="{box[2] - box[0]:.1f}" '
         f'height="{box[3] - box[1]:.1f}" rx="2" {pen.style(fill="paper", fill_opacity="0.82")}/>'

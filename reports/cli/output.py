@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any, TextIO, cast
 
 from reports.visible import DIRECTION
@@ -114,22 +115,18 @@ def progress(description: str, *, quiet: bool = False) -> Iterator[Callable[[int
             bar.stop()
 
 
-_told: set[str] = set()
+@cache
+def _tell(text: str) -> None:
+    sys.stderr.write(f"{text}\n")
+    sys.stderr.flush()
 
 
 @contextmanager
 def told_if_slow(text: str, patience_s: float = 1.0) -> Iterator[None]:
     """Write a line to a terminal's standard error if the block is still at work after a while; once each."""
-
-    def tell() -> None:
-        if text not in _told:
-            _told.add(text)
-            sys.stderr.write(f"{text}\n")
-            sys.stderr.flush()
-
-    timer = threading.Timer(patience_s, tell)
+    timer = threading.Timer(patience_s, _tell, (text,))
     timer.daemon = True
-    if text not in _told and sys.stderr.isatty():
+    if sys.stderr.isatty():
         timer.start()
     try:
         yield

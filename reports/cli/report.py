@@ -61,17 +61,11 @@ def report(
         raise InputError("--summary: allowed with --pdf, of which it makes a short one")
     drive = options.load_drive(design, changes)
     made = build.report(
-        drive,
-        out,
-        validation=validation,
-        also=FURTHER if also and "all" in also else also or (),
-        added=[part for path in include or () for part in _sections(path)],
-        response=response,
-        response_of=response_of,
-        averages=averages,
-        source=None if changes else design_text(design),
+        drive, out, validation=validation, also=FURTHER if also and "all" in also else also or (),
+        added=[part for path in include or () for part in _sections(path)], response=response,
+        response_of=response_of, averages=averages, source=None if changes else design_text(design),
         step=partial(progress, quiet=quiet),
-    )
+    )  # fmt: skip
     written = [out / "report.html", out / "report.json"]
     if pdf:
         from reports.pdf import write_pdf

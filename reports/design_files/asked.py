@@ -52,11 +52,9 @@ class AskedStart:
     force: Annotated[bool, FORCE] = False
 
     def __post_init__(self) -> None:
-        """Refuse a kind that there is not, and two sources."""
-        if (self.motor is not None or self.gear is not None) and (self.kind or self.source):
-            raise InputError(
-                f"--{'gear' if self.motor is None else 'motor'}: not allowed beside --kind and --from"
-            )
+        part = "motor" if self.motor is not None else "gear" if self.gear is not None else ""
+        if part and (self.kind or self.source):
+            raise InputError(f"--{part}: not allowed beside --kind and --from")
         if self.kind is not None and self.source is not None:
             raise InputError(f'--kind = "{self.kind}": not allowed beside --from')
         if self.kind is not None and self.kind not in KINDS:

@@ -103,7 +103,7 @@ def _suited(text: str, design: Design) -> str:
     if not design.friction.load_coefficient:
         lost = _derived(100.0 / ratio, "mN*m/(N*m)", "assumed: a tenth is lost under load", "X")
         text = _put(text, "[friction]", load_coefficient=lost)
-    rate = 0.4 * design.limits.speed_rad_s / ratio
+    rate, crosses = 0.4 * design.limits.speed_rad_s / ratio, f"crosses at {crossing:.3g} rad/s"
     made = {
         "[load]": {
             "inertia": _derived(load, "kg*m^2", "assumed: as much as the motor's, through the gear", "X"),
@@ -118,9 +118,7 @@ def _suited(text: str, design: Design) -> str:
             "integral_time": _derived(1e3 * integral, "ms", "L/R, and a period at least"),
         },
         "[control.velocity]": {
-            "gain": _derived(
-                2.0 * crossing * turning / k, f"{ampere}*s/rad", f"crosses at {crossing:.3g} rad/s"
-            ),
+            "gain": _derived(2.0 * crossing * turning / k, f"{ampere}*s/rad", crosses),
             "integral_time": _derived(5e3 / crossing, "ms", "five over the crossing"),
         },
         "[control.position]": {"gain": _derived(crossing / 4.0, "1/s", "a quarter of the velocity loop")},

@@ -158,15 +158,7 @@ def _map(design: Design) -> Tree | None:
     if design.controller.position is None:
         return None
     return {
-        "columns": COLUMNS,
-        "levels": LEVELS,
-        "updates": LEAST_UPDATES,
-        "lowest": LOWEST,
-        "longest": LONGEST_TICKS,
-        "full": design.validation.full_deflection_rad,
-        "stick": STICK_FRACTION,
-        "decibel": FRICTION_DB,
-        "degrees": FRICTION_DEG,
-        "words": WORDS,
-        "colours": COLOURS,
-    }
+        "columns": COLUMNS, "levels": LEVELS, "updates": LEAST_UPDATES, "lowest": LOWEST,
+        "longest": LONGEST_TICKS, "full": design.validation.full_deflection_rad, "stick": STICK_FRACTION,
+        "decibel": FRICTION_DB, "degrees": FRICTION_DEG, "words": WORDS, "colours": COLOURS,
+    }  # fmt: skip

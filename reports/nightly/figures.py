@@ -72,16 +72,9 @@ def _verdict(name: str, item: Mapping[str, Any], what: str) -> Tree:
         left = distance if limit is None or value is None else reserve(of, value, limit, distance)
     words = "" if limit is None else f"{item['comparison']} {limit:.6g}".strip()
     return {
-        "id": name,
-        "label": item["label"] or name,
-        "what": what,
-        "limit": words,
-        "bound": number(limit),
-        "relative": left,
-        "role": role(item),
-        "why": why(item),
-        **{key: item[key] for key in _AS_THEY_ARE},
-    }
+        "id": name, "label": item["label"] or name, "what": what, "limit": words, "bound": number(limit),
+        "relative": left, "role": role(item), "why": why(item), **{key: item[key] for key in _AS_THEY_ARE},
+    }  # fmt: skip
 
 
 def left(verdict: Mapping[str, Any]) -> float:

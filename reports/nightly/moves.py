@@ -76,11 +76,8 @@ def _rule(pattern: str, value: object, where: str) -> Rule:
     except ValueError:
         amount = math.nan
     if isinstance(value, bool) or not (amount >= 0.0 and math.isfinite(amount)):
-        raise InputError(
-            f"tolerance {one_line(pattern, 60)!r} = {one_line(text, 40)!r}: write a number of at least 0 and"
-            " its unit, or a percentage",
-            where=where,
-        )
+        said = f"tolerance {one_line(pattern, 60)!r} = {one_line(text, 40)!r}"
+        raise InputError(f"{said}: write a number of at least 0 and its unit, or a percentage", where)
     if unit.strip() == "%" or digits.endswith("%"):
         return Rule(pattern, 0.0, amount / 100.0)
     return Rule(pattern, amount, 0.0)

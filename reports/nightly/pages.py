@@ -45,14 +45,8 @@ NIGHT_SIGNS = {
 
 def index(night: Overview, folder: str) -> str:
     """Make the page that stands at the root of the site; its links lead into ``folder``."""
-    return _render(
-        "nightly/index.html",
-        asset("nightly/nightly.js"),
-        night=night,
-        folder=folder,
-        STATE_ORDER=tuple(STATES),
-        headlines=changes.headlines(night.designs)[:MAX_HEADLINES],
-    )
+    told = {"headlines": changes.headlines(night.designs)[:MAX_HEADLINES], "STATE_ORDER": tuple(STATES)}
+    return _render("nightly/index.html", asset("nightly/nightly.js"), night=night, folder=folder, **told)
 
 
 def of_night(night: Overview, history: History, available: set[str]) -> Iterator[tuple[str, str]]:
@@ -69,16 +63,10 @@ def design_page(night: Overview, design: DesignView, history: History, available
     past = history.results(design.name)
     course = course_of(night, design, history, past)
     return _render(
-        "nightly/design.html",
-        bundled("figures"),
-        night=night,
-        design=design,
-        charts=course.charts,
-        steady=course.steady,
-        nights=_nights(night, design, past, course, available),
-        more_nights=max(0, len(past) - MAX_NIGHTS),
-        max_changes=changes.SHOWN_CHANGES,
-    )
+        "nightly/design.html", bundled("figures"), night=night, design=design, charts=course.charts,
+        steady=course.steady, nights=_nights(night, design, past, course, available),
+        more_nights=max(0, len(past) - MAX_NIGHTS), max_changes=changes.SHOWN_CHANGES,
+    )  # fmt: skip
 
 
 def _render(template: str, code: str, **context: Any) -> str:
@@ -92,9 +80,8 @@ def _nights(
     night: Overview, design: DesignView, past: list[Result], course: Course, available: set[str]
 ) -> list[Tree]:
     """Rows of the table of nights, the last first, with rows for nights that are missing (``gap``)."""
-    known, states = {r.run: r for r in past}, outcomes(past)
+    known, states, rows = {r.run: r for r in past}, outcomes(past), list[Tree]()
     gaps = {night.runs[i].id: count for i, count in night.missing}
-    rows: list[Tree] = []
     for run in reversed(night.runs):
         if (past and run.id < past[0].run) or len(rows) >= MAX_NIGHTS:
             break
@@ -164,9 +151,8 @@ def _add(
     for point in points:
         course.marks.setdefault(nights[point.index][0], []).append((figure, point))
     title, started = verdict.get("label", figure.name), [start for _, start in nights]
-    drawn = line_chart(
-        title, figure.unit, started, values, points, verdict.get("bound"), f"t{len(course.charts)}"
-    )
+    limit, prefix = verdict.get("bound"), f"t{len(course.charts)}"
+    drawn = line_chart(title, figure.unit, started, values, points, limit, prefix)
     shown = [(started[p.index][:10], p) for p in points]
     about = {"title": title, "id": verdict.get("id", ""), "unit": figure.unit, "flaps": to_and_fro}
     course.charts.append({**about, "svg": Markup(drawn), "points": shown})

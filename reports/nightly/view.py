@@ -187,10 +187,9 @@ def _design(result: Result, between: Between, cache: Cache) -> DesignView:
     history = between.history
     past = history.results(result.name, last=STRIP + 1)  # the first only to tell whether the next regressed
     runs, known = {run.id: run for run in history.runs}, outcomes(past)
-    own = (
-        one for one in history.index.baselines[::-1] if one.name in (None, result.name) and one.run in runs
-    )
-    approval = next((one for one in own if history.first(result.name, [runs[one.run]])), None)
+    own = (one for one in history.index.baselines[::-1] if one.name in (None, result.name))
+    there = (one for one in own if one.run in runs and history.first(result.name, [runs[one.run]]))
+    approval = next(there, None)
     entry = cache.whole(result.key) if result.key else None
     return DesignView(
         result=result, meta=entry.meta if entry else {}, last_night=between.last_night(result, past),

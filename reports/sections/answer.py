@@ -15,7 +15,7 @@ from analyses.tuning.problem import SPAN
 from reports import document as doc
 from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
 from reports.live.keys import named
-from reports.numbers import capital, short
+from reports.numbers import capital, plain_decade, short
 from reports.sections import loop as loop_section
 from reports.sections import loop_charts
 from reports.sections.margins import margin_row, range_words, shown, worst_status
@@ -86,8 +86,7 @@ def power_above(value: float) -> str:
     >>> power_above(2.3e-9), power_above(1e-9)
     ('10⁻⁸', '10⁻⁹')
     """
-    power = math.ceil(math.log10(value) - 1e-9)
-    return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return plain_decade(10.0 ** math.ceil(math.log10(value) - 1e-9))
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
@@ -131,6 +130,8 @@ def _loop(
     cells: list[GlanceFigure] = []
     for quantity in AT_A_GLANCE:
         own = [item for item in items if item.get("quantity") == quantity.name and item.get("loop") == name]
+        # with the rotor locked, or to the reference, it is another figure than that of the cell
+        own = [item for item in own if item["value"] in (None, quantity.read(figures.judged))]
         nearest = min(own, key=_nearness, default=None)
         over = ranges.get(quantity.name)
         cells.append(

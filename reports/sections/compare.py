@@ -56,10 +56,11 @@ def brief(comparison: Comparison) -> Brief:
         if name.group == loop and name.key.removeprefix(f"{loop}.") in _TERMINAL
         if any(_is_other(name, one, shown.base) for one in shown.variants)
     ]
-    loops = _of_figures("Loops", names, _OF_GROUP, shown, batches(shown), _MARKS) if names else []
+    loops = _of_figures("Loops", names, _OF_GROUP, shown, [shown.all], _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
-    return Brief(result(comparison), [block, *loops], notes)
+    in_parts = [{**one, "heads": 2} for one in loops]  # figure and unit, before the designs
+    return Brief(result(comparison), [block, *in_parts], notes)
 
 
 def _is_other(name: FigureName, one: Compared, base: Compared) -> bool:
@@ -187,10 +188,8 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
         return None
     scale, _ = _scaled(comparison, name)
     words = _with_change(scale * value, scale * one.differences.get(name.key, 0.0))
-    ends = comparison.ends(name)
-    if ends is not None and value in ends:
-        words += " ▲" if value == ends[0] else " ▽"
-    return words
+    marks = zip(comparison.ends(name) or (), "▲▽", strict=False)
+    return words + "".join(f" {m}" for end, m in marks if number(scale * end) == number(scale * value))
 
 
 def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:

@@ -140,10 +140,9 @@ def _tornado(
     panel.rule_x(base, colour=style.INK, width=1.3)
     if limit is not None and near:
         panel.rule_x(limit, "limit", seen=True, colour=style.RED, width=1.4, dash=1)
-    widths = [
-        100.0 * (b.high_value - b.low_value) / (abs(b.low_value + b.high_value) or math.inf) for b in bars
-    ]
-    style.rows(panel, [f"{bar.path} ±{width:.3g} %" for bar, width in zip(bars, widths, strict=True)])
+    spans = {bar.path: (bar.low_value, bar.high_value) for bar in bars}
+    widths = {path: 100.0 * (b - a) / (abs(a + b) or math.inf) for path, (a, b) in spans.items()}
+    style.rows(panel, [f"{path} ±{width:.3g} %" for path, width in widths.items()])
     return doc.figure("tornado", chart, f"{words}: each parameter alone at both its ends.")
 
 

@@ -94,9 +94,8 @@ def _summary(whole: Correlation) -> doc.Section:
         doc.of(lambda row: 100.0 * row[1].share_of_motion, "share", "Of the motion", "%", format="sig:4"),
         doc.of(lambda row: 100.0 * row[1].relative_error, "relative", "Relative error", "%", format="sig:4"),
     ]
-    table = doc.listing(
-        "All records", rows, columns, status=lambda row: "info" if row[0].startswith("all ") else None
-    )
+    listed = ("All records", rows, columns)
+    table = doc.listing(*listed, status=lambda row: "info" if row[0].startswith("all ") else None)
     result, signal = worst_of(results)
     figure = signal_figure(signal, f"The worst record, {result.record}. ")
     intro = f"{len(results)} records against {result.design}; the motion of {result.record} is furthest off."

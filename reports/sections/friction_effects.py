@@ -3,8 +3,7 @@
 import numpy as np
 
 from actuator_lti.design.model import Command, Design
-from analyses.friction_effects import FrictionEffects
-from analyses.friction_effects.result import FrictionPoint
+from analyses.friction_effects.result import FrictionEffects, FrictionPoint
 from analyses.limit_cycles.run import Confirmation
 from analyses.motion.settling import FROM_THE_LARGEST, Settling, accepted_rad, noticed, told, verdict_of
 from analyses.motion.settling import words as end_words

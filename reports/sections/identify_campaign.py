@@ -32,9 +32,8 @@ def section(answer: CampaignAnswer) -> doc.Section:
     )
     found = ", ".join(f"{name} = {identified.value_words(fit, name)}" for name in NAMES)
     words = f"{found}{identified.constant_words(fit)}, from {len(fit.points)} runs."
-    return identified.judged(
-        "identification", "Identified friction", answer, blocks, result=words, intro=intro
-    )
+    id, title = "identification", "Identified friction"
+    return identified.judged(id, title, answer, blocks, result=words, intro=intro)
 
 
 def coefficient_table(fit: SurfaceFit) -> doc.Block:
@@ -156,9 +155,8 @@ def account_blocks(result: CampaignResult) -> list[doc.Block]:
 def run_table(result: CampaignResult) -> doc.Block:
     records = {run.id: run.record for run in result.imported.runs}
     fit = result.fit
-    residuals = {
-        p.run: (r, s) for p, r, s in zip(fit.points, fit.residuals_Nm, fit.residual_stds_Nm, strict=True)
-    }
+    found = zip(fit.points, fit.residuals_Nm, fit.residual_stds_Nm, strict=True)
+    residuals = {p.run: (r, s) for p, r, s in found}
     columns = [
         doc.of("run", "run", "Run"),
         doc.of(lambda p: p.direction * p.speed_rad_s, "speed", "Speed", "rad/s", format="fix:2"),

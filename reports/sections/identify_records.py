@@ -82,8 +82,9 @@ def _intro(result: BenchResult) -> str:
     recipe = model.recipe
     many = f"{len(result.records)} records, " if len(result.records) > 1 else ""
     rest = sum(record.rows_at_rest for record in model.records)
+    filtered = "Position and torques" if recipe.both_sides else "Position"
     return (
-        f"{many}{model.rows_in} rows in, {model.rows_used} used. Position filtered at {recipe.cutoff_hz:g} "
+        f"{many}{model.rows_in} rows in, {model.rows_used} used. {filtered} filtered at {recipe.cutoff_hz:g} "
         f"Hz (Butterworth of order {recipe.filter_order}, forward and backward), differentiated twice, the "
         f"first {recipe.skip_samples} samples dropped, decimated by "
         f"{recipe.decimation}{f', {rest} rows at rest left out' if rest else ''}; inverse dynamic model by "
@@ -204,9 +205,8 @@ def _residual_table(tests: Sequence[ResidualTest]) -> doc.Block:
         "something is not modelled, and the truth need not lie in the intervals. What the simulated record "
         "leaves too is taken off first."
     )
-    return doc.listing(
-        "Residual tests", tests, columns, note, status=lambda one: "pass" if one.within else "warn"
-    )
+    listed = ("Residual tests", tests, columns, note)
+    return doc.listing(*listed, status=lambda one: "pass" if one.within else "warn")
 
 
 def _figures(part: RecordFit, tests: Sequence[ResidualTest], axis: str) -> list[doc.Block]:

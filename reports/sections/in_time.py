@@ -11,8 +11,8 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
 from analyses.large_signal.from_rest import AmplitudeMargin
-from analyses.validation import Validation
 from analyses.validation.in_time import BenchSweep, MarginShown, StepShown
+from analyses.validation.result import Validation
 from reports import document as doc
 from reports.charts import style
 from reports.numbers import gain_margin

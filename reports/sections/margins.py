@@ -19,11 +19,7 @@ from reports.sections import measured, requirements
 from reports.sections.names import FORMS, LOOPS, figure_column, loop_words
 from reports.terminal import Brief, side_by_side
 
-EVIDENCE: dict[str, doc.State] = {
-    "certified": {"text": "certified", "status": "pass"},
-    "checked": {"text": "checked", "status": "info"},
-    "withheld": {"text": "withheld", "status": "warn"},
-}
+EVIDENCE: dict[str, doc.Status] = {"certified": "pass", "checked": "info", "withheld": "warn"}
 MEANING = {
     "certified": "exact arithmetic on the numbers of the loop as stored, each crossing and pole in a proven "
     "interval, and the same answer for numbers 8 units in the last place away",
@@ -49,6 +45,10 @@ def _state(figures: LoopFigures) -> doc.State:
     return {"text": figures.margins.verdict, "status": Verdict.of(figures.margins.stable).role()}
 
 
+def _evidence(figures: LoopFigures) -> doc.State:
+    return {"text": figures.margins.evidence, "status": EVIDENCE[figures.margins.evidence]}
+
+
 def _samples(figures: LoopFigures) -> float | None:
     return getattr(figures.margins.delay_margin, "samples", None) if figures.margins.stable else None
 
@@ -57,7 +57,7 @@ HERTZ: dict[str, Any] = {"unit": "Hz", "format": "sig:4"}
 DOUBTS = {False: "not stable", None: "stability not known"}
 MARGINS = [
     doc.of(_state, "stable", "Closed loop"),
-    doc.of(lambda figures: EVIDENCE[figures.margins.evidence], "evidence", "Margins are"),
+    doc.of(_evidence, "evidence", "Margins are"),
     _figure("gain_margin", "gain_margin_db", "gain:2"),
     doc.of("margins.gain_margin.frequency_hz", "gain_margin_hz", "at", **HERTZ),
     _figure("phase_margin", "phase_margin_deg", "fix:2"),
@@ -102,7 +102,7 @@ def section(result: Margins) -> list[doc.Section]:
     made = _loops(known, result.operating_points, how)
     made["blocks"] += map(doc.text, _notes(result, known))
     made["blocks"] += [] if result.measured is None else measured.blocks(result.measured)
-    said = f"{_stability(known)}{_elsewhere(result)}{_cogging(result)}{_hold(result)}. {judged['result']}"
+    said = f"{_stability(known)}{_elsewhere(result)}{_by_angle(result)}. {judged['result']}"
     if result.requirements and not as_judged(result.design, result.asked):
         said += " Judged on the sampled loops with sliding friction, without a load."
     return [{**made, "result": said + _below_custom(result)}, judged]
@@ -203,18 +203,14 @@ def place_words(place: str) -> str:
     return f"with the {place}" if " driven by " in place else place or "sliding"
 
 
-def _cogging(result: Margins) -> str:
-    """What a data sheet leaves open, where a loop is unstable by it: where in its cogging the rotor is."""
-    names = ", ".join(LOOPS[name].lower() for name in result.by_cogging)
+def _by_angle(result: Margins) -> str:
+    """Loops unstable only by cogging, whose phase a sheet leaves open, or by a slope held over a tick."""
     away = "which drives the rotor away at angle 0: motor.cogging_phase says where it stands"
-    return f" ({names}: by cogging alone, {away})" if names else ""
-
-
-def _hold(result: Margins) -> str:
-    """Loops that fail only as a slope over the angle is held over a tick."""
-    alone = [LOOPS[name].lower() for name, one in result.loops.items() if one.by_hold and not one.sound]
     held = "only as the slope of a torque over the angle, held over a tick, is slightly active"
-    return f" ({', '.join(alone)}: {held})" if alone else ""
+    by_hold = [name for name, one in result.loops.items() if one.by_hold and not one.sound]
+    causes = {f"by cogging alone, {away}": result.by_cogging, held: by_hold}
+    named = {why: ", ".join(LOOPS[name].lower() for name in names) for why, names in causes.items()}
+    return "".join(f" ({loops}: {why})" for why, loops in named.items() if loops)
 
 
 def of_loops(figures: Mapping[str, LoopFigures], points: Sequence[OperatingPointFigures] = ()) -> doc.Section:

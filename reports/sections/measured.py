@@ -69,10 +69,8 @@ def _margins(of: StabilityMargins) -> doc.Block:
     found: list[tuple[str, float | None, Any, str, float | None]]
     found = [("Gain margin", db, range_, "dB", m.frequency_rad_s) for db, range_, m in gains]
     found += [("Phase margin", m.deg, m.deg_range, "deg", m.frequency_rad_s) for m in of.phase_margins]
-    delays = [
-        (1e3 * m.seconds, m.seconds_range and 1e3 * np.array(m.seconds_range), m) for m in of.delay_margins
-    ]
-    found += [("Delay margin", ms, range_, "ms", m.frequency_rad_s) for ms, range_, m in delays]
+    delays = [(m, m.seconds_range and 1e3 * np.array(m.seconds_range)) for m in of.delay_margins]
+    found += [("Delay margin", 1e3 * m.seconds, ends, "ms", m.frequency_rad_s) for m, ends in delays]
     found.append(("Modulus margin", of.modulus_margin, of.modulus_range, "", of.modulus_frequency_rad_s))
     columns = [
         doc.of(lambda one: one[0], "kind", "Measured margin"),

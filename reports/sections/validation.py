@@ -11,7 +11,7 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design.checks import CHECKS
 from actuator_lti.drive.signals import LIMITERS
 from analyses.motion.settling import waiver_of_rest
-from analyses.validation import Validation
+from analyses.validation.result import Validation
 from analyses.validation.row import Row as Check
 from reports import document as doc
 from reports.numbers import capital, gain_margin, prose, row_time_unit

@@ -420,16 +420,8 @@ WORDS: dict[str, list[tuple[str, ...]]] = {  # by place: a line, and what each l
     "table": [
         ('[instruments]\njitter = "2 s"', "at most 1 s\n"),
         ("[belt]\nratio = 3", "it is a [[gear]]"),
-        (
-            '[friction]\ndry_torque = "1 mN*m"',
-            "no_load_current",
-            "_speed = 7580 rpm: not allowed beside friction.dry_torque",
-        ),
-        (
-            "[friction]\nload_coefficient = 0.1",
-            "gear.first",
-            "second.efficiency = 0.9: not allowed beside friction.load_c",
-        ),
+        ('[friction]\ndry_torque = "1 N*m"', "no_load_current", "7580 rpm: not allowed beside friction.dry"),
+        ("[friction]\nload_coefficient = 0.1", "gear.first", "y = 0.9: not allowed beside friction.load_c"),
     ],
     "encoder": [
         # by hand: 360 deg over 1.8 deg, over 20 arcsec

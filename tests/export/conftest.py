@@ -8,8 +8,11 @@ from actuator_lti import load_design
 
 
 @pytest.fixture(scope="session", params=[2, 3])
-def unit(request, tmp_path_factory) -> Path:
+def unit(request, once) -> Path:
     """Of the baseline, in either version of FMI."""
-    from fmu_host import written
+    from fmu_host import fmu_bytes
 
-    return written(tmp_path_factory.mktemp("unit"), load_design("ilr33-amber"), request.param)
+    design, version = load_design("ilr33-amber"), request.param
+    return once(
+        f"drive{version}.fmu", lambda path: path.write_bytes(fmu_bytes(design, version, ("linux64",)))
+    )

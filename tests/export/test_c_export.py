@@ -34,11 +34,10 @@ ELASTIC = ("ballscrew", "fin", "ilr33-amber-compliant", "joint")
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
 
 
-def opened(folder: Path, texts: dict[str, str]) -> ctypes.CDLL:
+def compiled(path: Path, texts: dict[str, str]) -> Path:
     sources = {name: text for name, text in texts.items() if name[-2:] in (".c", ".h") and name != "main.c"}
-    path = folder / "drive.so"
     path.write_bytes(compile_files(sources, "drive.so", "linux64", (*STRICT, "-shared", "-fPIC")))
-    return ctypes.CDLL(str(path))
+    return path
 
 
 def said_by(folder: Path, texts: dict[str, str], *arguments: str, compiler: list[str] | None = None) -> str:
@@ -50,8 +49,9 @@ def said_by(folder: Path, texts: dict[str, str], *arguments: str, compiler: list
 
 
 @pytest.fixture(scope="module")
-def library(tmp_path_factory) -> ctypes.CDLL:
-    return opened(tmp_path_factory.mktemp("c"), c_export(load_design("ilr33-amber")))
+def library(once) -> ctypes.CDLL:
+    texts = c_export(load_design("ilr33-amber"))
+    return ctypes.CDLL(str(once("exported.so", lambda path: compiled(path, texts))))
 
 
 def pointer(row: np.ndarray) -> ctypes.c_void_p:
@@ -172,7 +172,7 @@ def test_the_example_builds_without_a_warning_and_is_the_simulator(name: str, co
 @pytest.mark.parametrize("name", ["ilr33-amber", "ilr33-amber-multirate", "emps", "ctms-motor-position"])
 def test_single_precision_keeps_its_stated_error(name: str, tmp_path) -> None:
     design = load_design(name)
-    lib = opened(tmp_path, c_export(design, single_precision=True))
+    lib = ctypes.CDLL(str(compiled(tmp_path / "drive.so", c_export(design, single_precision=True))))
     P, S = parameters(exported_row(design))
     p, s, io = (np.zeros(n, np.float32) for n in (P.size, S.size, at.IO_SIZE))
     lib.drive_load_design(pointer(p))

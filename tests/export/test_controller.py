@@ -15,6 +15,7 @@ from actuator_lti.compiled.compiler import zig_command
 from actuator_lti.design import Design, design_hash, load_design, shipped_designs, with_overrides
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
+from nonlinear.export.controller_cut import controller_of
 from tests.loops.own_laws import random_law
 from tests.validation.rich_drives import rich_drive
 
@@ -229,6 +230,15 @@ int main(void)
     return (out[0].voltage_V == 0.0f) ? 2 : 0;
 }
 """
+
+
+@pytest.mark.parametrize(("name", "angles"), [("joint", {"output_counts"}), ("ballscrew", set())])
+@pytest.mark.parametrize("single", [True, False])
+def test_a_count_that_is_an_angle_may_not_go_round(name: str, angles: set[str], single: bool) -> None:
+    """The joint's position loop reads counts of the output; a speed takes differences of the motor's."""
+    ours = controller_of(load_design(name), "drive_", single_precision=single)
+    counts = {each.name: each.first in ours.angles for each in ours.measured.members if each.kind == "count"}
+    assert counts == {name: name in angles for name in {"motor_counts", *angles}}
 
 
 @pytest.mark.parametrize("speed", [{"difference_samples": 3}, {"speed": "tracking", "bandwidth": "300 Hz"}])

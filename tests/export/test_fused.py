@@ -19,20 +19,21 @@ pytestmark = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def libraries(tmp_path_factory) -> tuple[Path, Path]:
-    """The simulator compiled plainly, and with products and sums in one rounding."""
-    folder, command = tmp_path_factory.mktemp("fma"), [str(system_compiler())]
-    texts = {"run.c": LIBRARY.text()}
-    for name, more in (("plain.so", ()), ("fused.so", ("-mfma", "-ffp-contract=fast"))):
-        flags = ("-O3", "-shared", "-fPIC", *more)
-        (folder / name).write_bytes(compile_files(texts, "run.so", "x", flags, command=command))
-    return folder / "plain.so", folder / "fused.so"
+def fused(once) -> Path:
+    """The simulator compiled with products and sums in one rounding."""
+    flags = ("-O2", "-shared", "-fPIC", "-mfma", "-ffp-contract=fast")
+    command = [str(system_compiler())]
+
+    def compiled(path: Path) -> None:
+        path.write_bytes(compile_files({"run.c": LIBRARY.text()}, "run.so", "x", flags, command=command))
+
+    return once("fused.so", compiled)
 
 
-def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> float:
-    """Largest difference of angle, speed, current and voltage, each of its own size."""
+def apart(design: Design, fused: Path, ticks: int = 3000) -> float:
+    """Largest difference to the simulator's angle, speed, current and voltage, each of its own size."""
     found = []
-    for path in libraries:
+    for path in (LIBRARY.build(), fused):
         rows = Rows.of(design)
         rows["ticks"], rows["load"] = ticks, 0.1
         turns = np.sin(2.0 * np.pi * 3.0 * np.arange(ticks) / ticks)
@@ -42,18 +43,18 @@ def apart(design: Design, libraries: tuple[Path, Path], ticks: int = 3000) -> fl
         found.append(
             np.transpose([run.output_angle_rad, run.motor_speed_rad_s, run.current_A, run.voltage_V])
         )
-    plain, fused = found
+    plain, other = found
     there = plain.any(axis=0)  # a force source has no current
-    return float((np.abs(plain - fused).max(axis=0)[there] / np.abs(plain).max(axis=0)[there]).max())
+    return float((np.abs(plain - other).max(axis=0)[there] / np.abs(plain).max(axis=0)[there]).max())
 
 
 @pytest.mark.parametrize("name", shipped_designs())
-def test_shipped_designs_stay_within_rounding(name: str, libraries: tuple[Path, Path]) -> None:
-    assert apart(load_design(name), libraries) < 1e-11
+def test_shipped_designs_stay_within_rounding(name: str, fused: Path) -> None:
+    assert apart(load_design(name), fused) < 1e-11
 
 
-def test_a_count_on_the_other_side_is_seen(libraries: tuple[Path, Path]) -> None:
+def test_a_count_on_the_other_side_is_seen(fused: Path) -> None:
     """Drives with counts, noise, friction: most agree to rounding, and some differ far beyond it."""
-    sizes = [apart(rich_drive(seed), libraries) for seed in (*range(10, 20), 50, 197, 264, 294)]
+    sizes = [apart(rich_drive(seed), fused) for seed in (*range(10, 20), 50, 197, 264, 294)]
     assert np.median(sizes) < 1e-9
     assert max(sizes) > 1e-5

@@ -233,7 +233,13 @@ def sliced(s):
     s[0:2] = 1.0
 
 
+@kernel
+def strange(s):
+    return load_design(s[0])
+
+
 @pytest.mark.parametrize(("function", "kinds", "words"), [
+    (strange, ["row"], "load_design is no compiled function"),
     (power, ["float"], "Pow is not in the subset"),
     (two_types, ["float"], "y is a int and becomes a float"),
     (open_order, ["row"], "writes s beside another use of s"),

@@ -206,19 +206,21 @@ def test_items_sum_to_the_phase_of_the_exact_loop(design: Design, fraction: floa
 
 @pytest.mark.parametrize(("design", "loop", "omega", "items"), [
     # computing delay w d, hold w Ts/2, one more sample w Ts, PI atan(1/(w Ti)): -89.66 deg in all
-    (amber(), "current", 2737.0, {"computing_delay": 0.2737, "hold": 0.13685, "one_more_sample": 0.2737,
+    (amber(), "current", 2737.0, {"computing delay": 0.2737, "hold": 0.13685, "one more": 0.2737,
                                   "controller": np.arctan(1 / (2737.0 * 150e-6)), "measurement": 0.0}),
     # a difference over two samples is one sample old
     (emps(), "velocity", 100.0,
-     {"measurement": 0.1, "controller": 0.0, "computing_delay": 0.0, "one_more_sample": 0.1}),
+     {"measurement": 0.1, "controller": 0.0, "computing delay": 0.0, "one more": 0.1}),
     # a long delay is not wrapped
-    (ctms_position(delay_s=0.02), "position", 900.0 * np.pi, {"computing_delay": 18.0 * np.pi}),
+    (ctms_position(delay_s=0.02), "position", 900.0 * np.pi, {"computing delay": 18.0 * np.pi}),
 ], ids=["current loop", "EMPS", "long delay"])  # fmt: skip
 def test_items_by_hand(design: Design, loop: str, omega: float, items: dict[str, float]) -> None:
     """Lags in rad; the totals as they were computed apart from this."""
     budget = delay_budget(design, loop, omega)
-    for name, lag_rad in items.items():
-        assert getattr(budget, f"{name}_deg") == pytest.approx(-np.degrees(lag_rad), abs=1e-9)
+    told = {**budget.items, "one more": budget.one_more_sample_deg}
+    assert {name: told[name] for name in items} == pytest.approx(
+        {name: -np.degrees(lag_rad) for name, lag_rad in items.items()}, abs=1e-9
+    )
     assert loop != "current" or budget.total_deg == pytest.approx(89.66 - 180, abs=0.02)
     assert loop != "position" or budget.total_deg < -3000
 

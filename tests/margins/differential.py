@@ -259,7 +259,8 @@ def tried(family: Family, seed: int, k: int) -> tuple[str, str]:
             theirs = facts(other)
             gains, phases = ([(w * unit, x) for w, x in part] for part in (theirs.gains, theirs.phases))
             theirs = Facts(theirs.unstable, gains, phases)
-            tight = (RATIO, DEG) if m.evidence == other.evidence == "checked" else (1e-6, 1e-3)
+            checked = [one.evidence == "checked" for one in (m, other)]
+            tight = (RATIO, DEG) if all(checked) else (1e-8, 1e-6) if any(checked) else (1e-6, 1e-3)
             if not other.withheld and (what := unlike(ours, theirs, *tight, far=30.0) or farther(m, other)):
                 return "wrong", f"{name}: {what}"
         if isinstance(loop, control.TransferFunction) and rng.random() < 0.5:

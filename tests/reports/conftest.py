@@ -10,30 +10,34 @@ from live_page import AMBER, Built, opened, written
 from actuator_lti import Design
 from analyses.validation import Settings, validate
 from reports.build import design_report
+from reports.document import load
 from reports.html import write_report
 from reports.sections.validation import section
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory) -> Built:
-    """Build the report of ilr33-amber at a fixed time, with a coarse validation."""
+def built(once: Callable[..., Path]) -> Built:
+    """The report of ilr33-amber at a fixed time, with a coarse validation."""
     findings = ("injected sweep", "motion from rest", "large signals")
     coarse = Settings(findings=findings, rest_frequencies=10, map_counts=(10, 16))
+
+    def write(folder: Path) -> None:
+        write_report(design_report(AMBER, section(validate(AMBER, coarse))), folder)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SOURCE_DATE_EPOCH", "1700000000")
-        document = design_report(AMBER, section(validate(AMBER, coarse)))
-    page, data = write_report(document, tmp_path_factory.mktemp("report"))
-    return Built(document, page, data)
+        data = once("report", write) / "report.json"
+    return Built(load(data), data.with_suffix(".html"), data)
 
 
 @pytest.fixture
-def opens(browser, tmp_path) -> Iterator[Callable[..., Any]]:
+def opens(browser, once) -> Iterator[Callable[..., Any]]:
     """Open pages, of a design or from disk; in the end none has complained or asked for anything."""
     trouble: list[str] = []
     pages = []
 
     def call(what: Design | Path, fragment: str = "", **options: Any) -> Any:
-        path = written(what, tmp_path) if isinstance(what, Design) else what
+        path = written(what, once) if isinstance(what, Design) else what
         pages.append(opened(browser, path, trouble, fragment, **options))
         return pages[-1]
 

@@ -2,7 +2,8 @@
 
 import json
 import math
-from functools import cache
+from collections.abc import Callable
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,6 +12,7 @@ from typer.testing import CliRunner
 
 from actuator_lti import Design, load_design
 from actuator_lti.batch import Population, linear_figures
+from actuator_lti.design import write_design
 from reports.build import design_report
 from reports.cli.app import build
 from reports.document import dumps, loads
@@ -48,16 +50,13 @@ class Built(NamedTuple):
     data: Path
 
 
-@cache
-def page_text(design: Design) -> str:
-    """The page of a design without validation, built once however many tests open it."""
-    return page_of(loads(dumps(design_report(design))))
+def written(design: Design, once: Callable[..., Path]) -> Path:
+    """The page of a design without validation on disk, built once for all tests of a run."""
 
+    def write(path: Path) -> None:
+        path.write_text(page_of(loads(dumps(design_report(design)))), encoding="utf-8")
 
-def written(design: Design, folder: Path) -> Path:
-    path = folder / "page.html"
-    path.write_text(page_text(design), encoding="utf-8")
-    return path
+    return once(f"{sha256(write_design(design).encode()).hexdigest()}.html", write)
 
 
 def opened(browser: Browser, path: Path, trouble: list[str], fragment: str = "", **options: Any) -> Page:

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +15,9 @@ from nonlinear.commands import Command, ramp, sampled, sine, step
 
 
 @pytest.fixture(scope="module")
-def page(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
+def page(browser: Browser, once: Callable[..., Path]) -> Iterator[Page]:
     trouble: list[str] = []
-    made = opened(browser, written(AMBER, tmp_path_factory.mktemp("bench")), trouble)
+    made = opened(browser, written(AMBER, once), trouble)
     yield made
     made.context.close()
     assert trouble == []

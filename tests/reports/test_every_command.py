@@ -72,17 +72,13 @@ POSITION = "control.position.gain"
 @pytest.mark.parametrize(("words", "first"), [
     ("margins", "PASS  ilr33-amber: every loop is stable. 12 of 12 requirements met."),
     (f"margins --set {POSITION}=9000/s", "FAIL  ilr33-amber: not stable: Position loop. "),
-    (
-        f"margins --set {POSITION}=1560/s",
-        "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met, 3 not met. Not met: ",
-    ),
+    (f"margins --set {POSITION}=1560/s", "FAIL  ilr33-amber: every loop is stable. 9 of 12 requirements met"),
     ("stiffness", "PASS  "),
     ("corners fin", "FAIL  "),
     ("duty joint", "PASS  "),
     ("cycles ballscrew", "PASS  "),
     (f"compare ilr33-amber --no-validate --quiet --set {POSITION}=1560/s", "FAIL  "),
     (f"simulate --no-limits --duration 0.03 --set {POSITION}=9000/s", "FAIL  "),
-    ("tune --no-curve --quiet --require position.bandwidth>=2000Hz", "FAIL  "),
 ], ids=lambda words: words.split()[0])  # fmt: skip
 def test_the_first_line_is_the_verdict(words: str, first: str, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)

@@ -12,11 +12,14 @@ from actuator_lti import assemble_loops, load_design, onset
 from actuator_lti.design import shipped_designs
 from analyses.corners import corners
 from analyses.large_signal.from_rest import AmplitudeMargin
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.linear.loop_survey import with_cogging
+from analyses.specification.requirements import evaluate_requirements
 from reports import document as doc
 from reports.build import design_report
-from reports.sections import limits
+from reports.sections import answer, limits
 from reports.sections.in_time import remark
+from reports.sections.requirements import item
 from reports.verdict_summary import gathered
 from tests.changed import changed
 
@@ -46,6 +49,20 @@ def test_every_loop_shows_five_figures_and_the_distance_to_its_own_requirement(b
     bandwidths = [row["figures"][-1]["distance"] for row in result["loops"]]
     assert bandwidths[:2] == [None, None]  # required of the position loop only
     assert bandwidths[2] == pytest.approx(items["position-bandwidth"]["value"] - 15.0)
+
+
+@pytest.mark.parametrize("kept", ["position-bandwidth", "command-bandwidth"])
+def test_a_distance_stands_beside_the_figure_that_it_belongs_to(kept: str) -> None:
+    """-3 dB of the ball screw: 5.62 Hz to the command, behind its mean; 115 Hz to the reference, of 10 Hz."""
+    design = load_design("ballscrew")
+    design = replace(design, requirements=tuple(one for one in design.requirements if one.id == kept))
+    figures = all_loop_figures(assemble_loops(design))
+    items = [item(one) for one in evaluate_requirements(design, figures)]
+    (block, *_) = answer.section(figures, items, [])["blocks"]
+    cell = block["loops"][-1]["figures"][-1]
+    assert cell["value"] == pytest.approx(5.62, abs=0.01)
+    assert (cell["distance"], cell["limit"]) in ((cell["value"] - 5.0, 5.0), (None, None))
+    assert (cell["distance"] is None) == (kept == "position-bandwidth")
 
 
 def test_the_first_screen_says_how_far_it_is_believed_and_where_it_is_linear(built: Built) -> None:

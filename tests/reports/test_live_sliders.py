@@ -10,7 +10,7 @@ from html import unescape
 
 import numpy as np
 import pytest
-from live_page import AMBER, Page, command_line, page_text, same_figures, written
+from live_page import AMBER, Page, command_line, same_figures, written
 
 from actuator_lti import InputError, assemble_loops
 from actuator_lti.design import Design, check_design, with_values
@@ -190,12 +190,13 @@ def test_a_phone_has_the_sliders_within_its_width(opens) -> None:
     assert small.read()["position"]["bandwidth"] > before["position"]["bandwidth"]
 
 
-def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(browser, tmp_path):
+def test_without_scripts_the_page_is_the_report_and_with_them_the_module_alone_is_compiled(browser, once):
     page = browser.new_context(offline=True, java_script_enabled=False).new_page()
-    page.goto(written(AMBER, tmp_path).as_uri())
+    path = written(AMBER, once)
+    page.goto(path.as_uri())
     assert page.locator("#hands-on").is_hidden()
     assert page.locator("#verdicts").is_visible()
-    policy = unescape(page_text(AMBER).split('Content-Security-Policy" content="')[1].split('"')[0])
+    policy = unescape(path.read_text("utf-8").split('Content-Security-Policy" content="')[1].split('"')[0])
     assert "'wasm-unsafe-eval'" in policy
     assert "'unsafe-eval'" not in policy
     assert "http" not in policy

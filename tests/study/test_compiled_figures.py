@@ -150,7 +150,7 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
     """A resonance of 1 % damping, up to 140 dB above the gain at zero frequency."""
     import control
 
-    from actuator_lti.batch import _figures, _step
+    from actuator_lti.batch import _figures, _linalg, _step
 
     s = control.tf("s")
     system = control.c2d(control.ss(50 * above * s / (s**2 + s + 2500) + 1 / (s + 1)), 1e-3)
@@ -159,8 +159,9 @@ def test_a_step_is_followed_for_as_long_as_its_resonance_rings(above):
     row = np.zeros(_figures.COLUMNS)
     row[_figures.RADIUS], row[_figures.FINAL] = np.abs(p).max(), (C @ np.linalg.solve(np.eye(n) - A, B))[0, 0]
     poles = np.concatenate((np.zeros(2 * n), p.real, p.imag))
-    spaces = np.zeros(2 * n), np.zeros(2 * n * n + 2 * n)
-    _step.step_figures(n, A.ravel().copy(), B.ravel().copy(), C.ravel().copy(), np.nan, poles, row, *spaces)
+    spaces, loop = (np.zeros(2 * n), np.zeros(2 * n * n + 2 * n)), [part.ravel().copy() for part in (A, B, C)]
+    _linalg.hessenberg(n, *loop, np.zeros(n))
+    _step.step_figures(n, *loop, np.nan, poles, row, *spaces)
     truth = step_figures(system)
     assert row[_figures.SETTLING] == pytest.approx(truth.settling_time_s / 1e-3, abs=1e-6)
     assert row[_figures.RISE] == pytest.approx(truth.rise_time_s / 1e-3, abs=1e-6)

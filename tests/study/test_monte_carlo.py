@@ -8,10 +8,21 @@ import pyarrow.parquet as pq
 import pytest
 from toleranced import asked_twice, toleranced
 
-from actuator_lti import load_design, read_design_text, write_design
+from actuator_lti import assemble_loops, load_design, read_design_text, write_design
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design.asked import Requirement, Waiver
+from analyses.comparison.found import small_signal
+from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
-from analyses.monte_carlo.judging import Reduction, judge, judged, reduced, source_columns, unpacked
+from analyses.monte_carlo.judging import (
+    Reduction,
+    judge,
+    judged,
+    loop_columns,
+    reduced,
+    source_columns,
+    unpacked,
+)
 from analyses.monte_carlo.result import MOST, clopper_pearson
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
@@ -256,6 +267,17 @@ def test_one_sample_is_printed_as_a_design_and_json_goes_to_standard_output_alon
     assert "allowed with --step" in cli.refused("montecarlo", "--duration", "2")
     assert made["verdict"] == "met"
     assert made["columns"]["nonlinear.overshoot"]["unit"] == "%"
+
+
+@pytest.mark.parametrize("name", ["ballscrew", "ilr33-amber"])
+def test_a_column_of_samples_is_the_figure_that_all_else_calls_by_its_name(name):
+    """The ball screw takes the mean of 80 samples: its response to the command is none of the samples'."""
+    design = load_design(name)
+    columns = loop_columns(linear_figures(Population(design, {}, 1), held=True), design)
+    own = small_signal(design, all_loop_figures(assemble_loops(design)))
+    shared = {key for key in own if key in columns and own[key] is not None}
+    assert {key: columns[key][0] for key in shared} == pytest.approx({key: own[key] for key in shared})
+    assert ("position.bandwidth" in shared) == (name != "ballscrew")
 
 
 COMMANDS = {

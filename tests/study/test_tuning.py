@@ -11,7 +11,7 @@ from toleranced import QUICK, need, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, stability_margins
 from actuator_lti.bandwidth import closed_loop_bandwidth
-from actuator_lti.batch import Population
+from actuator_lti.batch import Population, linear_figures
 from actuator_lti.design import model, with_values
 from actuator_lti.design.model import Coupling, Gear, PositionLoop, VelocityLoop
 from actuator_lti.design.objects import export_objects
@@ -20,6 +20,7 @@ from analyses.monte_carlo.task import StepCheck, step_columns
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.sampling import Factor
 from analyses.tuning import TuningSettings, tune
+from analyses.tuning import problem as problem_module
 from analyses.tuning.problem import gain_requirements, problem_of, read_requirement
 from analyses.tuning.solve import maximise
 from analyses.tuning.start import (
@@ -98,6 +99,26 @@ def test_a_gain_stays_within_the_limits_of_its_tolerance(lower, upper, least):
     assert gain.value == pytest.approx(least, rel=1e-4)
     assert tuned.requirements[0].corner[GAIN] == pytest.approx(most)
     assert tuned.feasible == (least < 149.46)
+
+
+def test_no_step_is_followed_that_no_requirement_is_on(monkeypatch):
+    """The joint's current loop settles in thousands of samples; the position's figures are the same bits."""
+    seen = []
+
+    def noted(*asked, **more):
+        seen.append((asked, more, linear_figures(*asked, **more)))
+        return seen[-1][-1]
+
+    monkeypatch.setattr(problem_module, "linear_figures", noted)
+    asked = replace(need("settling_time", None, loop="position", unit="s"), maximum=1.0)
+    design = replace(load_design("joint"), requirements=(asked,))
+    problem = problem_of(design, (asked,), {})
+    distances = problem.exact_distances(problem.present[None, :], problem.all_corners[:2])
+    (population,), more, found = seen[-1]
+    assert np.isnan(found.quantity("settling_time", "current")).all()
+    whole = linear_figures(population, **more | {"time_figures": True})
+    assert np.isfinite(whole.quantity("settling_time", "current")).all()
+    assert np.array_equal(distances[0, :, 0], 1.0 - whole.quantity("settling_time", "position"))
 
 
 def test_the_step_of_a_speed_drive_is_judged_by_its_speed():
@@ -203,7 +224,8 @@ def test_every_corner_meets_the_requirements_in_whole_steps_and_steps_settle():
 
 def test_the_command_writes_a_design_that_is_what_it_says(cli, tmp_path):
     words = ("--no-curve", "--out", tmp_path, "--quiet", "--require")
-    assert "misses" in cli.text("tune", *words, "position.bandwidth>=2000 Hz", status=1)
+    said = cli.text("tune", *words, "position.bandwidth>=2000 Hz", status=1)
+    assert (said[:6], "misses" in said) == ("FAIL  ", True)
     made = json.loads((tmp_path / "tune.json").read_text())
     assert made["verdict"]["passed"] is False
     assert not (tmp_path / "tuned.toml").exists()

@@ -166,3 +166,12 @@ def test_a_margin_at_the_corners_is_judged_by_the_corners(least: float, verdict:
     assert found.verdict == found.over_all[0].verdict == verdict
     (margins,) = evaluate_requirements(design)
     assert (margins.verdict, margins.value) == (verdict, found.over_all[0].value)
+
+
+def test_a_figure_that_the_drive_does_not_have_is_not_proven_by_all(tmp_path) -> None:
+    """An ideal torque source has no current: margins and corners said so, samples were refused."""
+    asked = Requirement(id="amperes", quantity="motor_current", unit="A", maximum=1.0)
+    design = replace(EMPS, requirements=(asked,))
+    sampled = monte_carlo(design, tmp_path, MonteCarloSettings(samples=2, worst_cases=False))
+    found = (*evaluate_requirements(design), *corners(design).corners[0].verdicts, *sampled.left_out)
+    assert [one.verdict for one in found] == ["not proven"] * 3
