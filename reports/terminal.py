@@ -91,7 +91,7 @@ def _parts(block: Mapping[str, Any], wrapped: int, out: Console) -> Iterator[Tab
     first, others = block["columns"][:heads], block["columns"][heads:]
     if _fits(laid, out):
         yield laid
-    elif not heads or len(others) == 1:
+    elif not heads or len(others) < 2:
         yield stacked(block)
     else:
         middle, caption = -(-len(others) // 2), f"{block['caption'].removesuffix(CONTINUED)}{CONTINUED}"

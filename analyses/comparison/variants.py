@@ -40,7 +40,6 @@ from analyses.validation import CHECKS, validate
 from analyses.validation.row import Row
 
 _ALIKE = 1e-12  # relative; differences below are rounding
-_SEEN = 5e-5  # relative; differences below change no digit that is shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +93,7 @@ class Comparison:
         return Verdict.NOT_MET if self.refused or self.unconfirmed else self.tally.verdict
 
     def ends(self, name: FigureName) -> tuple[float, float] | None:
-        """Best and worst value of a figure over all designs; ``None`` if they hardly differ (0.005 %)."""
+        """Best and worst value of a figure over all designs; ``None`` if none is better, or has one."""
         return self.everything._ends.get(name.key)
 
     @cached_property
@@ -102,7 +101,7 @@ class Comparison:
         ends = {}
         for name in self.names:
             values = [v for c in self.all if (v := c.figures.get(name.key)) is not None and isfinite(v)]
-            if name.better and values and max(values) - min(values) > _SEEN * max(map(abs, values)):
+            if name.better and values:
                 low, high = min(values), max(values)
                 ends[name.key] = (high, low) if name.better > 0 else (low, high)
         return ends

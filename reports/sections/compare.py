@@ -59,7 +59,7 @@ def brief(comparison: Comparison) -> Brief:
     loops = _of_figures("Loops", names, _OF_GROUP, shown, [shown.all], _MARKS) if names else []
     left_out = len(comparison.all) - len(shown.all)
     notes = [f"{left_out} more designs are in {compare_best.TABLE}"] if left_out else []
-    in_parts = [{**one, "heads": 2} for one in loops]  # figure and unit, before the designs
+    in_parts = [{**one, "heads": 3} for one in loops]  # figure, unit and base, before the variants
     return Brief(result(comparison), [block, *in_parts], notes)
 
 
@@ -188,8 +188,9 @@ def _cell(comparison: Comparison, one: Compared, name: FigureName) -> str | None
         return None
     scale, _ = _scaled(comparison, name)
     words = _with_change(scale * value, scale * one.differences.get(name.key, 0.0))
-    marks = zip(comparison.ends(name) or (), "▲▽", strict=False)
-    return words + "".join(f" {m}" for end, m in marks if number(scale * end) == number(scale * value))
+    best, worst = (number(scale * end) for end in comparison.ends(name) or (0.0, 0.0))
+    marks = {} if best == worst else {best: " ▲", worst: " ▽"}  # none where all show the same digits
+    return words + marks.get(number(scale * value), "")
 
 
 def _scaled(comparison: Comparison, name: FigureName) -> tuple[float, str]:

@@ -7,7 +7,6 @@ and figure, those with the most and the least room.
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from functools import partial
 from typing import cast
 
 from actuator_lti.asked.quantities import reserve
@@ -133,9 +132,8 @@ def _best(comparison: Comparison) -> doc.Block:
         row = {"what": label(wanted), "limit": limit_words(wanted.requirement), "base": number(wanted.value)}
         if ranked:
             high, low = max(ranked, key=lambda r: r[0]), min(ranked, key=lambda r: r[0])
-            alike_one = partial(math.isclose, high[0], rel_tol=SEEN, abs_tol=1e-9 * SEEN)
-            first, *alike = [name for near, name, _ in ranked if alike_one(near)]  # the base is first
-            same = alike_one(low[0])
+            first, *alike = [name for _, name, shown in ranked if shown == high[2]]  # the base is first
+            same = low[2] == high[2]
             best = first + f"; {len(alike)} alike" * bool(alike)
             row |= {"best": "all alike" if same and alike else best, "value": high[2]}
             row["worst"] = "" if same else f"{low[1]}: {low[2] or 'not stable'}"

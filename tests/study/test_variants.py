@@ -147,6 +147,19 @@ def test_variants_differ_by_what_was_changed_and_by_nothing_else(compared):
     assert [v.id for v in compared.variants[3].verdicts if v.verdict == "not met"] == ["output-rate"]
 
 
+def test_nothing_is_best_or_worst_where_all_show_the_same_digits(tmp_path) -> None:
+    """Of a gain 0.04 % higher some figures move in a digit that is shown, most in one that is not."""
+    change = '[[variant]]\nname = "near"\noverride = { "control.velocity.gain" = "0.12005 A*s/rad" }\n'
+    found = compare(load_study(study(tmp_path, change)), validation=False)
+    rows = brief(found).blocks[1]["rows"]
+    pairs = [[row[key].partition(" ")[::2] for key in ("d0", "d1")] for row in rows]
+    assert {base[0] == near[0] for base, near in pairs} == {True, False}
+    for (base, of_base), (near, of_near) in pairs:
+        assert sorted(mark for mark in of_base + of_near if mark in "▲▽") == ["▲", "▽"] * (base != near)
+    best = best_section(found)["blocks"][1]["rows"]
+    assert not [row for row in best if row["worst"].endswith(f": {row['value']}")]
+
+
 def test_a_changed_key_is_named_as_an_override_names_it():
     base = load_design("ilr33-amber").add_filter("velocity", kind="lowpass", frequency="400 Hz")
     for key, text in {"control.velocity.filter.1.frequency": "500 Hz", "gear.worm.ratio": "50"}.items():
