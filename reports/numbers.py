@@ -58,7 +58,11 @@ def significant(value: float, digits: int = 3) -> str:
     if -4 <= exponent < 6:
         return to_minus(f"{value:.{max(digits - 1 - exponent, 0)}f}")
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    return to_minus(f"{mantissa}×10") + str(int(power)).translate(_SUPERSCRIPT)
+    return to_minus(mantissa) + "×" + power_of_ten(int(power))
+
+
+def power_of_ten(exponent: int) -> str:
+    return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 
 def or_none(value: float | None, digits: int = 4) -> str:

@@ -15,7 +15,7 @@ from analyses.tuning.problem import SPAN
 from reports import document as doc
 from reports.document_schema import Bar, GlanceBlock, GlanceFigure, GlanceLoop, Weakest
 from reports.live.keys import named
-from reports.numbers import capital, plain_decade, short
+from reports.numbers import capital, power_of_ten, short
 from reports.sections import loop as loop_section
 from reports.sections import loop_charts
 from reports.sections.margins import margin_row, range_words, shown, worst_status
@@ -83,10 +83,10 @@ def believed(sections: Sequence[doc.Section]) -> str:
 def power_above(value: float) -> str:
     """The power of ten that a value does not pass.
 
-    >>> power_above(2.3e-9), power_above(1e-9)
-    ('10⁻⁸', '10⁻⁹')
+    >>> power_above(2.3e-9), power_above(1e-9), power_above(2.3e-4)
+    ('10⁻⁸', '10⁻⁹', '10⁻³')
     """
-    return plain_decade(10.0 ** math.ceil(math.log10(value) - 1e-9))
+    return power_of_ten(math.ceil(math.log10(value) - 1e-9))
 
 
 def _bars(items: Sequence[doc.VerdictItem], bounds: Corners | None) -> list[Bar]:
