@@ -47,7 +47,4 @@ _PUBLIC = {
     "unwrapped_phase_deg": "actuator_lti.systems.phase",
 }
 
-__all__ = sorted(_PUBLIC)
-
-
 __getattr__, __dir__ = on_first_use(__name__, _PUBLIC)

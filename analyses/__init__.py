@@ -30,7 +30,4 @@ _PUBLIC = {
 }
 _PACKAGES = ("friction_effects", "monte_carlo", "specification", "stiffness")
 
-__all__ = sorted([*_PUBLIC, *_PACKAGES])
-
-
 __getattr__, __dir__ = on_first_use(__name__, _PUBLIC, _PACKAGES)

@@ -5,5 +5,4 @@
 
 from actuator_lti.start.on_first_use import from_rooms
 
-__all__ = ["report"]
 __getattr__, __dir__ = from_rooms(__name__, build="report")

@@ -15,6 +15,4 @@ _PUBLIC = {
     "variable_paths": "actuator_lti.batch.parameters",
 }
 
-__all__ = sorted(_PUBLIC)
-
 __getattr__, __dir__ = on_first_use(__name__, _PUBLIC)

@@ -11,7 +11,8 @@ def on_first_use(
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """What a package defines as ``__getattr__`` and ``__dir__``: the module that defines each public name.
 
-    ``modules`` are modules of the package that are public themselves.
+    ``modules`` are modules of the package that are public themselves. All these are its ``__all__``, which
+    ``from package import *`` asks for.
 
     >>> load, _ = on_first_use("math_of_mine", {"sqrt": "math"})
     >>> load("sqrt")(9.0)
@@ -19,6 +20,8 @@ def on_first_use(
     """
 
     def load(name: str) -> Any:
+        if name == "__all__":
+            return sorted({*names, *modules})
         if name in modules:
             return import_module(f"{package}.{name}")
         if name not in names:
