@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from itertools import compress
 from math import inf
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
 from actuator_lti.asked.drive_figure import drive_figure
-from actuator_lti.asked.quantities import LOOPS, QUANTITIES, judged_loops, with_unit
+from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, LOOPS, QUANTITIES, judged_loops, with_unit
 from actuator_lti.asked.verdict import Role, Tally, Verdict
 from actuator_lti.design.asked import ResponseTo
 from actuator_lti.design.loader import AnyDesign, as_design
@@ -43,19 +43,24 @@ def evaluate_requirements(
     if figures is None:
         figures = all_loop_figures(assemble_loops(design))
 
-    @cache
-    def asked() -> AskedFigures:
-        from analyses.specification.asked_figures import AskedFigures
-
-        return AskedFigures(design)
-
+    analysed = [one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES]
+    own = tuple(one for one in analysed if not QUANTITIES[one.quantity].cornered)
+    alone = replace(design, requirements=own)  # what else is required changes no figure
     made: list[RequirementVerdict] = []
     for done, requirement in enumerate(design.requirements):
         if progress is not None:
             progress(done, len(design.requirements))
-        found = judged(design, requirement, figures, lambda name: asked().figure(name))
+        found = judged(design, requirement, figures, lambda name: _analyses_of(alone).figure(name))
         made += [_with_limits(design, verdict) for verdict in found]
     return tuple(made)
+
+
+@lru_cache(maxsize=1)
+def _analyses_of(design: Design) -> AskedFigures:
+    """The analyses of one design, kept for who asks next: in a report the corners, after the requirements."""
+    from analyses.specification.asked_figures import AskedFigures
+
+    return AskedFigures(design)
 
 
 def judged_nominally(

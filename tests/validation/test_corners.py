@@ -3,6 +3,7 @@
 from collections import Counter
 from dataclasses import replace
 from itertools import product
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from actuator_lti.design.model import Requirement
 from analyses.corners import Asked, corners
 from analyses.corners.run import worst_ends
 from analyses.monte_carlo import MonteCarloSettings, monte_carlo
+from analyses.specification import asked_figures
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import evaluate_requirements
 from analyses.specification.sensitivity import population_figures
@@ -139,8 +141,13 @@ def test_a_value_beyond_the_limits_of_its_tolerance_loses_it(value: float, stays
     assert read_design_text(write_design(moved)).controller.position_loop.gain == value
 
 
-def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path) -> None:
-    """The duty takes 10 mA and more, less than 1 kA: the one fails, the other is known of one design."""
+def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path, monkeypatch) -> None:
+    """The duty takes 10 mA and more, less than 1 kA: the one fails, the other is known of one design.
+
+    It is computed once for all of them.
+    """
+    duty = Mock(wraps=asked_figures.duty)
+    monkeypatch.setattr(asked_figures, "duty", duty)
     limits = {"less": 1e-3, "more": 1e3}
     asked = tuple(Requirement(id=id, quantity="duty_current", unit="A", maximum=limit)
                   for id, limit in limits.items())  # fmt: skip
@@ -155,6 +162,8 @@ def test_corners_and_samples_say_the_same_of_what_takes_an_analysis(tmp_path) ->
         assert [one.verdict for one in found.left_out] == ["not met", "not proven"]
         assert found.verdict == "not met"
     assert at_corners.left_out[0].reason == sampled.left_out[0].reason
+    assert [one.verdict for one in evaluate_requirements(design)] == ["not met", "met"]
+    assert duty.call_count == 1
     assert "Not met: less, fails in the nominal design: " in section(at_corners)["result"]
 
 
