@@ -18,7 +18,7 @@ from reports.cli.output import console, printable
 from reports.document_schema import GOES_ON
 from reports.html import show_signed
 from reports.numbers import prose, show
-from reports.verdict_summary import judged, role, tally, walk, why
+from reports.verdict_summary import judged, role, tally, walk, worded
 
 COLOURS = {"pass": "green", "fail": "bold red", "warn": "yellow", "info": "dim"}
 WRAPPED = 26  # characters; a cell of text is not broken into narrower lines
@@ -188,8 +188,8 @@ def verdict_table(block: Mapping[str, Any]) -> Mapping[str, Any]:
     columns += [doc.column(key, key.capitalize(), align="right") for key in ("found", "limit", "distance")]
     rows = []
     for item in block["items"]:
-        colour, because = role(item), f" ({why(item)})" if why(item) else ""
-        word = {"text": f"{SIGNS[colour]} {item['verdict']}{because}", "status": colour}
+        colour = role(item)
+        word = {"text": f"{SIGNS[colour]} {worded(item)}", "status": colour}
         limit = f"{item['comparison']} {show(item['limit'])}"
         found, distance = show(item["value"]), show_signed(item["distance"])
         rows.append((item["label"], word, found, limit, distance, item["unit"]))

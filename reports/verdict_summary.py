@@ -43,6 +43,11 @@ def why(item: Mapping[str, Any]) -> str:
     return "; ".join(filter(None, (item["reason"], item["waiver"])))
 
 
+def worded(item: Mapping[str, Any]) -> str:
+    """Write the word of one item, in brackets what stands beside it."""
+    return f"{item['verdict']} ({why(item)})" if why(item) else item["verdict"]
+
+
 def judged(blocks: Iterable[Mapping[str, Any]]) -> list[Any]:
     return [item for block in blocks if block["kind"] == "verdicts" for item in block["items"]]
 

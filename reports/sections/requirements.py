@@ -10,6 +10,7 @@ from analyses.monte_carlo.result import Odds
 from analyses.specification.requirements import RequirementVerdict, tally
 from reports import document as doc
 from reports.sections.names import QUANTITIES, in_shown
+from reports.verdict_summary import worded
 
 
 def section(verdicts: Sequence[RequirementVerdict], load_unit: str = "N m") -> doc.Section:
@@ -46,7 +47,7 @@ def table(
         doc.of(lambda v: label(v, load_unit), "label", "What"),
         doc.of(lambda v: in_shown(v.value, v.requirement.unit), "value", "Found", format="sig:4"),
         doc.of(lambda v: limit_words(v.requirement), "limit", "Limit"),
-        doc.of("verdict.value", "verdict", "Verdict"),
+        doc.of(lambda v: worded(item(v, load_unit)), "verdict", "Verdict"),
     ]
     return [doc.listing(title, verdicts, columns, status=lambda v: v.role)] if verdicts else []
 

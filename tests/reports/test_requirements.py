@@ -28,9 +28,12 @@ from analyses.monte_carlo import MonteCarloSettings, monte_carlo
 from analyses.specification.capability import drive_figures
 from analyses.specification.requirements import RequirementVerdict, evaluate_requirements, tally
 from analyses.stiffness import stiffness
+from reports import document as doc
 from reports.sections.duty import section as duty_section
 from reports.sections.failures import section as failures_section
+from reports.sections.requirements import item, table
 from reports.sections.stiffness import section as stiffness_section
+from reports.terminal import verdict_table
 
 AMBER = load_design("ilr33-amber")
 
@@ -208,6 +211,8 @@ def test_a_figure_that_there_is_not_says_why(name: str, quantity: str, reason: s
     asked = replace(load_design(name), requirements=(requirement(quantity, maximum=1.0),))
     (found,) = evaluate_requirements(asked)
     assert (found.verdict, found.reason) == ("not proven", reason)
+    for block in (*table([found], "N m"), verdict_table(doc.verdicts([item(found)]))):
+        assert f"not proven ({reason})" in str(block["rows"])
 
 
 def test_a_study_of_many_designs_leaves_them_out_and_says_so(tmp_path) -> None:
