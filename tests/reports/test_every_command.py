@@ -82,12 +82,15 @@ POSITION = "control.position.gain"
 ], ids=lambda words: words.split()[0])  # fmt: skip
 def test_the_first_line_is_the_verdict(words: str, first: str, tmp_path, monkeypatch, cli) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("COLUMNS", "80")
-    said, *rest = cli.text(*words.split(), status=int(first.startswith("FAIL"))).splitlines()
-    assert said.startswith(first)
-    assert len(said) > 20
-    tables = [line for line in rest if not line.startswith(("note:", "out/", "  ", "play"))]
-    assert max(map(len, tables), default=0) <= 80
+    for width in (60, 80, 120) if words == "margins" else (80,):
+        monkeypatch.setenv("COLUMNS", str(width))
+        said, *rest = cli.text(*words.split(), status=int(first.startswith("FAIL"))).splitlines()
+        assert said.startswith(first)
+        assert len(said) > 20
+        tables = [line for line in rest if not line.startswith(("note:", "out/", "  ", "play"))]
+        assert max(map(len, tables), default=0) <= width
+        if met := words.startswith("margins") and re.search(r"(\d+) of 12 requirements met", said):
+            assert sum(line.count("✓ met") for line in rest) == int(met[1])
 
 
 @pytest.fixture
