@@ -20,7 +20,7 @@ COMPILE := $(BIN)/pip-compile --quiet --generate-hashes --allow-unsafe --strip-e
 # Where the environment says so (many containers do), Python keeps no bytecode: each process would compile its
 # libraries anew, which doubles the time of its start.
 unexport PYTHONDONTWRITEBYTECODE
-BOTH_CORES := --jobs=2 --output-sync=target
+BOTH_CORES := --jobs=2
 
 .PHONY: page style types contracts d3 differential newest newest-wheel newest-report installs wasm report test test-all machines check bench clean install browser fuzz lock limits docs release
 

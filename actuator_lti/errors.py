@@ -114,6 +114,19 @@ def whole_number(name: str, value: Any, least: int = 1) -> int:
     return int(value)
 
 
+def whole_numbers(name: str, values: Any, many: int, least: int = 1) -> tuple[int, ...]:
+    """An argument that is so many whole numbers from ``least`` on.
+
+    >>> whole_numbers("counts", 5, 2)
+    Traceback (most recent call last):
+    actuator_lti.errors.InputError: counts = 5: must be 2 whole numbers, at least 1
+    """
+    given = values if isinstance(values, Sequence) and len(values) == many else ()
+    if not given or not all(isinstance(one, Integral) and int(one) >= least for one in given):
+        raise InputError(f"{name} = {shown(values)}: must be {many} whole numbers, at least {least}")
+    return tuple(map(int, given))
+
+
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = _SHORT.maxlong = 100
 

@@ -65,16 +65,17 @@ class Plant:
         """Now."""
         return output_of(self._drive, "angle")
 
-    def measured(self, name: str, counts_per_rad: dict[str, float]) -> float:
+    def measured(self, name: str, constants: dict[str, float]) -> float:
         """What a member of the controller's input is."""
         angle, output = self._drive.value("angle"), self.output_angle_rad
         known = {"motor_angle": angle, "output_angle": output, "motor_speed": self._drive.value("speed"),
                  "motor_current": self._drive.value("current"),
                  "output_speed": output_of(self._drive, "speed")}  # fmt: skip
+        unit = "M" if self._drive.design.axis == "linear" else "RAD"
         if name == "motor_counts":
-            return floor(angle * counts_per_rad["COUNTS_PER_RAD"])
+            return floor(angle * constants[f"COUNTS_PER_{unit}"])
         if name == "output_counts":
-            return floor(output * counts_per_rad["OUTPUT_COUNTS_PER_RAD"])
+            return floor(output * constants[f"OUTPUT_COUNTS_PER_{unit}"])
         return known["_".join(name.split("_")[:2])]
 
 

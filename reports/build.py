@@ -185,9 +185,10 @@ def loop_sections(survey: LoopSurvey, verdicts: Sequence[RequirementVerdict]) ->
     }
     for name, result in figures.items():
         makers[f"Loop {name}"] = partial(loop.section, name, design, result)
-    makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
-    makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
-    makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
+    if figures:
+        makers["Forms"] = lambda: forms.section(survey.forms, survey.refused)
+        makers["Break points"] = lambda: forms.break_points(survey.break_points, figures)
+        makers["Operating points"] = lambda: forms.operating_points(survey.operating_points, design)
     if survey.budgets:
         makers["Delays"] = lambda: forms.delay_budget(survey.budgets)
     if design.coupling is not None or design.load.path == "back-drivable":

@@ -23,7 +23,7 @@ def _width(text: str | float | int, nominal: float, parse: Parse) -> float:
     else:
         width = parse(text)
     if width <= 0.0:
-        raise InputError("allowed: above 0")
+        raise InputError("allowed: above 0; an exact value is written without a tolerance")
     return width
 
 

@@ -64,6 +64,9 @@ class Operating:
         needed = self.point == "describing-function"
         if (needed or W is not None) and finite_number("speed_amplitude_rad_s", W, allowed) <= 0.0:
             raise InputError(f"speed_amplitude_rad_s = {W}: must be {allowed}")
+        if W is not None and not needed:
+            at = f"operating_point = {self.point!r}"
+            raise InputError(f"speed_amplitude_rad_s = {W}: {at} has none; allowed: with describing-function")
 
     def checked(self, design: Design) -> Operating:
         """The same, refused where the design has no such operating point."""

@@ -19,6 +19,8 @@ class SheetFigure:
 def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
     """Time constants, stall, no-load speed and inertia at the motor, at the design's temperature and supply.
 
+    Of a linear axis behind gears of ratio N, speed and force are those of the output.
+
     >>> from actuator_lti.design import load_design
     >>> for one in sheet_figures(load_design("ilr33-amber"))[:2]:
     ...     print(f"{one.name}: {one.value:.4g} {one.unit}")
@@ -37,12 +39,18 @@ def sheet_figures(design: Design) -> tuple[SheetFigure, ...]:
     kM, kE = motor.torque_constant_Nm_A, motor.back_emf_constant_Vs_rad
     if R is None or L is None or kM is None or kE is None:  # an ideal source
         return inertia
-    speed, rpm = U / kE, U / kE * 30.0 / pi
+    geared, force, speed = linear and ratio != 1.0, kM * U / R, U / kE
+    if linear:
+        force, speed = force * ratio, speed / ratio
+    of, by, over = (" of the output", " N", "/N") if geared else ("", "", "")
+    shown = (speed, "m/s") if linear else (speed * 30.0 / pi, "rpm")
     return (
         SheetFigure("electrical time constant L/R", 1e3 * L / R, "ms"),
         SheetFigure("mechanical time constant of the rotor alone R J/kM^2", 1e3 * R * J / kM**2, "ms"),
-        SheetFigure("no-load speed without friction U/kE", *((speed, "m/s") if linear else (rpm, "rpm"))),
+        SheetFigure(f"no-load speed{of} without friction U/kE{over}", *shown),
         SheetFigure("stall current U/R", U / R, "A" if design.motor.constants == "dc" else "A dc"),
-        SheetFigure(f"stall {'force' if linear else 'torque'} kM U/R", kM * U / R, "N" if linear else "N*m"),
+        SheetFigure(
+            f"stall {'force' if linear else 'torque'}{of} kM U/R{by}", force, "N" if linear else "N*m"
+        ),
         *inertia,
     )

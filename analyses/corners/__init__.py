@@ -2,4 +2,4 @@
 
 from actuator_lti.start.on_first_use import from_rooms
 
-__getattr__, __dir__ = from_rooms(__name__, asked="Asked", run="Corner Corners corners")
+__getattr__, __dir__ = from_rooms(__name__, asked="Asked", run="Corner Corners corners worst_of")

@@ -184,6 +184,8 @@ def worst_ends(design: Design, quantity: str) -> dict[str, float]:
         return {}
     better = QUANTITIES[quantity].better
     columns = [better * column for name, column in figures.items() if name.endswith(f".{quantity}")]
+    if not columns:  # a drive without loops
+        return {}
     margin = np.min(np.nan_to_num(columns, nan=-np.inf), axis=0)
     chosen: dict[str, float] = {}
     for k in range(0, len(ends), 2):

@@ -27,7 +27,12 @@ class Asked:
     """
 
     stop_rad: Annotated[
-        float, Option('Mechanical stop, such as "25 deg"; the full deflection.', "ANGLE", kind="output")
+        float,
+        Option(
+            'Mechanical stop, such as "25 deg"; the full deflection, of a speed drive none.',
+            "ANGLE",
+            kind="output",
+        ),
     ]
     deflection_rad: Annotated[
         float,
@@ -47,8 +52,9 @@ class Asked:
     def __post_init__(self) -> None:
         """Refuse what cannot be answered."""
         for name in ("stop_rad", "deflection_rad", "detection_s", "watched_s"):
-            if not 0.0 < getattr(self, name) < inf:
-                raise InputError(f"{name} = {getattr(self, name):.6g}: must be positive")
+            value = getattr(self, name)
+            if not value > 0.0 or (value == inf and name.endswith("_s")):
+                raise InputError(f"{name} = {value:.6g}: must be positive")
         near, stop, seen, end = self.deflection_rad, self.stop_rad, self.detection_s, self.watched_s
         if near > stop:
             raise InputError(f"deflection: must not be beyond the stop, it is {near / stop:.4g} times that")
@@ -59,7 +65,11 @@ class Asked:
 
     @classmethod
     def of(cls, design: Design, **chosen: float | None) -> Asked:
-        """What is chosen; the rest from [failure] of the design; else its full deflection is the stop."""
+        """What is chosen; the rest from [failure] of the design; else its full deflection is the stop.
+
+        A drive without a position loop turns on: unless one is stated, its stop is infinitely far.
+        """
         stated = vars(design.failure) if design.failure is not None else {}
-        made = given({"stop_rad": design.validation.full_deflection_rad}, stated, chosen)
+        stop = inf if design.controller.position is None else design.validation.full_deflection_rad
+        made = given({"stop_rad": stop}, stated, chosen)
         return cls(**{"deflection_rad": NEAR_SHARE * made["stop_rad"], **made})

@@ -153,6 +153,7 @@ def _settling_s(design: Design, asked: Asked) -> float:
         raise UnstableError("failures: the closed loop is not stable")
     rate = min(drive_figures(design).output_rate_rad_s, design.command.rate_rad_s)
     travel = 0.5 * asked.stop_rad / rate if rate > 0.0 else LONGEST_S
+    travel = 0.0 if design.controller.position is None else travel  # it is not commanded to
     ticks = log(SETTLED) / log(slowest) if 0.0 < slowest < 1.0 else 0.0
     return min(0.1 + travel + ticks * period, MOST_TICKS * period)
 

@@ -53,7 +53,7 @@ def _term(model: JointModel, speed: float, tries: int) -> Bend:
     tables, rests = [], []
     for weight, part in zip(model.weights, model.records, strict=True):
         rows = part.compared if model.simulated else away_from_reversals(part)
-        columns = np.column_stack([part.w[rows], *_columns(model, part.inputs[rows, 0], speed)])
+        columns = np.column_stack([part.w[rows], *_columns(model, part.speed[rows], speed)])
         tables.append(weight * columns)
         rests.append(weight * part.noise[rows[part.compared]])
     table, rest, count = np.concatenate(tables), np.concatenate(rests), len(model.names)

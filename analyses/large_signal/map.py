@@ -12,7 +12,7 @@ import numpy as np
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drawing import draw
-from actuator_lti.errors import whole_number
+from actuator_lti.errors import whole_numbers
 from actuator_lti.loops import Loops
 from actuator_lti.loops.limiters import onset
 from actuator_lti.start.extras import need
@@ -111,10 +111,9 @@ def amplitude_map(
     `MOST_TICKS`.
     """
     design = as_design(design)
-    for count in counts:
-        whole_number("counts", count, 2)
-    part = min(np.sqrt(MOST_TICKS / (counts[0] * work_ticks(design, loops, counts[1]))), 1.0)
-    given, counts = counts, (max(int(part * counts[0]), 2), max(int(part * counts[1]), 2))
+    given = whole_numbers("counts", counts, 2, 2)
+    part = min(np.sqrt(MOST_TICKS / (given[0] * work_ticks(design, loops, given[1]))), 1.0)
+    counts = max(int(part * given[0]), 2), max(int(part * given[1]), 2)
     frequencies = tones(design, loops, counts[1])
     omega = np.array([t.omega_rad_s for t in frequencies])
     threshold = static_threshold(design, load_Nm).smallest_rad if friction_on else None

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import QUANTITIES, judged_loops
 from actuator_lti.bounds import SAMPLES
 from actuator_lti.design import with_values, write_design
 from actuator_lti.design.loader import AnyDesign, as_design
@@ -187,10 +186,8 @@ def _worst_cases(
     """The worst case of each requirement, with a design file of it."""
     design = task.design
     for place, (requirement, tally) in enumerate(tallies, 1):
-        judged = judged_loops(requirement.loop, design.controller.stages)
-        timed = judged if QUANTITIES[requirement.quantity].timed else ()
-        quick = replace(task, step=None, time_figures=timed)
-        case = worst_case(quick, requirement, np.array([sample for _, sample, _ in tally.worst]))
+        samples = np.array([sample for _, sample, _ in tally.worst])
+        case = worst_case(task.of(requirement), requirement, samples)
         name = f"worst-{place:02d}-{slug(requirement.id)}"
         title = f"{design.title or design.name}: worst case for {requirement.id}"
         changed = with_values(design, together(design, case.parameters), check=False)

@@ -10,17 +10,17 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES
+from actuator_lti.asked.quantities import DRIVE_QUANTITIES, LOOP_QUANTITIES, QUANTITIES, judged_loops
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import design_hash, with_values
-from actuator_lti.design.model import Design
+from actuator_lti.design.model import Design, Requirement
 from actuator_lti.design.tolerances import together
 from actuator_lti.drive.operating import OperatingPoint
 from actuator_lti.errors import InputError
@@ -177,6 +177,7 @@ class SampleTask:
     # Of the linear loops
     operating_point: OperatingPoint = "sliding"
     load_Nm: float = 0.0
+    loops: bool = True  # whether their figures are wanted
     time_figures: bool | Collection[str] = True  # of their steps, or of which loops
     step: StepCheck | None = None  # a nonlinear one
 
@@ -202,19 +203,23 @@ class SampleTask:
     def figures(self, draws: np.ndarray) -> Arrays:
         """Columns of figures for rows of parameter values (SI, in the order of ``sampler.paths``)."""
         population = Population(self.design, as_values(self.design, self.sampler.paths, draws), len(draws))
-        linear = linear_figures(
-            population,
-            operating_point=self.operating_point,
-            load_Nm=self.load_Nm,
-            time_figures=self.time_figures,
-            held=True,
-        )
-        columns = loop_columns(linear, self.design, self._quantities)
+        columns: dict[str, np.ndarray] = {}
+        if self.loops:
+            at = {"operating_point": self.operating_point, "load_Nm": self.load_Nm}
+            linear = linear_figures(population, **at, time_figures=self.time_figures, held=True)
+            columns = loop_columns(linear, self.design, self._quantities)
         for quantity, load in self._drive_wanted:
             columns[drive_column(quantity, load)] = drive_figures(population, quantity, load)
         if self.step is not None:
             columns |= step_columns(self.step, population)
         return columns
+
+    def of(self, requirement: Requirement) -> SampleTask:
+        """The same of what one requirement is on alone."""
+        quantity, design = QUANTITIES[requirement.quantity], replace(self.design, requirements=(requirement,))
+        timed = judged_loops(requirement.loop, design.controller.stages) if quantity.timed else ()
+        loops = quantity.scope == "loop"
+        return replace(self, design=design, loops=loops, time_figures=timed, step=None)
 
     @property
     def _quantities(self) -> tuple[str, ...]:

@@ -309,6 +309,7 @@ def summary(run: Trajectory, ended: Conduct) -> Tree:
         "commanded": run.stage,
         f"largest_command_{si}": np.abs(run.reference_rad).max(),
         f"largest_error_{si}": np.abs(run.reference_rad - run.followed).max(),
+        **({f"largest_response_{si}": np.abs(run.followed).max()} if followed else {}),
         **({f"final_response_{si}": run.followed[-1]} if followed else {}),
         f"final_output_{angle}": run.output_angle_rad[-1],
         f"largest_motor_speed_{angle}_s": np.abs(run.motor_speed_rad_s).max(),

@@ -11,7 +11,7 @@ from actuator_lti.design.model import Design
 from actuator_lti.drive.profile import profile_onset_rad
 from actuator_lti.errors import InputError
 from actuator_lti.loops import assemble_loops
-from analyses.corners.run import corners, worst_of
+from analyses.corners import corners, worst_of
 from analyses.duty import duty
 from analyses.failures import failures
 from analyses.large_signal.tones import linear_steady_state, run_tones, tone

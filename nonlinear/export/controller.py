@@ -100,12 +100,13 @@ def _constants(ours: Controller, upper: str) -> str:
     for each in ours.measured.members:
         if each.kind == "count":
             value = c_float(ours.counts_per_rad(each.first))
-            lines.append(f"#define {_per_rad(each.name, upper)} {value} /* of {each.name} */")
+            lines.append(f"#define {_per_unit(ours, each.name, upper)} {value} /* of {each.name} */")
     return "\n".join(lines)
 
 
-def _per_rad(counts: str, upper: str) -> str:
-    return f"{upper}CONTROLLER_{counts.removeprefix('motor_').upper()}_PER_RAD"
+def _per_unit(ours: Controller, counts: str, upper: str) -> str:
+    unit = "M" if ours.design.axis == "linear" else "RAD"
+    return f"{upper}CONTROLLER_{counts.removeprefix('motor_').upper()}_PER_{unit}"
 
 
 def _structs(ours: Controller) -> str:
@@ -124,13 +125,16 @@ def _signal_words(ours: Controller, member: Member) -> str:
 
 
 def _angles(ours: Controller, upper: str) -> str:
-    """What to give for an angle in rad where the encoder is all there is."""
-    named = {each.name for each in ours.measured.members}
+    """What to give for an angle where the encoder is all there is."""
+    named, unit = (
+        {each.name for each in ours.measured.members},
+        "m" if ours.design.axis == "linear" else "rad",
+    )
     return "".join(
-        f" Where the encoder is all there is, give `{side}_angle_rad` as `{side}_counts / "
-        f"{_per_rad(f'{side}_counts', upper)}`."
+        f" Where the encoder is all there is, give `{side}_angle_{unit}` as `{side}_counts / "
+        f"{_per_unit(ours, f'{side}_counts', upper)}`."
         for side in ("motor", "output")
-        if {f"{side}_angle_rad", f"{side}_counts"} <= named
+        if {f"{side}_angle_{unit}", f"{side}_counts"} <= named
     )
 
 

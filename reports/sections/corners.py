@@ -23,7 +23,9 @@ def section(result: Corners) -> doc.Section:
     caption = "From nominal (line) to each corner (dot): which corner moves which margin, loop by loop."
     alt = f"{caption} The figures stand in the table of every loop at every corner."
     details = doc.details("Every loop at every corner", [_loop_table(result), *named])
-    blocks = [_summary_table(result), doc.figure("corners", chart(result), caption, alt=alt), details]
+    blocks = [_summary_table(result)]
+    if result.corners[0].figures:
+        blocks += [doc.figure("corners", chart(result), caption, alt=alt), details]
     told = doc.severity(result.verdict)
     words = summary(result)
     return doc.section("corners", "Corners", blocks, result=words, intro=intro, status=told, told=told)
@@ -41,7 +43,8 @@ def summary(result: Corners) -> str:
         every = "every other requirement" if more else "every requirement"
         judged = result.corners[0].verdicts
         met, none = (f" and {every} met", "") if judged else ("", " No requirement is judged there.")
-        return f"Every loop is stable{met} at all {count} corners.{none}{more}"
+        stable = "Every loop is stable" if result.corners[0].figures else "The drive has no loop"
+        return f"{stable}{met} at all {count} corners.{none}{more}"
     where = f"{len(failed)} of {count} corners ({'; '.join(failed)})"
     where = f"all {count} corners" if len(failed) == count else where
     what = Counter(name for corner in result.corners for name in _failings(corner))

@@ -34,7 +34,7 @@ def section(result: Failures) -> doc.Section:
         held = f"does not come to rest, {told(result.design, swing, *out)},"
     intro = (
         f"Each failure is simulated from a drive that {held} under {load} (positive pushes forward). "
-        f"Deflection counts from where the output was; the stop is {out.of(asked.stop_rad, 4)} away, and "
+        f"Deflection counts from where the output was; {_stop(result, out)}, and "
         f"detection takes {1e3 * asked.detection_s:.4g} ms. The {push} is that in the coupling"
     )
     if result.design.coupling is None:
@@ -51,6 +51,11 @@ def section(result: Failures) -> doc.Section:
     told_as = told_as if status == "info" else status
     words, title = summary(result), "Failure cases"
     return doc.section("failures", title, blocks, result=words, intro=intro, status=status, told=told_as)
+
+
+def _stop(result: Failures, out: Unit) -> str:
+    stop = result.asked.stop_rad
+    return f"the stop is {out.of(stop, 4)} away" if stop < inf else "no stop is stated"
 
 
 def summary(result: Failures) -> str:
@@ -73,14 +78,18 @@ def summary(result: Failures) -> str:
 
 
 def _table(result: Failures, out: Unit) -> doc.Block:
-    time, near = Unit(1e3, "ms").column("ms:3"), out.of(result.asked.deflection_rad, 4)
+    time, asked = Unit(1e3, "ms").column("ms:3"), result.asked
+    times = []
+    if asked.deflection_rad < inf:
+        times.append(doc.of("to_deflection_s", "near", f"To {out.of(asked.deflection_rad, 4)}", **time))
+    if asked.stop_rad < inf:
+        times.append(doc.of("to_stop_s", "stop", "To the stop", **time))
     most: dict[str, Any] = {"format": "sig:3", "better": -1}
     push, load = push_words(result.design), result.design.load_unit
     current = "peak_current_A" if result.design.motor.has_electrical_dynamics else lambda _case: None
     columns = [
         doc.of(lambda case: NAMES[case.name], "case", "Failure"),
-        doc.of("to_deflection_s", "near", f"To {near}", **time),
-        doc.of("to_stop_s", "stop", "To the stop", **time),
+        *times,
         doc.of("at_detection_rad", "seen", "Until detected", **out.column(better=-1)),
         doc.of(current, "current", "Peak current", "A", **most),
         doc.of("peak_moment_Nm", "moment", f"Peak {push}", load, **most),
@@ -105,7 +114,8 @@ def _figure(result: Failures, out: Unit) -> doc.Block:
         time = case.time_s[keep] * per_s
         top.curve(time, out.scale * case.deflection_rad[keep], NAMES[case.name], **style.series(k))
         bottom.curve(time, case.moment_Nm[keep], NAMES[case.name], **style.series(k))
-    top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
+    if asked.stop_rad < inf:
+        top.rule_y(out.scale * asked.stop_rad, "stop", seen=True, colour=style.RED, dash=1)
     for panel in (top, bottom):
         panel.rule_x(asked.detection_s * per_s, "detected" if panel is top else "")
     push = push_words(result.design)

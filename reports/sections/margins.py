@@ -119,7 +119,8 @@ def brief(result: Margins) -> Brief:
         more += [block for block in measured.blocks(result.measured) if block["kind"] == "table"]
         told += [measured.words(result.measured), *(f"measured loop: {one}" for one in result.measured.notes)]
     notes = [*told, *by_itself_notes(known), *evidence_notes(known), *_notes(result, known)]
-    return Brief(first["result"], [side_by_side(head, tables), *more, *judged["blocks"]], notes)
+    shown = [side_by_side(head, tables), *more] if known else []
+    return Brief(first["result"], [*shown, *judged["blocks"]], notes)
 
 
 def _named(result: Margins) -> dict[str, LoopFigures]:
@@ -169,6 +170,8 @@ def _smoothed(result: Margins) -> list[str]:
 
 
 def _stability(named: Mapping[str, LoopFigures]) -> str:
+    if not named:
+        return "the drive has no loop, so there are no margins"
     for sound, words in DOUBTS.items():
         if names := [name for name, one in named.items() if one.sound is sound]:
             return f"{words}: {', '.join(names)}"
@@ -230,6 +233,8 @@ def _loops(
         doc.details("Every crossing of every loop", [crossing_table(own)]),
         *(doc.text(note) for note in evidence_notes(named)),
     ]
+    if not loops:
+        blocks, how = [], "The drive has no loop: its command is the voltage. "
     kinds = {one.margins.evidence for one in named.values()}
     meaning = " ".join(f"{kind.capitalize()}: {words}." for kind, words in MEANING.items() if kind in kinds)
     intro = (

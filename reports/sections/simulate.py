@@ -46,8 +46,13 @@ def _table(run: Trajectory, ended: Conduct) -> doc.Block:
     unit, per_SI = COMMAND_UNITS[run.axis, run.stage]
     rows: list[doc.Row] = []
     for name, value in summary(run, ended).items():
-        if name.startswith(("largest_command", "largest_error", "final_response")):
-            rows.append({"what": " ".join(name.split("_")[:2]), "value": value * per_SI, "unit": unit})
+        first, second, *_ = f"{name}_".split("_")
+        if second in ("command", "error", "response"):
+            what = MOVES[run.stage] if second == "response" else second
+            rows.append({"what": f"{first} {what}", "value": value * per_SI, "unit": unit})
+        elif second == "output":
+            what = "output position" if run.axis == "linear" else "output angle"
+            rows += [{**row, "what": f"{first} {what}"} for row in _in_words(name, value)]
         elif isinstance(value, float):
             rows += _in_words(name, value)
     events = f"stick-slip events (at most {run.events_per_tick} in one tick)"
@@ -59,6 +64,7 @@ COLUMNS = [
     doc.column("value", "Value", format="short:6"),
     doc.column("unit", "Unit"),
 ]
+MOVES = {"velocity": "output speed", "current": "motor current"}
 UNITS = (
     ("_rad_s", 1.0, "rad/s"), ("_m_s", 1.0, "m/s"), ("_rad", 180.0 / np.pi, "deg"), ("_m", 1e3, "mm"),
     ("_A", 1.0, "A"), ("_V", 1.0, "V"), ("_s", 1.0, "s"),

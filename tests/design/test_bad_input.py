@@ -77,6 +77,7 @@ CASES = {
     ),
     "loop for a drive figure": ([('"output_rate"', '"output_rate"\nloop = "every"')], ["output-rate.loop", "no loop"]),
     "tolerance too wide": ([(TOLERANCE, 'tolerance = "150 %"')], ["input_inertia.tolerance", "0, or at least"]),
+    "tolerance of nothing": ([(TOLERANCE, 'tolerance = "0 %"')], ["input_inertia.tolerance", "without a tolerance"]),
     "tolerance of a wrong kind": ([(TOLERANCE, 'tolerance = { kind = "gauss" }')], ["tolerance.kind", '"normal"']),
     "normal without std": ([(TOLERANCE, 'tolerance = { kind = "normal" }')], ["tolerance", "missing std"]),
     "uniform with std": ([(TOLERANCE, 'tolerance = { half_width = "5 %", std = "1 %" }')], ["no std"]),

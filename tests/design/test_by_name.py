@@ -133,6 +133,7 @@ BAD = {
     "drive": lambda: Drive(3),
     "tune": lambda: analyses.tune(3),
     "sawtooth": lambda: analyses.sawtooth(3),
+    "counts": lambda: analyses.large_signals(DESIGN, counts=5),
     "study": lambda: analyses.compare(3),
     "a report's folder": lambda: report(DESIGN, out=3),
     "a record's path": lambda: analyses.open_record(3),

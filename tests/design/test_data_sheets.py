@@ -19,13 +19,16 @@ from actuator_lti.design import (
 )
 from actuator_lti.design.key_reference import explained
 from actuator_lti.design.loader import design_from_tree
+from actuator_lti.design.model import Gear
 from actuator_lti.design.writing import read_value
 from actuator_lti.drive.facts import capability, steady_torque_Nm
+from actuator_lti.drive.sheet_figures import sheet_figures
 from actuator_lti.errors import InputError, Mistakes
 from analyses.linear.loop_survey import survey_loops
 from analyses.studies.sampling import sampler_of
 from nonlinear import commands, simulate
 from reports.sections import forms
+from tests.changed import changed
 from tests.refusals import refused
 
 AMBER = load_design("ilr33-amber")
@@ -622,3 +625,17 @@ def test_a_gear_is_named_as_its_maker_names_it(name: str) -> None:
     )
     assert changed.total_ratio == 100.0
     assert changed.friction == same.friction != plain.friction
+
+
+def test_speed_and_force_of_a_linear_axis_behind_gears_are_those_of_the_output() -> None:
+    """16:1 and a screw: U/(k N) and k N U/R, of k in N/A behind the screw; of a direct screw without N."""
+    screw = load_design("ballscrew")
+    geared = changed(screw, gears=(Gear(name="spur", ratio=16.0),))
+    motor, U = screw.effective_motor, screw.limits.voltage_V
+    for design, of, by, over, N in ((screw, "", "", "", 1.0), (geared, " of the output", " N", "/N", 16.0)):
+        told = {one.name: one.value for one in sheet_figures(design)}
+        speed, force = (f"no-load speed{of} without friction U/kE{over}", f"stall force{of} kM U/R{by}")
+        assert told[speed] == pytest.approx(U / motor.back_emf_constant_Vs_rad / N, rel=1e-12)
+        assert told[force] == pytest.approx(
+            motor.torque_constant_Nm_A * N * U / motor.resistance_ohm, rel=1e-12
+        )

@@ -12,7 +12,7 @@ import pytest
 from programs import ran
 
 from actuator_lti.compiled.compiler import zig_command
-from actuator_lti.design import Design, design_hash, load_design, shipped_designs
+from actuator_lti.design import Design, design_hash, load_design, shipped_designs, with_overrides
 from nonlinear._kernels import layout as at
 from nonlinear.export import controller_export
 from nonlinear.export.controller_cut import controller_of
@@ -283,3 +283,12 @@ def test_firmware_with_a_sensor_at_the_output_stays_where_that_stands(tmp_path: 
     (tmp_path / "stay.c").write_text(STAY)
     ran(tmp_path, "gcc", "-std=c99", *STRICT[:6], "stay.c", "controller.c", "-lm", "-o", "stay")
     ran(tmp_path, "./stay")
+
+
+def test_counts_of_a_linear_axis_are_told_by_the_metre(tmp_path: Path) -> None:
+    """4096 a revolution of a lead of 10 mm."""
+    encoder = {"encoder.counts_per_rev": "4096", "encoder.speed": "difference"}
+    written(tmp_path, with_overrides(load_design("ballscrew"), encoder), single=True)
+    header = (tmp_path / "controller.h").read_text()
+    assert "#define DRIVE_CONTROLLER_COUNTS_PER_M 409600.0f" in header
+    assert "PER_RAD" not in header

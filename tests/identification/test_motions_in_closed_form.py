@@ -1,5 +1,7 @@
 """Motions in closed form: many rows a second, fast torques, another friction law, noise of the speed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lfilter
@@ -116,3 +118,18 @@ def test_noise_behind_a_filter_is_no_motion(corner_hz: float, moves: float) -> N
     )
     logged = moves * speed + 2e-4 * noise / np.std(noise)
     assert stands(design, record_of(time, velocity=logged, force=force)) is (moves == 0.0)
+
+
+def test_a_slope_that_came_out_negative_and_is_kept_is_no_proof_of_the_law() -> None:
+    """Friction that falls with the speed, as `JointModel` has it where a command is simulated: 0 errors."""
+    rng = np.random.default_rng(3)
+    time, position, speed, acceleration = _sines(rng, 4000)
+    dry = (DRY + 20.0 * np.exp(-np.abs(speed) / 0.1)) * np.sign(speed)
+    force = MASS * acceleration + dry + OFFSET + rng.standard_normal(len(time))
+    model = _fitted(time, position, force)
+    assert "viscous" in model.fixed
+    (part,) = model.records
+    # speed and acceleration as the regressors that were found tell them
+    inputs = part.w @ np.linalg.lstsq(part.w, part.inputs, rcond=None)[0]
+    told = replace(model, simulated=(record_of(time),), records=(replace(part, inputs=inputs),))
+    assert bend_of(told).is_sure

@@ -223,6 +223,7 @@ def test_operating_points_of_the_friction() -> None:
     ({"form": "discrete"}, "^form = 'discrete': one of sampled, continuous, ideal$"),
     ({"operating_point": "moving"}, "operating_point = 'moving'"),
     ({"operating_point": "describing-function"}, "speed_amplitude_rad_s"),
+    ({"operating_point": "rest", "speed_amplitude_rad_s": 3.0}, "rad_s = 3.0: .*'rest' has none"),
     ({"load_Nm": float("nan")}, "load_Nm"),
     ({"direction": 0}, "direction"),
     ({"rotor": "stuck"}, "rotor"),

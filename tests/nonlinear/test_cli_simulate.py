@@ -148,6 +148,17 @@ def without(stages: tuple[str, ...], folder: Path) -> Path:
     return folder / "drive.toml"
 
 
+def test_a_drive_without_a_loop_says_so_and_has_corners_and_a_report(tmp_path, cli) -> None:
+    drive = without(VOLTAGE, tmp_path)
+    head = "the drive has no loop, so there are no margins. The design states no requirements."
+    said = [cli.text("margins", drive, "--quiet"), cli.text("corners", drive, "--quiet")]
+    assert head in " ".join(said[0].split())
+    assert "Phase margin" not in said[0]
+    assert "The drive has no loop at all" in said[1]
+    cli.text("report", drive, "--no-validation", "--out", tmp_path)
+    assert (tmp_path / "report.html").exists()
+
+
 def test_volts_and_amperes(run, tmp_path) -> None:
     """At rest of the transient U = R i + kE w, with i from the dry friction."""
     facts, rows = run(f"{without(VOLTAGE, tmp_path)} --amplitude 6 --duration 2")
@@ -181,6 +192,7 @@ def test_speed_settles_while_the_output_turns_however_short_the_run_is(run, tmp_
     assert rows["speed_command_rad_s"][-1] == pytest.approx(wanted, rel=1e-12)
     assert facts["largest_error_rad_s"] == pytest.approx(rate, rel=0.2)
     assert facts["final_response_rad_s"] == pytest.approx(rate, rel=1e-3)
+    assert facts["largest_response_rad_s"] == rows["motor_speed_rad_s"].max() / AMBER.total_ratio
     facts, cut = run(f"{drive} --amplitude 20 --duration 0.001")
     assert 0.0 < cut["motor_speed_rad_s"][-1] < (1.0 - exp(-1.0)) * wanted
     assert facts["status"] == "becomes steady"
@@ -192,6 +204,9 @@ def test_words_have_the_unit(stages: tuple[str, ...], unit: str, tmp_path, cli) 
     rows = [row.split() for row in said.splitlines()]
     assert ["largest", "command", "0.5", unit] in rows
     assert any(row[:2] == ["largest", "error"] and row[3:] == [unit] for row in rows)
+    moved = {" ".join(row[:-2]): row[-1] for row in rows if row}
+    assert moved["largest output angle"] == "deg"
+    assert moved.get("largest output speed") == (unit if stages == SPEED else None)
 
 
 @pytest.mark.parametrize(("drive", "words", "most"), [

@@ -116,5 +116,6 @@ def test_a_package_that_is_missing_is_named_with_its_extra(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "pandas", None)
     told = r'to_pandas needs pandas; allowed: pip install "actuator-lti\[tables\]"'
     refused(run.to_pandas, match=told)
+    loop = assemble_loops("ilr33-amber").velocity.open_loop  # python-control itself loads pyplot
     monkeypatch.setitem(sys.modules, "matplotlib.pyplot", None)
-    refused(plot_bode, assemble_loops("ilr33-amber").velocity.open_loop, words="plotting needs matplotlib")
+    refused(plot_bode, loop, words="plotting needs matplotlib")

@@ -10,11 +10,19 @@ from toleranced import asked_twice, toleranced
 
 from actuator_lti import assemble_loops, load_design, read_design_text, write_design
 from actuator_lti.batch import Population, linear_figures
-from actuator_lti.design.asked import Waiver
+from actuator_lti.design.asked import Requirement, Waiver
 from analyses.comparison.found import small_signal
 from analyses.linear.loop_figures import all_loop_figures
 from analyses.monte_carlo import MonteCarloSettings, SampleTask, monte_carlo, replay, run
-from analyses.monte_carlo.judging import Reduction, loop_columns, reduced, unpacked
+from analyses.monte_carlo.judging import (
+    Reduction,
+    judge,
+    judged,
+    loop_columns,
+    reduced,
+    source_columns,
+    unpacked,
+)
 from analyses.monte_carlo.result import MOST, clopper_pearson
 from analyses.specification.requirements import evaluate_requirements
 from analyses.studies.engine import Engine
@@ -174,6 +182,24 @@ def test_a_reduced_study_that_was_interrupted_goes_on(damage, study, design, tmp
     assert result.columns == study.columns
     assert result.odds == study.odds
     assert steps[-1] == ((600, 600) if damage is None else (1000, 1000))
+
+
+def test_a_search_for_the_worst_case_computes_what_its_requirement_is_on_alone():
+    """Each computed the stiffness that another asks for besides, and all loops."""
+    own = load_design("fin")
+    asked = {"least_stiffness": "N*m/rad", "lost_motion": "deg"}
+    more = (Requirement(id=name, quantity=name, unit=unit, minimum=0.1) for name, unit in asked.items())
+    design = replace(own, requirements=(*own.requirements, *more))
+    task = SampleTask(design, sampler_of(design))
+    whole = task((0, 3))
+    for requirement in judged(design):
+        alone = task.of(requirement)
+        found = alone.figures(alone.sampler.draw(0, 3))
+        if requirement.loop is None:
+            assert [*found] == [*source_columns(requirement, design)]
+        assert not any(name.startswith("drive.") for name in found) or len(found) == 1
+        both = (judge(requirement, design, columns) for columns in (whole, found))
+        assert len({each.distance.tobytes() for each in both}) == 1
 
 
 @pytest.mark.parametrize(("count", "bins"), [(8, 4), (30, 7), (1000, 20), (64_000, 60)])

@@ -99,6 +99,22 @@ def test_a_rigid_train_passes_the_motors_torque_less_its_friction(path, efficien
     assert result.failure_moment_Nm < 0.9 * N * design.motor.torque_constant_Nm_A * free.peak_current_A
 
 
+def test_a_drive_that_turns_on_has_no_stop_unless_one_is_stated() -> None:
+    """The full deflection that every design states is no stop of a spindle."""
+    spindle = changed(AMBER, controller={"position": None}, requirements=())
+    free = failures(spindle)
+    over = free.case("hard-over")
+    assert (over.to_stop_s, over.to_deflection_s, free.hard_over_time_s) == (None, None, inf)
+    assert over.time_s[-1] == pytest.approx(1.0)  # all that is watched
+    made = section(free)
+    assert "no stop is stated" in made["intro"]
+    assert "Hard-over of the power stage moves the output most" in made["result"]
+    assert "<svg" in draw_svg(next(one for one in made["blocks"] if one["kind"] == "figure"), page=False)
+    stop = 0.5 * over.at_detection_rad
+    stated = failures(spindle, Asked.of(spindle, stop_rad=stop)).case("hard-over")
+    assert stated.to_stop_s == pytest.approx(np.interp(stop, over.deflection_rad, over.time_s), rel=1e-9)
+
+
 def test_a_jam_at_speed_is_an_impact_on_the_spring() -> None:
     """The motor's inertia runs into the coupling: W sqrt(k J_m) N_c, the motor's own push beside it."""
     design = changed(load_design("ballscrew"), coupling={"damping_Nms_rad": 0.0})
