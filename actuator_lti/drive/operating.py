@@ -195,19 +195,18 @@ IN_MOTION = "in motion"
 
 
 def turned(design: Design) -> Iterator[tuple[str, Design]]:
-    """The drive where its cogging or gear error is steepest, and in a motion that averages them.
+    """The drive where its cogging and gear error are steepest, and in a motion that averages them.
 
-    On a crest it drives the rotor away, in a notch it holds it: margins are extreme there.
+    On a crest they drive the rotor away, in a notch they hold it: margins are extreme there.
     """
     motor, load = design.motor, design.load
-    if runs(design) or not (motor.cogging_Nm or load.gear_error_Nm):
+    waves = {"cogging": motor.cogging_Nm, "gear error": load.gear_error_Nm}
+    acting = " and ".join(name for name, peak_Nm in waves.items() if peak_Nm)
+    if runs(design) or not acting:
         return
     for where, phase in (("on a crest", 0.0), ("in a notch", pi)):
-        if motor.cogging_Nm:
-            yield f"{where} of the cogging", replace(design, motor=replace(motor, cogging_phase_rad=phase))
-        if load.gear_error_Nm:
-            at = replace(load, gear_error_phase_rad=phase)
-            yield f"{where} of the gear error", replace(design, load=at)
+        motor, load = replace(motor, cogging_phase_rad=phase), replace(load, gear_error_phase_rad=phase)
+        yield f"{where} of the {acting}", replace(design, motor=motor, load=load)
     yield IN_MOTION, replace(design, motor=motor.straight(), load=replace(load, gear_error_Nm=0.0))
 
 

@@ -2,9 +2,8 @@
 
 Every stable motion is a sum of orthonormal functions of its poles (Takenaka, Malmquist), which are the free
 motions of such a cascade: x' = A x, e = c x, A upper triangular with A + A* + c* c = 0. exp(A t) is a
-contraction, so poles that lie together or repeat cost no digit. A sampled system is a continuous one in
-s = (z - 1)/(z + 1): with the same A, c and x at the start, e after k samples is
-c (1 - A)^-1 ((1 + A)/(1 - A))^k x.
+contraction, so poles that lie together or repeat cost no digit. Those of a sampled system are in z, with
+A* A + c* c = 1; e after k samples is c A^k x.
 
 Heuberger, Van den Hof, Wahlberg, Modelling and Identification with Rational Orthogonal Basis Functions, 2005.
 """
@@ -17,7 +16,7 @@ from flint import acb, acb_mat, acb_poly, arb, arb_poly, ctx, fmpq, fmpq_poly
 
 from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.margins.exact.loop import ExactLoop, exact_loop
-from actuator_lti.margins.exact.roots import at_enough_bits
+from actuator_lti.margins.exact.roots import at_enough_bits, warped
 from actuator_lti.margins.given import given_of
 from actuator_lti.margins.loop import RationalLoop
 from actuator_lti.step.search import OVER, Search
@@ -133,9 +132,18 @@ def rational_motion(system: Any, loop: RationalLoop) -> tuple[Motion, float]:
         if abs(final) <= dc_noise(loop):
             raise NumericalError(LOST)
         rest = (fmpq_poly(N) * D[0] / N[0] - D) / fmpq_poly([0, D[D.degree()]])
+        if exact.sampled:
+            rest = _in_z(rest, len(poles) - 1) / _in_z(fmpq_poly(D) / D[D.degree()], len(poles))[len(poles)]
+            poles = [(1 + p) / (1 - p) for p in poles]
         return _free_motion(acb_poly(arb_poly(rest)), poles, exact.sampled)
 
     return at_enough_bits(motion, _FIRST_BITS, "a pole of the step response"), final
+
+
+def _in_z(p: fmpq_poly, degree: int) -> fmpq_poly:
+    """(z + 1)^degree p((z - 1)/(z + 1))."""
+    turn = fmpq_poly([0, -1])
+    return warped(p(turn), degree)(turn)
 
 
 def _poles(exact: ExactLoop, loop: RationalLoop) -> list[acb]:
@@ -152,22 +160,26 @@ def _poles(exact: ExactLoop, loop: RationalLoop) -> list[acb]:
 
 
 def _free_motion(rest: acb_poly, poles: list[acb], sampled: bool) -> Motion | None:
-    """The motion with the transform rest/(product of s - pole); ``None``: more digits are needed."""
+    """The motion with the transform rest/(product of variable - pole); ``None``: more digits are needed.
+
+    The variable is s, or z of a sampled system: there no pole is large, those near -1 would be in s.
+    """
     n = len(poles)
-    gains = [(-2 * p.real).sqrt() for p in poles]  # of a section, whose free motion has the energy 1
-    mirrored = [acb_poly.from_roots([-p.conjugate() for p in poles[:k]]) for k in range(n)]
-    A, state = acb_mat(n, n), [acb(0)] * n
+    turned = [-p.conjugate() for p in poles]
+    gains = [(1 + p * q if sampled else q - p).sqrt() for p, q in zip(poles, turned, strict=True)]  # energy 1
+    mirrored = [acb_poly([1])]
+    for q in turned:
+        mirrored.append(mirrored[-1] * acb_poly([1, q] if sampled else [-q, 1]))
+    A, state, output = acb_mat(n, n), [acb(0)] * n, [acb(0)] * n
     for j in reversed(range(n)):
         p, passed = poles[j], gains[j] * mirrored[j]
         state[j] = rest(p) / passed(p)
         rest = (rest - state[j] * passed) // acb_poly([-p, 1])
         if not float(abs(state[j] * gains[j]).rad()) <= _SURE:
             return None
-        A[j, j] = p
-        for k in range(j + 1, n):
-            A[j, k] = -gains[j] * gains[k]
-    if not sampled:
-        return Motion(A, gains, state, False)
-    one = acb_mat(n, n, [int(k % (n + 1) == 0) for k in range(n * n)])
-    over = (one - A).inv()
-    return Motion((one + A) * over, (acb_mat(1, n, gains) * over).entries(), state, True)
+        through = acb(1)  # what the sections between let pass at once
+        for k in reversed(range(j)):
+            A[k, j] = gains[k] * gains[j] * through if sampled else -gains[k] * gains[j]
+            through *= turned[k] if sampled else 1
+        A[j, j], output[j] = p, gains[j] * through
+    return Motion(A, output, state, sampled)

@@ -13,6 +13,7 @@ from analyses.estimation.fit import Fit
 from analyses.estimation.means import autocovariance
 
 LEAST_OWN_SHARE = 0.03  # a column with less of its own beside those before it is not separated from them
+RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the same
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,6 +69,11 @@ def told_apart(
             moves = {names[kept[j]]: float(share[j] * size / sizes[j]) for j in chosen}
         left.append(NotTold(name=name, moves=moves))
     return tuple(kept), tuple(left)
+
+
+def independent(w: Floats, *, least: float = LEAST_OWN_SHARE) -> list[int]:
+    """Which columns can be told apart, as `told_apart` without names."""
+    return list(told_apart(w, [""] * w.shape[1], least=least)[0])
 
 
 def solve(w: Floats, y: Floats, ends: Sequence[int] = ()) -> Solution:

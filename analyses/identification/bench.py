@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
@@ -47,6 +46,8 @@ class BenchResult(verdict.Identified):
     validation: tuple[Record, ...]
     findings: Mapping[str, tuple[Finding, ...]]
     model: JointModel
+    # whiteness of each record's residual, and its independence of the inputs
+    residual_tests: tuple[ResidualTest, ...]
     refined: OutputErrorResult | None
     resimulated: tuple[Resimulated, ...]
     settings: Settings
@@ -60,11 +61,6 @@ class BenchResult(verdict.Identified):
         pairs = zip(self.model.records, self.records, strict=True)
         own = {} if self.electrical is None else {"voltage": "voltage equation: R, kE, L"}
         return {record.name: account(record, {**own, **part.used}) for part, record in pairs}
-
-    @cached_property
-    def residual_tests(self) -> tuple[ResidualTest, ...]:
-        """Whiteness of each record's residual, and its independence of the inputs."""
-        return residual_tests(self.model)
 
 
 def identify_bench(
@@ -108,7 +104,8 @@ def identify_bench(
     told = {**right.findings, **{record.name: tuple(clipped) for record, clipped in whole}}
     findings = {name: (*each, *told[name]) for name, each in findings.items()}
     right, unseen = replace(right, model=model), tuple(record for record, _ in whole)
-    items = list(_items(design, settings, findings, right, compared, held))
+    tests = residual_tests(model)
+    items = list(_items(design, settings, findings, right, compared, held, tests))
     made, refined, unmade = _made(start, right, both, settings, items, progress)
     every = () if unmade else (*right.records, *unseen)
     again = tuple(resimulate(made, record, model.form) for record in every)
@@ -120,6 +117,7 @@ def identify_bench(
         validation=unseen,
         findings=findings,
         model=model,
+        residual_tests=tests,
         refined=refined,
         design=made,
         unmade=unmade,
@@ -211,6 +209,7 @@ def _items(
     right: Diagnosed,
     compared: Sequence[DesignValue],
     held: Mapping[str, float],
+    tests: Sequence[ResidualTest],
 ) -> Iterator[verdict.Item]:
     """What must hold before a design is made, and what is kept of the old one."""
     model, records = right.model, right.records
@@ -226,7 +225,7 @@ def _items(
     yield verdict.residual_item(model.relative_residual, settings.residual_limit / 100.0)
     commanded = all(command_of(design, record) is not None for record in records)
     yield from verdict.law_items(right.bend, model, design.axis, commanded and bool(model.simulated))
-    yield from verdict.independence_items(residual_tests(model))
+    yield from verdict.independence_items(tests)
     yield from verdict.noise_items(model)
     yield from verdict.offset_items(design, model)
     yield from verdict.kept_items(model, held, design.axis)

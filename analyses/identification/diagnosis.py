@@ -10,10 +10,10 @@ from actuator_lti.errors import InputError, NumericalError
 from actuator_lti.types import Floats, Mask
 from analyses.correlation.closed_loop import AXIS_SIGNALS, model_signals
 from analyses.correlation.following import Followed, followed
-from analyses.estimation.least_squares import covariance_of, information_of, solve, told_apart
+from analyses.estimation.least_squares import covariance_of, independent, information_of, solve, told_apart
 from analyses.estimation.means import correlation_time
 from analyses.estimation.parameters import Parameter, parameter
-from analyses.identification.friction_law import Bend, bend_of
+from analyses.identification.friction_law import Bend, bend_of, kept_columns
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel, Recipe, RecordFit
 from analyses.identification.rows import drive_of, is_benchmark, recipe_for, record_rows, rows_under
@@ -151,9 +151,10 @@ def _drift(part: RecordFit, model: JointModel, offset: Parameter) -> tuple[list[
     """Whether scale or offset of all torques drifts (-1 to 1) along a record, and adds to the covariance."""
     moved = np.zeros_like(model.covariance)
     time, w = np.linspace(-1.0, 1.0, len(part.keep))[part.keep][part.compared], part.w[part.compared]
-    table = np.column_stack([w, time * (w @ model.values), time])
-    names = (*model.names, "scale", "shift")
-    if len(table) <= len(names) or len(told_apart(table, names)[0]) < len(names):
+    every = np.column_stack([w, *kept_columns(model, part, part.compared)])
+    every = every[:, independent(every)]
+    table = np.column_stack([every, time * (w @ model.values), time])
+    if len(table) <= table.shape[1] or len(independent(table)) < table.shape[1]:
         return [], moved
     found, told = solve(table, part.noise), []
     scale, shift = found.values[-2:]

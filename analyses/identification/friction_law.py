@@ -6,10 +6,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import t
 
-from actuator_lti.types import Floats
-from analyses.estimation.least_squares import event_blocks, scaled_lstsq, wider_covariance
+from actuator_lti.types import Floats, Mask
+from analyses.estimation.least_squares import (
+    LEAST_OWN_SHARE,
+    RESOLVED,
+    event_blocks,
+    independent,
+    scaled_lstsq,
+    wider_covariance,
+)
 from analyses.identification.friction_map import away_from_reversals, speeds_tried
-from analyses.identification.joint_model import JointModel
+from analyses.identification.joint_model import JointModel, RecordFit
 from analyses.records.consistency import NO_CHANCE
 
 
@@ -53,27 +60,38 @@ def _term(model: JointModel, speed: float, tries: int) -> Bend:
     tables, rests = [], []
     for weight, part in zip(model.weights, model.records, strict=True):
         rows = part.compared if model.simulated else away_from_reversals(part)
-        columns = np.column_stack([part.w[rows], *_columns(model, part.speed[rows], speed)])
-        tables.append(weight * columns)
+        term = _bent(part.speed[rows], speed)
+        tables.append(weight * np.column_stack([part.w[rows], *kept_columns(model, part, rows), term]))
         rests.append(weight * part.noise[rows[part.compared]])
-    table, rest, count = np.concatenate(tables), np.concatenate(rests), len(model.names)
-    size = np.maximum(np.linalg.norm(table, axis=0), 1e-300)
-    if len(rest) <= table.shape[1] or np.linalg.matrix_rank(table / size) < table.shape[1]:
+    count, term, rest = len(model.names), np.concatenate(tables)[:, -1], np.concatenate(rests)
+    moved = -scaled_lstsq(np.concatenate(tables)[:, :count], term)
+    # of the others all that differ: what a kept value is off by is no term
+    others = independent(np.concatenate(tables)[:, :-1], least=RESOLVED)
+    tables = [each[:, [*others, -1]] for each in tables]
+    table = np.concatenate(tables)
+    own = term - table[:, :-1] @ scaled_lstsq(table[:, :-1], term)
+    if len(rest) <= table.shape[1] or not np.linalg.norm(own) > LEAST_OWN_SHARE * np.linalg.norm(term):
         return Bend(speed_rad_s=speed, errors=0.0, moved=np.zeros(count), tries=tries, blocks=2)
     found = scaled_lstsq(table, rest)
     left = [(w, e - w @ found) for w, e in zip(tables, rests, strict=True)]
     error = float(np.sqrt(wider_covariance(left)[-1, -1]))
     errors = abs(float(found[-1])) / error if error > 0.0 else 0.0
     blocks = sum(event_blocks(len(one)) for one in rests)
-    return Bend(speed_rad_s=speed, errors=errors, moved=found[:count], tries=tries, blocks=blocks)
+    return Bend(speed_rad_s=speed, errors=errors, moved=found[-1] * moved, tries=tries, blocks=blocks)
 
 
-def _columns(model: JointModel, speed: Floats, below: float) -> Iterator[Floats]:
-    """The line over the speed as far as the model has none of it free, and the term that is tried."""
+def kept_columns(model: JointModel, part: RecordFit, rows: Mask) -> Iterator[Floats]:
+    """Acceleration, speed and direction as far as none of it is free: what a model keeps may be off."""
     kinds = {name.partition("_")[0] for name in model.names}
+    if "inertia" not in kinds:
+        yield part.acceleration[rows]
     if not kinds & {"viscous", "map"}:
-        yield speed
+        yield part.speed[rows]
     if not kinds & {"dry", "map"}:
-        yield np.sign(speed)
+        yield np.sign(part.speed[rows])
+
+
+def _bent(speed: Floats, below: float) -> Floats:
+    """The term that is tried."""
     size = np.abs(speed)
-    yield size if np.isinf(below) else np.sign(speed) * np.maximum(below - size, 0.0)
+    return size if np.isinf(below) else np.sign(speed) * np.maximum(below - size, 0.0)

@@ -118,8 +118,13 @@ def _fitted(
     found = dict(zip(problem.free, solution.values.tolist(), strict=True))
     negative = {name: value for name, value in found.items() if value < 0.0 and name not in SIGNED}
     if negative and given is None:  # as no drive has them; of a simulated record the bias is as it is
-        again = {name: default_value(design, name) for name in negative}
-        return _said(design, problem, negative, _fitted(design, blocks, {**held, **again}, None))
+        # what cannot be told from others still free stays kept: a value that is not known tells nothing apart
+        same = {one.name: fixed[one.name] for one in left if not one.moves.keys() & negative.keys()}
+        again = {name: default_value(design, name) for name in (*same, *negative)}
+        model = _fitted(design, blocks, {**held, **again}, None)
+        model = replace(model, fixed={**model.fixed, **same})
+        model = replace(model, covariance=model.covariance + _of_fixed(design, model.names, same))
+        return _said(design, problem, negative, model)
     return _model(design, problem, solution, weights)
 
 

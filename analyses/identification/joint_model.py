@@ -39,6 +39,11 @@ class Recipe:
     # whether what drives and what turns with the direction are filtered as the position is
     both_sides: bool = False
 
+    def part(self, rows: int) -> slice:
+        """The samples without those dropped at both ends; a short record keeps its end."""
+        skip = self.skip_end_samples
+        return slice(self.skip_samples, rows - skip if rows > 4 * skip else rows)
+
     def motion(self, values: Floats, period_s: float) -> Motion:
         """A position, filtered and differentiated."""
         return filtered_motion(

@@ -13,13 +13,12 @@ from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats, Progress
 from analyses.estimation.fit import COVERAGE, Fit, Fixed
-from analyses.estimation.least_squares import told_apart
+from analyses.estimation.least_squares import RESOLVED, told_apart
 from analyses.identification.response_model import Seen
 from analyses.identification.response_search import ROUNDS, Point, Search
 from analyses.records.consistency import SURE
 
 NOT_TOLD = "not determined, the design's value kept"
-RESOLVED = 1e-5  # share of a slope that is its own: below it two values do the same
 STARTS: tuple[float, ...] = 1.0, 0.25, 4.0
 """Stiffnesses to begin with, over the design's: an octave of the resonance to either side."""
 REACH = 30.0

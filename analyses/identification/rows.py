@@ -207,7 +207,7 @@ def record_rows(
         own.known,
         own.drive,
     ]
-    part = _part(motion, recipe)
+    part = recipe.part(len(motion.velocity))
     rows = decimated(np.column_stack([columns, *others])[part], recipe.decimation)
     sine, cosine, speed, side, known, y = rows[:, columns.shape[1] :].T
     w = [*rows[:, : columns.shape[1]].T, np.abs(known if moment is None else known + moment) * side]
@@ -280,12 +280,6 @@ def _balance(design: Design, record: Record, recipe: Recipe, *, gravity: bool) -
     return _Balance(
         motion=motion, angle=angle, drive=drive, known=known, used=used, note=f"{place} and {told}"
     )
-
-
-def _part(motion: Motion, recipe: Recipe) -> slice:
-    """The samples without those dropped at both ends; a short record keeps its end."""
-    rows, skip = len(motion.velocity), recipe.skip_end_samples
-    return slice(recipe.skip_samples, rows - skip if rows > 4 * skip else rows)
 
 
 def _kept(record: Record, motion: Motion, part: slice, recipe: Recipe) -> Mask:

@@ -127,8 +127,9 @@ def independence_items(tests: Sequence[ResidualTest]) -> Iterator[Item]:
     for test in asked:
         if len(asked) * test.chance >= NO_CHANCE:
             continue
-        told = f"it hangs on the {test.input} (at a lag of {test.lag} rows): something is not modelled"
-        id, label = f"independent-{test.record}-{test.input}", f"{test.record}: residual of chance alone"
+        told = f"it hangs on it at a lag of {test.lag} rows: something is not modelled"
+        id = f"independent-{test.record}-{test.input}"
+        label = f"{test.record}: residual independent of the {test.input}"
         yield Item(id=id, label=label, passed=None, reason=f"{told}, the intervals need not hold it")
 
 

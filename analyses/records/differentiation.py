@@ -62,7 +62,8 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
 
     The signal is extended at both ends (odd extension) by 3 * order samples, the usual padding of a filter
     of this order, or by as long as they last where ten samples make a period of the cut-off: the filter
-    forgets in time, not in samples. A cut-off so low that its coefficients cancel is refused.
+    forgets in time, not in samples. A cut-off so low that its coefficients cancel, or that the record is
+    shorter than that, is refused.
     """
     if not 0.0 < cutoff_hz < 0.5 / period_s:
         raise InputError(f"cutoff = {cutoff_hz:g} Hz: must be between 0 and {0.5 / period_s:g} Hz")
@@ -71,9 +72,15 @@ def low_pass(values: Floats, period_s: float, *, cutoff_hz: float, order: int) -
             f"cutoff = {cutoff_hz:g} Hz: too low for rows that are {period_s:g} s apart; allowed: fewer rows "
             "or a higher cut-off"
         )
+    if len(values) <= 3 * order:
+        raise InputError(f"{len(values)} samples: more than {3 * order} are needed; allowed: a longer record")
+    lowest_hz = 0.3 * order / ((len(values) - 1) * period_s)
     padding = round(3 * order * max(1.0, 0.1 / (cutoff_hz * period_s)))
-    if len(values) <= max(padding, 3):
-        raise InputError(f"{len(values)} samples: more than {padding} are needed")
+    if len(values) <= padding:
+        told = f"its filter remembers {padding} rows, and there are {len(values)}"
+        raise InputError(
+            f"cutoff = {cutoff_hz:g} Hz: {told}; allowed: {lowest_hz:.6g} Hz and more, or more rows"
+        )
     b, a = butter(order, 2.0 * cutoff_hz * period_s)
     return np.asarray(filtfilt(b, a, values, padlen=padding), dtype=np.float64)
 

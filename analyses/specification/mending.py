@@ -1,6 +1,6 @@
 """The move that mends the weakest point of a drive: one gain, the least change, nothing else made worse."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, log
 
@@ -38,6 +38,7 @@ class Move:
 def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None) -> Move | None:
     """Find the least move of one gain that brings every margin of the weakest view within its limit.
 
+    And those of every other view that is not stable: at the border it would be no better.
     No other view of a loop goes beyond its limits, or further beyond them, and no requirement on a loop that
     is met is lost. ``None`` where no single gain within the factor `SPAN` does, or the view is no loop of
     `linear_figures`.
@@ -52,27 +53,29 @@ def mending(point: WeakPoint, survey: LoopSurvey, corners: Corners | None = None
     if not point.view.loop or point.view.rotor == "locked":
         return None
     others = [each for each in views(survey, corners) if each.loop and each.rotor != "locked"]
-    found = sorted(_moves(point.view, survey.design), key=lambda move: move.change)
+    mended = [point.view, *(each for each in others if each.stable is False)]
+    found = sorted(_moves(mended, survey.design), key=lambda move: move.change)
     return next((move for move in found if _harmless(move, others, survey.design)), None)
 
 
-def _moves(view: View, design: Design) -> Iterator[Move]:
-    """For each gain the least change either way that mends the view."""
+def _moves(weak: Sequence[View], design: Design) -> Iterator[Move]:
+    """For each gain the least change either way that mends the views."""
     for path in GAINS:
         if path not in design.parameters or not (was := parameter_value(design, path)):
             continue
         low, high = allowed_range(design, path)
         for end in (max(was / SPAN, low), min(was * SPAN, high)):
             steps = np.geomspace(was, end, STEPS + 1)
-            first = _first(view, design, path, steps)
+            first = _first(weak, design, path, steps)
             if first is not None and first > 0:
                 between = np.geomspace(steps[first - 1], steps[first], STEPS + 1)
-                place = _first(view, design, path, between) or STEPS
+                place = _first(weak, design, path, between) or STEPS
                 yield Move(path, was, _written(float(between[place]), was))
 
 
-def _first(view: View, design: Design, path: str, values: np.ndarray) -> int | None:
-    inside = np.flatnonzero(_reserves(view, design, path, values) >= 0.0)
+def _first(weak: Sequence[View], design: Design, path: str, values: np.ndarray) -> int | None:
+    least = np.min([_reserves(view, design, path, values) for view in weak], axis=0)
+    inside = np.flatnonzero(least >= 0.0)
     return int(inside[0]) if inside.size else None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from itertools import compress
 from math import inf
 from types import SimpleNamespace
@@ -46,12 +46,18 @@ def evaluate_requirements(
     analysed = [one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES]
     own = tuple(one for one in analysed if not QUANTITIES[one.quantity].cornered)
     alone = replace(design, requirements=own)  # what else is required changes no figure
+
+    @cache
+    def moving() -> LoopFigures | None:
+        there = dict(turned(design)).get(IN_MOTION)
+        return None if there is None else all_loop_figures(assemble_loops(there))["position"]
+
     made: list[RequirementVerdict] = []
     for done, requirement in enumerate(design.requirements):
         if progress is not None:
             progress(done, len(design.requirements))
         found = judged(design, requirement, figures, lambda name: _analyses_of(alone).figure(name))
-        made += [_with_limits(design, verdict) for verdict in found]
+        made += [_with_limits(design, verdict, moving) for verdict in found]
     return tuple(made)
 
 
@@ -88,32 +94,39 @@ def judged_nominally(
     return tuple(map(of_all, evaluate_requirements(nominal, figures, progress)))
 
 
-def _with_limits(design: Design, verdict: RequirementVerdict) -> RequirementVerdict:
+def _with_limits(design: Design, verdict: RequirementVerdict, moving: Moving) -> RequirementVerdict:
+    """Beside a figure what it is in motion, and what the profile of the command makes of it."""
+    said = () if verdict.value is None else (_in_motion(verdict, moving), _limited(design, verdict))
+    return replace(verdict, reason="; ".join(filter(None, (verdict.reason, *said))))
+
+
+def _limited(design: Design, verdict: RequirementVerdict) -> str:
     """Beside a bandwidth, a rate or an acceleration what the profile of the command makes of it."""
     of, value = verdict.requirement, verdict.value
-    if value is not None and (moving := _moving(design, verdict)):
-        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, moving))))
     if value is not None and (profile := beyond_profile(design, of, value)):
-        return replace(verdict, reason="; ".join(filter(None, (verdict.reason, profile))))
+        return profile
     limits = (design.command.rate_rad_s, design.command.acceleration_rad_s2)
     if (of.quantity, verdict.loop) != ("bandwidth", "position") or of.to == "reference" or min(limits) == inf:
-        return verdict
+        return ""
     from analyses.specification.asked_figures import said_of
 
-    return replace(verdict, reason="; ".join(filter(None, (verdict.reason, said_of(design, verdict.value)))))
+    return said_of(design, value)
 
 
-def _moving(design: Design, verdict: RequirementVerdict) -> str:
+Moving = Callable[[], LoopFigures | None]
+"""The position loop of a drive in a motion that averages its cogging and gear error."""
+
+
+def _in_motion(verdict: RequirementVerdict, moving: Moving) -> str:
     """Beside a response of a drive that stands in its cogging what it is in a motion over many periods."""
-    of = verdict.requirement
-    there = dict(turned(design)).get(IN_MOTION) if verdict.loop == "position" else None
-    if there is None or not QUANTITIES[of.quantity].of_response:
+    of, value = verdict.requirement, verdict.value
+    if verdict.loop != "position" or not QUANTITIES[of.quantity].of_response or (found := moving()) is None:
         return ""
-    found = all_loop_figures(assemble_loops(there))["position"].asked(of)
-    if not found.stable or (value := QUANTITIES[of.quantity].read(found)) is None:
+    other = QUANTITIES[of.quantity].read(found.asked(of)) if found.stable else None
+    here, there = (one and with_unit(one, of.unit, ".4g") for one in (value, other))
+    if there is None or there == here:
         return ""
-    over = with_unit(value, of.unit, ".4g")
-    return f"within a period of its cogging or gear error; in a motion over many {over}"
+    return f"within a period of its cogging or gear error; in a motion over many {there}"
 
 
 Asked = Callable[[str], tuple[float | None, str]]

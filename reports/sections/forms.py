@@ -167,7 +167,8 @@ def operating_points(points: Sequence[OperatingPointFigures], design: Design) ->
     note += " All margins are certified" + (" but those named below." if reasons else ".")
     caption = "PM: phase margin, GM: gain margin, −3 dB: bandwidth (position: to the command)"
     blocks = [doc.table(caption, columns, rows, note), *map(doc.text, reasons)]
-    intro = "The effect of friction on small motions depends on speed and load."
+    intro = "The effect of friction on small motions depends on speed and load"
+    intro += ", that of cogging and gear error on the angle." if any(p.design for p in points) else "."
     return doc.section("operating-points", "Operating points", blocks, result=_spread(points), intro=intro)
 
 
@@ -176,7 +177,11 @@ def _spread(points: Sequence[OperatingPointFigures]) -> str:
         here = [p.place or p.label for p in points if any(f.sound is sound for f in p.figures.values())]
         if here:
             return f"{words} at {len(here)} of {len(points)} operating points: {'; '.join(here)}."
-    rows = [(margin_row(f), f"{n} loop, {p.place or p.label}") for p in points for n, f in p.figures.items()]
+    rows = [
+        (margin_row(f.judged), f"{n} loop, {p.place or p.label}")
+        for p in points
+        for n, f in p.figures.items()
+    ]
     known = [(row["phase_margin_deg"], words) for row, words in rows if row["phase_margin_deg"] is not None]
     deg, where = min(known, key=lambda each: float(each[0]), default=(None, ""))
     least = "" if deg is None else f"; the smallest phase margin is {deg:.1f} deg ({where})"
@@ -187,8 +192,9 @@ def _operating_point(point: OperatingPointFigures, scale: float) -> doc.Row:
     load = "any" if point.load_Nm is None else point.load_Nm
     row: doc.Row = {"point": point.label, "slope": point.slope_Nms_rad * scale, "load": load}
     for name, result in point.figures.items():
-        margins, response = margin_row(result), response_row(result)
-        row[f"{name}_phase"] = margins["phase_margin_deg"] if result.stable else result.margins.verdict
+        one = result.judged
+        margins, response = margin_row(one), response_row(one)
+        row[f"{name}_phase"] = margins["phase_margin_deg"] if one.stable else one.margins.verdict
         row[f"{name}_gain"] = margins["gain_margin_db"]
         row[f"{name}_band"] = response["minus3db_hz"] or None
         row |= {"_status": "fail"} if result.sound is False else {}

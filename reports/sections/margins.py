@@ -338,14 +338,20 @@ def spread_table(points: Sequence[OperatingPointFigures], named: Mapping[str, Lo
 
 
 def range_words(range_: Spread, quantity: str) -> str:
-    """Say between which values a margin lies over the operating points; empty where they agree."""
+    """Say between which values a margin lies over the operating points.
+
+    >>> range_words(Spread(15.0, -16.3, "in the gap of the play"), "gain_margin")
+    '15 (in the gap of the play); elsewhere down to −16.3'
+    """
 
     def end(value: float) -> str:
         words = "∞" if math.isinf(value) else short(value, 3)
         return f"down to {words}" if quantity == "gain_margin" and words[0] == "−" else words
 
     least, most = end(range_.least), end(range_.most)
-    return least if least == most else f"{least} ({range_.where}) to {most}"
+    if least == most:
+        return least
+    return f"{least} ({range_.where})" + (f"; elsewhere {most}" if most.startswith("down") else f" to {most}")
 
 
 class _Crossing(NamedTuple):

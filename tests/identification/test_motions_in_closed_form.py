@@ -1,6 +1,7 @@
 """Motions in closed form: many rows a second, fast torques, another friction law, noise of the speed."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,12 +14,14 @@ from analyses.identification.joint_model import JointModel
 from analyses.identification.motion_noise import with_noise_of_motion
 from analyses.identification.rows import stands
 from analyses.identification.verdict import law_items, noise_items
+from analyses.records.differentiation import low_pass
 from tests.identification.bench_records import record_of
+from tests.refusals import refused
 
 MASS, VISCOUS, DRY, OFFSET = 95.0, 200.0, 20.0, -3.0
 
 
-def _fitted(time: np.ndarray, position: np.ndarray, force: np.ndarray, **asked: str) -> JointModel:
+def _fitted(time: np.ndarray, position: np.ndarray, force: np.ndarray, **asked: Any) -> JointModel:
     return fit_records(load_design("emps"), [record_of(time, position=position, force=force)], **asked)
 
 
@@ -73,6 +76,44 @@ def test_friction_that_bends_over_the_speed_fails_the_straight_law(stribeck: flo
         force = MASS * acceleration + VISCOUS * speed + dry + OFFSET + 2.0 * rng.standard_normal(len(time))
         sure.append(bend_of(_fitted(time, position, force)).is_sure)
     assert all(sure) if stribeck else not any(sure)
+
+
+def _first_order_step(inertia: float) -> tuple[np.ndarray, ...]:
+    """Time, position and force of a speed that rises to 0.2 m/s: the acceleration is what it lacks."""
+    time, constant = 1e-3 * np.arange(3000), 0.05
+    since = np.maximum(time - 0.2, 0.0)
+    rise, moves = np.exp(-since / constant), time >= 0.2
+    speed = 0.2 * (1.0 - rise)
+    force = inertia * 0.2 / constant * rise * moves + VISCOUS * speed + (DRY + OFFSET) * moves
+    noise = 0.1 * np.random.default_rng(1).standard_normal(len(time))
+    return time, 0.2 * (since - constant * (1.0 - rise)), force + noise
+
+
+def test_a_value_that_is_kept_for_being_negative_tells_no_others_apart() -> None:
+    """Speed, acceleration and a constant are of two columns: with the mass kept, viscous was 2263 for 200."""
+    model = _fitted(*_first_order_step(-5.0))
+    assert model.names == ("viscous",)
+    assert "negative" in model.fixed["inertia"].reason
+    for name in ("dry", "offset"):
+        assert "cannot be separated from viscous" in model.fixed[name].reason
+    # the kept values are within 0.4 N of those drawn, the mass within the error that it is said to have
+    assert abs(model["viscous"] - VISCOUS) < model.std("viscous") < 0.25 * VISCOUS
+
+
+def test_rows_that_differ_by_rounding_bend_no_friction_law() -> None:
+    """Direction and offset are one column there: a straight law was bent by 20 and 36 standard errors."""
+    step = _first_order_step(-5.0)
+    for held in ({}, {"inertia": -5.0}, {"inertia": -5.0, "dry": DRY}):
+        assert not bend_of(_fitted(*step, fixed=held)).is_sure
+
+
+def test_a_record_shorter_than_the_filter_remembers_is_told_the_cut_off_that_it_allows() -> None:
+    """By its 499 steps 500 rows hold 1.2 periods of 2.4048 Hz; taken at 2 Hz, a ramp comes out 9 % off."""
+    short, words = 0.3 * np.arange(500) * 1e-3, ("cutoff = 2 Hz", "600 rows", "2.40481 Hz and more")
+    refused(low_pass, short, 1e-3, cutoff_hz=2.0, order=4, words=words)
+    refused(low_pass, short, 1e-3, cutoff_hz=2.40, order=4, words="allowed: 2")
+    assert len(low_pass(short, 1e-3, cutoff_hz=2.40481, order=4)) == 500
+    refused(low_pass, short[:12], 1e-3, cutoff_hz=20.0, order=4, words="allowed: a longer record")
 
 
 def test_a_slope_by_direction_is_named() -> None:

@@ -64,6 +64,17 @@ def test_the_motor_of_the_steps_predicts_the_chirp(odrive_files: dict[str, Path]
     assert min(alone) < together.time_constant_s < max(alone)
 
 
+def test_a_record_of_another_motor_is_not_written_into_a_design(odrive_files, cli, tmp_path) -> None:
+    """A step of 38 ms: what one row told of offset and drift widened the errors until 44 times agreed."""
+    words = ("identify", odrive_files["step1"], "--design", "ilr33-amber", "--out", tmp_path)
+    said = " ".join(cli.text(*words, status=1).split())
+    assert "Viscous friction is 44" in said
+    assert "first 9 and last 9 samples dropped" in said
+    assert not list(tmp_path.glob("*.toml"))
+    unproven = said.partition("Not proven, which alone does not fail: ")[2].partition(". ")[0].split("; ")
+    assert len(set(unproven)) == len(unproven) > 4
+
+
 def test_a_chirp_is_found_again_and_noise_is_not() -> None:
     time = np.arange(0.0, 6.0, 5e-3)
     since = np.maximum(time - 1.0, 0.0)

@@ -13,7 +13,13 @@ from actuator_lti.asked.verdict import Verdict
 from actuator_lti.design import model, read_design_text
 from actuator_lti.design.plant import reachable_speed
 from actuator_lti.drive.facts import breakaway_torque_Nm, capability
-from actuator_lti.drive.operating import Operating, follows_angle, holding_torque_Nm, level, straight
+from actuator_lti.drive.operating import (
+    Operating,
+    follows_angle,
+    holding_torque_Nm,
+    level,
+    straight,
+)
 from actuator_lti.drive.wiring import wire
 from actuator_lti.loops.assemble import loops_at
 from actuator_lti.loops.tick import TickProgram
@@ -326,16 +332,23 @@ def test_a_loop_that_only_the_hold_of_a_slope_makes_unstable_is_told_so(cli) -> 
     assert "PASS" in cli.text("corners", "ilr33-amber", *asked)
 
 
-def test_margins_are_told_where_the_cogging_is_steepest() -> None:
+def test_margins_are_told_where_the_torques_over_the_angle_are_steepest() -> None:
     """At DC a crest of F Z works against a stiffness of g kv kp: the gain may fall to their ratio."""
-    force, periods = 500.0, 600.0
-    cogging = {"cogging_Nm": force, "cogging_periods": periods, "cogging_phase_rad": 1.2}
-    points = operating_points(changed(load_design("emps"), motor=cogging), [], described=False)
-    least = {one.label: one.figures["position"].margins.gain_margin_db for one in points}
-    down = 20.0 * np.log10(force * periods / (35.15065 * 243.45 * 160.18))
-    assert least["on a crest of the cogging"] == pytest.approx(down, rel=1e-9)
-    assert least["in a notch of the cogging"] > 0.0
-    assert "on a crest of the cogging" in {one.place for one in points}
+    cogging = {"cogging_Nm": 500.0, "cogging_periods": 600.0, "cogging_phase_rad": 1.2}
+    gear = {"gear_error_Nm": 80.0, "gear_error_periods": 500.0, "gear_error_phase_rad": 2.0}
+    slopes, stiffness = {"cogging": 500.0 * 600.0, "gear error": 80.0 * 500.0}, 35.15065 * 243.45 * 160.18
+    for acting in (["cogging"], ["gear error"], ["cogging", "gear error"]):
+        parts = {
+            "motor": cogging if "cogging" in acting else {},
+            "load": gear if "gear error" in acting else {},
+        }
+        points = operating_points(changed(load_design("emps"), **parts), [], described=False)
+        found = {one.place: one.figures["position"].margins.gain_margins for one in points}
+        lowest = [
+            one.ratio for one in found[f"on a crest of the {' and '.join(acting)}"] if not one.frequency_rad_s
+        ]
+        assert lowest == pytest.approx([sum(slopes[name] for name in acting) / stiffness], rel=1e-9)
+        assert all(one.ratio > 1.0 for one in found[f"in a notch of the {' and '.join(acting)}"])
 
 
 def test_beside_the_bandwidth_of_standing_in_a_notch_stands_that_of_a_motion() -> None:
@@ -346,4 +359,10 @@ def test_beside_the_bandwidth_of_standing_in_a_notch_stands_that_of_a_motion() -
     (alone,) = evaluate_requirements(changed(plain, requirements=asked))
     (standing,) = evaluate_requirements(changed(plain, requirements=asked, motor=notch))
     assert standing.value != pytest.approx(alone.value, rel=0.01)
-    assert standing.reason.endswith(f"in a motion over many {alone.value:.4g} Hz")
+    assert f"in a motion over many {alone.value:.4g} Hz" in standing.reason
+    weak = changed(
+        plain, requirements=asked, motor={**notch, "cogging_Nm": 1e-6}, command={"rate_rad_s": 0.05}
+    )
+    (same,) = evaluate_requirements(weak)
+    assert "rate and acceleration of the command" in same.reason
+    assert "in a motion" not in same.reason

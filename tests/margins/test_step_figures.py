@@ -9,7 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import brentq, newton
 
+from actuator_lti import assemble_loops, load_design
 from actuator_lti.errors import NumericalError
+from actuator_lti.margins.exact import roots
 from actuator_lti.step import step_figures
 from actuator_lti.systems.delay_system import DelaySystem
 from actuator_lti.systems.phase import unwrapped_phase_deg
@@ -159,3 +161,18 @@ def test_unwrapping_refuses() -> None:
     refused(unwrapped_phase_deg, 1 / s, [0.0], words="positive")
     refused(unwrapped_phase_deg, control.tf([1], [1, 0.5], 0.01), [400.0], words="Nyquist")
     refused(unwrapped_phase_deg, control.frd([1.0, 0.5], [1.0, 2.0]), [4.0], words="measured")
+
+
+def test_a_loop_over_many_ticks_has_figures_of_few_digits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Poles near z = -1 are large in s and cost twice the digits; 160 states never ended. By recursion."""
+    monkeypatch.setattr(roots, "_MOST_BITS", 384)
+    slow = {"control.velocity.every": 10, "control.position.every": 10}
+    fed = {**slow, "control.current.back_emf_feedforward": 1.0}
+    closed = assemble_loops(load_design("ilr33-amber").with_values(fed)).current.plain_closed
+    found, x, y = step_figures(closed), np.zeros(len(closed.A)), []
+    for _ in range(2000):
+        y.append((closed.C @ x + closed.D[:, 0]).item())
+        x = closed.A @ x + closed.B[:, 0]
+    part = np.array(y) / found.final_value
+    assert 100.0 * (part.max() - 1.0) == pytest.approx(found.overshoot_percent, abs=1e-6)
+    assert found.settling_time_s / closed.dt == pytest.approx(np.flatnonzero(abs(part - 1.0) > 0.02)[-1] + 1)

@@ -17,13 +17,14 @@ from analyses.linear.loop_survey import LoopSurvey, operating_points, survey_loo
 from analyses.linear.responses import curve, frequency_grid
 from analyses.margins import margins
 from analyses.specification.mending import mending
-from analyses.specification.weakest import spread, views, weakest
+from analyses.specification.weakest import figures_of, spread, views, weakest
 from reports.build import report
 from reports.document import verdict
 from reports.sections.answer import section as first_screen
 from reports.sections.answer import weakest as words_of
 from reports.sections.loop_charts import open_bode
 from reports.sections.margins import section as margins_section
+from tests.changed import changed
 
 FIN = replace(load_design("fin"), requirements=())
 
@@ -149,6 +150,24 @@ def test_a_gain_that_is_far_from_stable_is_mended_as_well() -> None:
     assert 60.0 < move.value < 8.0 * 10.0 ** ((25.90 - 6.0) / 20.0)
     mended = assemble_loops(with_values(design, {move.path: move.value})).position
     assert stability_margins(mended.open_loop).modulus_margin >= CUSTOMARY["modulus_margin"]
+
+
+def test_no_view_is_left_at_its_border_by_what_mends_another() -> None:
+    """On a crest of the cogging every loop of the joint is unstable: one gain brings all within custom."""
+    cogging = {"cogging_Nm": 6e-3, "cogging_periods": 24.0, "cogging_phase_rad": np.pi}
+    design = changed(load_design("joint"), motor=cogging, requirements=())
+    seen = survey_loops(design)
+    lost = [view for view in views(seen) if view.stable is False]
+    assert {view.loop for view in lost if view.place == "on a crest of the cogging"} >= {
+        "velocity",
+        "position",
+    }
+    move = mending(weakest(seen), seen)
+    points = operating_points(with_values(design, {move.path: move.value}), [], described=False)
+    crest = next(one for one in points if one.label == "on a crest of the cogging")
+    for one in crest.figures.values():
+        found = figures_of(one.judged.margins)
+        assert all(found[name] >= limit for name, limit in CUSTOMARY.items() if name in found)
 
 
 def test_a_requirement_that_is_not_met_without_a_figure_has_the_first_bar() -> None:
