@@ -114,7 +114,7 @@ class Stream(io.StringIO):
 def test_a_wait_is_told_once_on_a_terminal(terminal: bool, after_s: float, said: str, monkeypatch) -> None:
     stream = Stream(terminal)
     monkeypatch.setattr(sys, "stderr", stream)
-    monkeypatch.setattr(waiting, "_told", set())
+    waiting._tell.cache_clear()
     for wait_s in (10.0 if said else 0.0, 0.2):
         stream.written.clear()
         with waiting.told_if_slow("the kettle boils", after_s):

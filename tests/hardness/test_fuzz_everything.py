@@ -16,7 +16,6 @@ from targets import CAMPAIGN, SPEC, Target, parquet_file, small_report, targets
 from actuator_lti import bounds
 from actuator_lti.bounds import JSON_DEPTH, KEY_PARTS, TEXT_CHARACTERS, TOML_BYTES, TOML_DEPTH, TOML_VALUES
 from actuator_lti.design.loader import design_text
-from actuator_lti.files import reading
 from actuator_lti.files.reading import parse_json, parse_toml, read_bytes, read_json
 from analyses.estimation.least_squares import solve
 from analyses.records.campaign_file import load_campaign
@@ -196,7 +195,7 @@ def test_a_pipe_or_a_device_is_refused_without_waiting(suffix, tmp_path) -> None
 
 def test_a_file_of_any_kind_has_a_largest_size(tmp_path, monkeypatch) -> None:
     path, most = tmp_path / "f", bounds.Bound("of a file", 9, "small", unit="bytes")
-    monkeypatch.setattr(reading, "REPORT_BYTES", most)
+    monkeypatch.setattr(bounds, "REPORT_BYTES", most)
     for read, whole in ((lambda file: read_bytes(file, most=most), b'"1234567"'), (read_json, "1234567")):
         path.write_bytes(b'"1234567"')
         assert read(path) == whole

@@ -1,6 +1,7 @@
 """Motions in closed form: many rows a second, fast torques, another friction law, noise of the speed."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from actuator_lti.design import load_design
+from analyses.identification.diagnosis import diagnosed
 from analyses.identification.friction_law import bend_of
 from analyses.identification.inverse import fit_records
 from analyses.identification.joint_model import JointModel
@@ -84,7 +86,7 @@ def _first_order_step(inertia: float) -> tuple[np.ndarray, ...]:
     since = np.maximum(time - 0.2, 0.0)
     rise, moves = np.exp(-since / constant), time >= 0.2
     speed = 0.2 * (1.0 - rise)
-    force = inertia * 0.2 / constant * rise * moves + VISCOUS * speed + (DRY + OFFSET) * moves
+    force = inertia * 0.2 / constant * rise * moves + VISCOUS * speed + DRY * moves + OFFSET
     noise = 0.1 * np.random.default_rng(1).standard_normal(len(time))
     return time, 0.2 * (since - constant * (1.0 - rise)), force + noise
 
@@ -100,8 +102,18 @@ def test_a_value_that_is_kept_for_being_negative_tells_no_others_apart() -> None
     assert abs(model["viscous"] - VISCOUS) < model.std("viscous") < 0.25 * VISCOUS
 
 
+def test_a_mass_that_is_kept_is_no_drift() -> None:
+    """The rise was one: all torques changed by -2600 %, and viscous was 181 +- 2422."""
+    design, time, position, force = load_design("emps"), *_first_order_step(-5.0)
+    held = {"inertia": MASS, "dry": DRY, "offset": OFFSET}
+    record = record_of(time, position=position, force=force)
+    right = diagnosed(design, design, [record], partial(fit_records, design, fixed=held), None)
+    assert not right.findings["r"]
+    assert right.model.std("viscous") < 0.25 * VISCOUS
+
+
 def test_rows_that_differ_by_rounding_bend_no_friction_law() -> None:
-    """Direction and offset are one column there: a straight law was bent by 20 and 36 standard errors."""
+    """Direction and offset are one column there: a straight law was bent by 15 to 36 standard errors."""
     step = _first_order_step(-5.0)
     for held in ({}, {"inertia": -5.0}, {"inertia": -5.0, "dry": DRY}):
         assert not bend_of(_fitted(*step, fixed=held)).is_sure
