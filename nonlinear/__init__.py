@@ -15,33 +15,21 @@ from typing import TYPE_CHECKING
 
 from actuator_lti.start.on_first_use import on_first_use
 
-if TYPE_CHECKING:
-    from nonlinear import commands, loads
-    from nonlinear.bench.derivative import Tangent, tangent
-    from nonlinear.bench.probe import Probe
-    from nonlinear.drive import Drive
-    from nonlinear.rows import LIMITERS, Rows
-    from nonlinear.runs.batch import simulate_many
-    from nonlinear.runs.setup import Reducers, Run
-    from nonlinear.runs.simulation import simulate
-    from nonlinear.runs.trajectory import State, Trajectory
-
-__all__ = [
-    "LIMITERS",
-    "Drive",
-    "Probe",
-    "Reducers",
-    "Rows",
-    "Run",
-    "State",
-    "Tangent",
-    "Trajectory",
-    "commands",
-    "loads",
-    "simulate",
-    "simulate_many",
-    "tangent",
-]
+if TYPE_CHECKING:  # each by its name again: public to type checkers
+    from nonlinear import commands as commands
+    from nonlinear import loads as loads
+    from nonlinear.bench.derivative import Tangent as Tangent
+    from nonlinear.bench.derivative import tangent as tangent
+    from nonlinear.bench.probe import Probe as Probe
+    from nonlinear.drive import Drive as Drive
+    from nonlinear.rows import LIMITERS as LIMITERS
+    from nonlinear.rows import Rows as Rows
+    from nonlinear.runs.batch import simulate_many as simulate_many
+    from nonlinear.runs.setup import Reducers as Reducers
+    from nonlinear.runs.setup import Run as Run
+    from nonlinear.runs.simulation import simulate as simulate
+    from nonlinear.runs.trajectory import State as State
+    from nonlinear.runs.trajectory import Trajectory as Trajectory
 
 _WHERE = {
     "Drive": "nonlinear.drive",
