@@ -75,7 +75,7 @@ def views(survey: LoopSurvey, corners: Corners | None = None) -> Iterator[View]:
 
 
 def _loops(place: str, loops: Mapping[str, LoopFigures], **at: Any) -> Iterator[View]:
-    for name, one in loops.items():
+    for name, one in reversed(list(loops.items())):  # of loops that are not stable the outermost is named
         seen = [(one.rotor, one.judged)]
         seen += [("locked", one.locked)] if one.locked is not None and one.held is None else []
         for rotor, found in seen:

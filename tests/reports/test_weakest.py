@@ -162,6 +162,7 @@ def test_no_view_is_left_at_its_border_by_what_mends_another() -> None:
         "velocity",
         "position",
     }
+    assert weakest(seen).view.loop == "position"  # the loops inside it are lost with it
     move = mending(weakest(seen), seen)
     points = operating_points(with_values(design, {move.path: move.value}), [], described=False)
     crest = next(one for one in points if one.label == "on a crest of the cogging")
