@@ -94,6 +94,17 @@ def finite_number(name: str, value: Any, allowed: str = "a finite number, in SI"
     return number
 
 
+def instance_of(name: str, value: Any, kind: type) -> None:
+    """Refuse an argument that is nothing of a kind.
+
+    >>> instance_of("values", 5, dict)
+    Traceback (most recent call last):
+    actuator_lti.errors.InputError: values = 5: must be a dict
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name} = {shown(value)}: must be a {kind.__name__}")
+
+
 def delay_number(delay_s: Any) -> float:
     """A delay in s that is one finite number and not negative."""
     allowed = "finite and not negative, in s"

@@ -10,6 +10,7 @@ from actuator_lti.asked.quantities import ANALYSIS_QUANTITIES, CORNERED, QUANTIT
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.access import with_values
 from actuator_lti.design.checks import contradictions
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Temperature, Tolerance
 from actuator_lti.design.tolerances import drawn, together
 from actuator_lti.errors import InputError
@@ -75,7 +76,7 @@ class Corners:
         return self.verdict.passes()
 
 
-def corners(design: Design, asked: Asked | None = None, *, progress: Progress = None) -> Corners:
+def corners(design: AnyDesign, asked: Asked | None = None, *, progress: Progress = None) -> Corners:
     """Figures and requirements of a drive when hot, cold, on a low supply, and at the worst tolerances.
 
     Each corner is a design of its own, put through the same loops as the nominal one. Requirements on what an
@@ -87,6 +88,7 @@ def corners(design: Design, asked: Asked | None = None, *, progress: Progress = 
     >>> [corner.name for corner in corners(load_design("fin")).corners]
     ['nominal', 'hot', 'cold', 'low supply', 'hot, low supply', 'worst gain margin', 'worst phase margin']
     """
+    design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     made = []

@@ -8,6 +8,7 @@ from math import exp, inf, isfinite, log
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -86,7 +87,7 @@ MOST_CYCLES = 2**40
 _DRAWN = 200
 
 
-def duty(design: Design, asked: Asked | None = None) -> Duty:
+def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     """Current of a duty by simulation, against continuous current, overload protection and temperature.
 
     The protection is left out of the simulation, so that the current is that of the duty as asked.
@@ -98,6 +99,7 @@ def duty(design: Design, asked: Asked | None = None) -> Duty:
     >>> result.rms_A <= result.peak_A
     True
     """
+    design = as_design(design)
     if not design.motor.has_electrical_dynamics:
         raise InputError("duty: an ideal torque source has no current")
     if design.controller.position is None:

@@ -7,6 +7,7 @@ from math import ceil, inf, log
 import numpy as np
 
 from actuator_lti.asked.verdict import Verdict
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError, UnstableError
 from actuator_lti.loops import assemble_loops
@@ -90,7 +91,7 @@ LONGEST_S = 5.0  # of waiting before a failure
 MOST_TICKS = 400_000
 
 
-def failures(design: Design, asked: Asked | None = None) -> Failures:
+def failures(design: AnyDesign, asked: Asked | None = None) -> Failures:
     """Follow every failure case from its start to the stop or to the end of the time watched.
 
     By default the design's full deflection is the stop, a tenth of it the deflection asked for.
@@ -103,6 +104,7 @@ def failures(design: Design, asked: Asked | None = None) -> Failures:
     >>> result.case("jam").at_detection_rad < result.case("hard-over").at_detection_rad
     True
     """
+    design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
     if asked.watched_s / design.controller.period_s > MOST_TICKS:
         longest = MOST_TICKS * design.controller.period_s

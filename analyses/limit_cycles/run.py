@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.bounds import BATCH_TICKS
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.types import Floats
@@ -69,7 +70,7 @@ class LimitCycles:
         return Tally.of([verdict_of(self.design, self.hunting)], [waived]).verdict
 
 
-def limit_cycles(design: Design) -> LimitCycles:
+def limit_cycles(design: AnyDesign) -> LimitCycles:
     """Limit cycles of play and of quantisation, and what steps of the drive as it is end in.
 
     Cycles of play are predicted without dry friction and with it; those of dry friction alone are
@@ -81,6 +82,7 @@ def limit_cycles(design: Design) -> LimitCycles:
     >>> limit_cycles(load_design("fin")).looked_for
     ('play', 'quantisation')
     """
+    design = as_design(design)
     if design.controller.position is None:
         raise InputError("cycles: needs a drive with a position loop")
     has_play = design.coupling is not None and design.coupling.play_rad > 0.0

@@ -7,6 +7,7 @@ from typing import Any, cast
 import numpy as np
 
 from actuator_lti.asked.verdict import Tally, Verdict
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from actuator_lti.files.response import Loop as Kind
@@ -194,7 +195,7 @@ class Margins:
         return self.verdict.passes()
 
 
-def margins(design: Design, asked: Asked | None = None) -> Margins:
+def margins(design: AnyDesign, asked: Asked | None = None) -> Margins:
     """Find the certified margins of every loop and judge the requirements.
 
     Raises `InputError`, `NumericalError`: where loops cannot be assembled as asked, or margins not be found.
@@ -203,6 +204,7 @@ def margins(design: Design, asked: Asked | None = None) -> Margins:
     >>> str(margins(load_design("emps")).verdict)
     'met'
     """
+    design = as_design(design)
     asked = asked or Asked()
     loops = assemble_loops(
         design,

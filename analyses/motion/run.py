@@ -6,6 +6,7 @@ from functools import cached_property
 import numpy as np
 
 from actuator_lti.bounds import TONES
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.drive.operating import straight
 from actuator_lti.errors import InputError, whole_number
@@ -62,11 +63,12 @@ class Motion:
         return False if self.ended.status == "diverging" else None
 
 
-def motion(design: Design, asked: Asked, *, progress: Progress = None) -> Motion:
+def motion(design: AnyDesign, asked: Asked, *, progress: Progress = None) -> Motion:
     """Simulate one motion, and write its rows where that is asked for.
 
     Raises `InputError`: for a command that does not fit the run, or a load that would not act in it.
     """
+    design = as_design(design)
     unit, per_SI = COMMAND_UNITS[design.axis, design.controller.outermost]
     duration = asked.duration
     if asked.cycles is not None and asked.command != "stepped-sine":  # which has a duration of its own

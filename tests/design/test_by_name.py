@@ -35,7 +35,12 @@ from actuator_lti.design import (
 from actuator_lti.design.loader import design_text
 from actuator_lti.loops.delay_budget import delay_budget
 from actuator_lti.margins import MeasuredResponse
+from analyses.corners import corners
+from analyses.duty import duty
+from analyses.failures import failures
 from analyses.friction_effects import friction_effects
+from analyses.limit_cycles import limit_cycles
+from analyses.margins import margins
 from analyses.monte_carlo import monte_carlo
 from analyses.specification import specification
 from analyses.stiffness import stiffness
@@ -72,6 +77,7 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
     analyses.evaluate_requirements, friction_effects, analyses.large_signals, analyses.sawtooth,
     specification, stiffness, analyses.survey_loops, analyses.tune, analyses.validate,
     lambda name: monte_carlo(name, "nowhere"), lambda name: analyses.amplitude_map(name, None),
+    corners, duty, failures, limit_cycles, margins,
 ])  # fmt: skip
 def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
     refused(ask, "ilr33-ambre", words='nearest known: "ilr33-amber"')
@@ -134,6 +140,11 @@ BAD = {
     "tune": lambda: analyses.tune(3),
     "sawtooth": lambda: analyses.sawtooth(3),
     "counts": lambda: analyses.large_signals(DESIGN, counts=5),
+    "loops": lambda: analyses.large_signals(DESIGN, 5),
+    "findings": lambda: analyses.validate(DESIGN, 5),
+    "values": lambda: with_values(DESIGN, "x"),
+    "overrides": lambda: with_overrides(DESIGN, [1, 2]),
+    "overridden": lambda: with_overrides("ilr33-amber", {}),
     "study": lambda: analyses.compare(3),
     "a report's folder": lambda: report(DESIGN, out=3),
     "a record's path": lambda: analyses.open_record(3),
