@@ -1,7 +1,7 @@
 """The model driven by a record's own command, load and supply."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -154,8 +154,35 @@ def model_signals(
     ``measured`` are the signals wanted; the simulation starts from what their first samples show. What was
     done is added to ``notes``.
     """
+    _, made, series = _nearest(design, record, measured, [] if notes is None else notes, progress, command)
+    limits = {name: use.fraction for name, use in made.limits.items()}
+    return {name: series[name] for name in measured}, limits
+
+
+def as_driven(design: Design, record: Record) -> Record:
+    """The record with how a design's drive took its command, as that meets the record best.
+
+    It stays so whatever drive is simulated with it: in a search each would have its steps where they suit it.
+    """
+    driven, *_ = _nearest(design, record, measured_signals(design, record), [])
+    early = np.full(len(record), np.nan)
+    early[driven.steps] = driven.early_s
+    return replace(record, between=driven.between, early_s=early)
+
+
+_Modelled = tuple[driving.Driven, Trajectory, dict[str, Floats]]
+
+
+def _nearest(
+    design: Design,
+    record: Record,
+    measured: Mapping[str, Floats],
+    notes: list[str],
+    progress: Progress = None,
+    command: str | None = None,
+) -> _Modelled:
+    """The reading of a command with which a run is nearest, that run and its signals."""
     driven = driving.needed_command(design, record, command)
-    notes = [] if notes is None else notes
     notes.extend(driven.notes)
     time, even = record.time_s - record.time_s[0], period_of(record) * np.arange(len(record))
     if (np.abs(time - even) <= 4.0 * np.spacing(np.abs(record.time_s).max())).all():
@@ -184,11 +211,10 @@ def model_signals(
             notes.append("the record begins in motion or under load, and so does the model")
     whole = partial(run, at=initial, progress=progress)
     readings = driving.readings(driven, record)
-    tried = [(one, *_with_steps(one, time, measured, partial(whole, one))) for one in readings]
-    best, made, series = min(tried, key=lambda each: _off(measured, each[2]))
-    notes.append(f"model: {len(made.time_s)} ticks of {period * 1e6:g} us, command {best.between}")
-    limits = {name: use.fraction for name, use in made.limits.items()}
-    return {name: series[name] for name in measured}, limits
+    tried = [_with_steps(one, time, measured, partial(whole, one)) for one in readings]
+    best = min(tried, key=lambda each: _off(measured, each[2]))
+    notes.append(f"model: {len(best[1].time_s)} ticks of {period * 1e6:g} us, command {best[0].between}")
+    return best
 
 
 def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> float:
@@ -199,27 +225,32 @@ def _off(measured: Mapping[str, Floats], modelled: Mapping[str, Floats]) -> floa
 
 def _with_steps(
     driven: driving.Driven, time: Floats, measured: Mapping[str, Floats], run: Callable[[Floats], Trajectory]
-) -> tuple[Trajectory, dict[str, Floats]]:
+) -> _Modelled:
     """A run and its signals at the record's times, each step of the command at the tick that meets it best.
 
     The record says between which samples a step was written, the answer to it at which tick: from a tick
     after the later sample (written before it acts) to the earlier one.
     """
-    tick, row = driven.design.controller.period_s, float(np.median(np.diff(time)))
-    early = np.zeros(len(driven.steps))
+    tick, (least, most) = driven.design.controller.period_s, ticks_early(driven.design, time)
+    early = np.zeros(len(driven.steps)) if driven.early_s is None else driven.early_s
     made = run(early)
     series = _series(driven.design, made, time)
     name = next((name for name in ANSWERS if name in measured), "")
-    for _ in range(STEP_ROUNDS if len(early) and name else 0):
+    for _ in range(STEP_ROUNDS if driven.early_s is None and len(early) and name else 0):
         more = driving.earlier_s(driven, time, measured[name], series[name])
-        moved = tick * np.clip(np.round((early + more) / tick), -1.0, np.floor(row / tick * (1.0 + 1e-9)))
+        moved = tick * np.clip(np.round((early + more) / tick), least, most)
         if np.array_equal(moved, early):
             break
         other = run(moved)
         if _off(measured, nearer := _series(driven.design, other, time)) >= _off(measured, series):
             break
         early, made, series = moved, other, nearer
-    return made, series
+    return replace(driven, early_s=early), made, series
+
+
+def ticks_early(design: Design, time_s: Floats) -> tuple[float, float]:
+    """By how many ticks a step of the command comes before the row that shows it, at least and at most."""
+    return -1.0, float(np.floor(np.median(np.diff(time_s)) / design.controller.period_s * (1.0 + 1e-9)))
 
 
 def _series(design: Design, run: Trajectory, time: Floats) -> dict[str, Floats]:

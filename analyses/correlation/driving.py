@@ -49,6 +49,7 @@ class Driven:
     notes: tuple[str, ...] = ()
     together: int = 1  # jumps from row to row, between standstills, that are steps each and no curve
     between: str = SMOOTH
+    early_s: Floats | None = None  # each step comes before its row, where that is known
 
     @property
     def steps(self) -> Ints:
@@ -67,6 +68,9 @@ def readings(driven: Driven, record: Record) -> list[Driven]:
         found.append(replace(driven, together=len(record), between=HELD))
         found.append(replace(driven, together=0, between=STRAIGHT))
     other = [one for k, one in enumerate(found) if not k or len(one.steps) != len(found[k - 1].steps)]
+    if (early := record.early_s) is not None:
+        known = [one for one in other if np.array_equal(one.steps, np.flatnonzero(~np.isnan(early)))]
+        other = [replace(one, early_s=early[one.steps]) for one in known]
     return [one for one in other if record.between in ("", one.between)] or [driven]
 
 

@@ -6,9 +6,10 @@ set. No equation of the rows tells these from kE and R, friction and inertia. Th
 are known, has the same rows.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,19 +17,22 @@ from actuator_lti.design import parameter_value, with_values
 from actuator_lti.design.model import Design
 from actuator_lti.errors import NumericalError
 from actuator_lti.types import Floats
-from analyses.correlation.closed_loop import measured_signals, model_signals
+from analyses.correlation.closed_loop import as_driven, measured_signals, model_signals, ticks_early
 from analyses.estimation.fit import Fit
 from analyses.estimation.least_squares import wider_covariance
 from analyses.estimation.parameters import default_value, parameter
 from analyses.identification import to_design
-from analyses.identification.electrical import NAMES, NOT_SHOWN, SHOWN, ElectricalFit, kept_inductance
+from analyses.identification.electrical import NAMES, SHOWN, ElectricalFit, kept_inductance
 from analyses.identification.joint_model import JointModel
-from analyses.identification.output_error import LEAST_GAIN, fit_output, simulated_part
+from analyses.identification.output_error import ITERATIONS, fit_output, simulated_part
 from analyses.identification.own_bias import same_fit, with_model_signals, with_noise
 from analyses.records.record import Record
 
+INDUCTANCE = parameter("inductance").key
 BACK, TORQUE = parameter("back_emf").key, parameter("torque_constant").key
-FIRST_GAIN = 0.03  # part of the squares that a step takes, with which a first search goes on
+NOT_SHOWN = "the records do not show it (they are as likely with none)"
+NONE = 1e-6  # of the design's inductance: as good as none
+SETTLED = 0.05  # of what a signal leaves, within which its weight may still move
 
 
 def found_together(
@@ -56,8 +60,10 @@ def found_together(
         return None
     made = with_values(design, dict(zip(found.names, found.values.tolist(), strict=True)), check=False)
     scale = to_design.inertia_share(design, made.inertia_kgm2, inertia)[1]
-    slopes = {name: {key: 1.0 / scale if name == "inertia" else 1.0} for name, key in keys.items()}
-    return found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
+    told = {name: key for name, key in keys.items() if key in found}
+    slopes = {name: {key: 1.0 / scale if name == "inertia" else 1.0} for name, key in told.items()}
+    whole = found.mapped(slopes, {"inertia": made.inertia_kgm2} if "inertia" in keys else {})
+    return replace(whole, fixed=found.fixed)
 
 
 def _first_friction(design: Design, model: JointModel) -> dict[str, float]:
@@ -83,35 +89,160 @@ def _by_simulation(
 ) -> Fit | None:
     """Values of keys with which the simulated drive has the currents and voltages of records; kM as kE."""
     parts = [simulated_part(design, record) for record in records]
-    measured = [measured_signals(design, part) for part in parts]
-    wanted = _drives(measured)
-
-    def made(sizes: Sequence[float], tried: Design) -> Floats:
-        tried = _one_constant(design, tried)
-        runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
-        return _weighed(_drives(runs), sizes)
-
-    start, ends = design, np.cumsum([len(one) for one in wanted])[:-1]
+    wanted = _drives(parts)
     lefts = [[left.std() for left in map(np.subtract, wanted, _drives(like))] for like in others]
-    sizes = np.min([[one.std() for one in wanted], *lefts], axis=0).tolist()
-    for gain in (FIRST_GAIN, LEAST_GAIN):
-        found = fit_output(start, keys, partial(made, sizes), _weighed(wanted, sizes), least_gain=gain)
-        start = with_values(start, dict(zip(keys, found.values.tolist(), strict=True)), check=False)
-        if gain == FIRST_GAIN and not is_nearest(
-            [with_model_signals(_one_constant(design, start), part) for part in parts]
-        ):
-            return None
-        rests = np.split(found.rest, ends)
-        sizes = [size * float(np.std(rest)) for size, rest in zip(sizes, rests, strict=True)]
-    told = list(zip(np.split(found.slopes, ends), rests, strict=True))
-    pairs = [
-        (_side_by_side(w, z), _side_by_side(e, d))
-        for (w, e), (z, d) in zip(told[::2], told[1::2], strict=True)
-    ]
+    sizes = np.min([[one.std() for one in wanted], *lefts], axis=0)
+    parts = [as_driven(design, part) for part in parts]
+    first = _first(design, keys, parts, sizes, design)
+    if not is_nearest([with_model_signals(first.design, part) for part in parts]):
+        return None
+    found = _with_inductance(design, keys, first)
     try:
-        return Fit(names=keys, values=found.values, covariance=wider_covariance(told, pairs))
+        return _at_its_ticks(design, keys, found)
     except np.linalg.LinAlgError:
         raise NumericalError(f"the records do not tell {', '.join(keys)} apart") from None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Likeliest:
+    """Where a search ended: its values are the design's."""
+
+    design: Design
+    keys: tuple[str, ...]
+    parts: Sequence[Record]
+    sizes: Floats  # of what is left of each signal
+    told: Sequence[tuple[Floats, Floats]]  # slopes of each over the values, what is left, of unit size
+    unlikely: float  # twice the negative logarithm of the likelihood of white noise, but for a constant
+    freed: _Likeliest | None = None  # where the inductance is found too, though the records do not show it
+
+    def away(self, other: _Likeliest) -> Floats:
+        """By what the values of another search are off these, as a covariance."""
+        moved = _values(other.design, self.keys) - _values(self.design, self.keys)
+        return np.outer(moved, moved)
+
+    @property
+    def fit(self) -> Fit:
+        """The values; in error by what an inductance that is not shown, and was kept, moves them by too."""
+        pairs = [
+            (_side_by_side(w, z), _side_by_side(e, d))
+            for (w, e), (z, d) in zip(self.told[::2], self.told[1::2], strict=True)
+        ]
+        covariance, fixed = wider_covariance(self.told, pairs), {}
+        if self.freed is not None:
+            covariance = covariance + self.away(self.freed)
+            fixed = {"inductance": kept_inductance(self.design, NOT_SHOWN)}
+        values = _values(self.design, self.keys)
+        return Fit(names=self.keys, values=values, covariance=covariance, fixed=fixed)
+
+
+def _with_inductance(
+    design: Design, keys: tuple[str, ...], first: _Likeliest, than: float = np.inf
+) -> _Likeliest:
+    """The likeliest values, the design's inductance kept where the records show none and do not deny it."""
+    freed = _likeliest(design, keys, first.parts, first.sizes, first.design, than=than)
+    if first.keys == keys or freed.unlikely > than + SHOWN**2:
+        return freed
+    denied = freed.unlikely + SHOWN**2
+    without = with_values(design, {INDUCTANCE: NONE * parameter_value(design, INDUCTANCE)})
+    if _likeliest(without, first.keys, first.parts, freed.sizes, first.design).unlikely <= denied:
+        held = _likeliest(design, first.keys, first.parts, freed.sizes, first.design)
+        if held.unlikely <= denied:
+            return replace(held, freed=freed)
+    return replace(freed, unlikely=denied)
+
+
+def _first(
+    design: Design, keys: tuple[str, ...], parts: Sequence[Record], sizes: Floats, start: Design
+) -> _Likeliest:
+    """One search with the inductance of the design.
+
+    Without one the samples stand still over it: a search that comes to such from afar would stay there.
+    """
+    rest = tuple(key for key in keys if key != INDUCTANCE)
+    return _likeliest(design, rest, parts, sizes, start, rounds=1)
+
+
+def _likeliest(
+    design: Design,
+    keys: tuple[str, ...],
+    parts: Sequence[Record],
+    sizes: Floats,
+    start: Design,
+    *,
+    rounds: int = ITERATIONS,
+    than: float = np.inf,
+) -> _Likeliest:
+    """Search from ``start``, each signal weighed by what is left of it, until that settles.
+
+    Given up where it lacks more of being as likely as another, ``than``, than its last round has gained.
+    """
+    measured = [measured_signals(design, part) for part in parts]
+    wanted, before = _drives(measured), np.inf
+    rows = np.array([len(one) for one in wanted])
+
+    def weighed(signals: Sequence[Floats]) -> Floats:
+        return np.concatenate([one / size for one, size in zip(signals, sizes, strict=True)])
+
+    def made(tried: Design) -> Floats:
+        tried = _one_constant(design, tried)
+        runs = [model_signals(tried, *each)[0] for each in zip(parts, measured, strict=True)]
+        return weighed(_drives(runs))
+
+    for _ in range(rounds):
+        moved = fit_output(design, keys, made, weighed(wanted), begin=_values(start, keys))
+        start = with_values(design, dict(zip(keys, moved.values.tolist(), strict=True)), check=False)
+        slopes, rests = (np.split(each, np.cumsum(rows)[:-1]) for each in (moved.slopes, moved.rest))
+        left = np.array([np.std(rest) for rest in rests])
+        sizes = sizes * left
+        unlikely = float(2.0 * rows @ np.log(sizes))
+        if np.all(np.abs(left - 1.0) < SETTLED) or before - unlikely < unlikely - than:
+            break
+        before = unlikely
+    return _Likeliest(
+        design=_one_constant(design, start),
+        keys=keys,
+        parts=parts,
+        sizes=sizes,
+        told=[(w / size, e / size) for w, e, size in zip(slopes, rests, left, strict=True)],
+        unlikely=unlikely,
+    )
+
+
+def _at_its_ticks(design: Design, keys: tuple[str, ...], found: _Likeliest) -> Fit:
+    """The fit with the steps of each command at the ticks with which the records are likeliest.
+
+    A tick later or earlier is another minimum, as the inductance delays too: each is searched to its end, and
+    counts in the covariance by how likely it is beside the likeliest.
+    """
+    tried = [found]
+    for k in range(len(found.parts)):
+        for turn in (1, -1):
+            before = found
+            while (other := _moved_steps(found, k, turn)) is not None:
+                first = _first(design, keys, other, found.sizes, found.design)
+                tried.append(_with_inductance(design, keys, first, found.unlikely))
+                if tried[-1].unlikely >= found.unlikely:
+                    break
+                found = tried[-1]
+            if found is not before:
+                break
+    fit = found.fit
+    others = sum(np.exp(-0.5 * abs(one.unlikely - found.unlikely)) * found.away(one) for one in tried)
+    return replace(fit, covariance=fit.covariance + others)
+
+
+def _values(design: Design, keys: Sequence[str]) -> Floats:
+    return np.array([parameter_value(design, key) for key in keys])
+
+
+def _moved_steps(found: _Likeliest, k: int, turn: int) -> Sequence[Record] | None:
+    """The records with the steps of one of them a tick earlier, or later; None where its rows refuse it."""
+    part, tick = found.parts[k], found.design.controller.period_s
+    early = np.asarray(part.early_s) + turn * tick
+    (least, most), ticks = ticks_early(found.design, part.time_s), np.round(early[np.isfinite(early)] / tick)
+    if not len(ticks) or ticks.min() < least or ticks.max() > most:
+        return None
+    return [*found.parts[:k], replace(part, early_s=early), *found.parts[k + 1 :]]
 
 
 def _one_constant(design: Design, tried: Design) -> Design:
@@ -131,25 +262,16 @@ def _drives(records: Sequence[Mapping[str, Floats]] | Sequence[Record]) -> list[
     return [signal for pair in each for signal in pair]
 
 
-def _weighed(signals: Sequence[Floats], sizes: Sequence[float]) -> Floats:
-    return np.concatenate([one / size for one, size in zip(signals, sizes, strict=True)])
-
-
-def motor_of(both: Fit, raw: ElectricalFit, design: Design) -> ElectricalFit:
+def motor_of(both: Fit, raw: ElectricalFit) -> ElectricalFit:
     """What was found of the motor, in the place of what the voltage equation makes of the rows."""
-    value, std = both.get("inductance", 0.0), both.std("inductance")
-    hidden = (
-        {"inductance": kept_inductance(design, NOT_SHOWN.format(value, std))} if value < SHOWN * std else {}
-    )
-    names = tuple(name for name in NAMES if name in both.names and name not in hidden)
+    names = tuple(name for name in NAMES if name in both.names)
     motion, motor = ([k for k, n in enumerate(both.names) if (n in NAMES) is own] for own in (False, True))
-    motor = [k for k in motor if both.names[k] in names]
     return replace(
         raw,
         names=names,
         values=both.values[motor],
         covariance=both.covariance[np.ix_(motor, motor)],
-        fixed=hidden,
+        fixed=both.fixed,
         at_once=np.zeros(len(names)),
         bias={name: raw[name] - both[name] for name in names if name in raw.names},
         with_motion=both.covariance[np.ix_(motion, motor)],

@@ -156,7 +156,7 @@ def _together(
             return None
         if both is None:
             return []
-        motor = motor_of(both, raw, plain)
+        motor = motor_of(both, raw)
         start = _with_motor(plain, motor, records)
         fit = partial(_fitted, start, settings, held, recipe, both=both)
         right = diagnosed(design, start, records, fit, recipe)

@@ -74,13 +74,12 @@ def fit_output(
     output_of: Callable[[Design], Floats],
     measured: Floats,
     progress: Progress = None,
-    least_gain: float = LEAST_GAIN,
+    begin: Floats | None = None,
 ) -> Moved:
     """The values of some keys, within what each allows, with which an output of a design fits best.
 
-    Least squares by a dogleg in a box (scipy), from the design's own values; the derivative is by central
-    differences of a share `STEP` of each value. The search ends
-    where a step takes less than ``least_gain`` of the squares.
+    Least squares by a dogleg in a box (scipy), from the design's own values or others; the derivative is by
+    central differences of a share `STEP` of each value of the design.
     """
     start = np.array([parameter_value(design, path) for path in paths])
     scale, ends = box_of(design, paths)
@@ -99,8 +98,8 @@ def fit_output(
             progress(min(count, most), most)
         return measured - output
 
-    begin = np.ones(len(paths))
-    first = residual(begin)
+    at = np.ones(len(paths)) if begin is None else np.clip(1.0 + (begin - start) / scale, *box)
+    first = residual(at)
 
     def slopes(moved: Floats) -> Floats:
         to = STEP * np.diag(np.maximum(np.abs(moved), LEAST_STEPPED))
@@ -109,8 +108,8 @@ def fit_output(
         change = np.array([residual(up) - residual(down) for up, down in pairs])
         return np.asarray((change / np.diag(both[0] - both[1])[:, None]).T)
 
-    options = {"method": "dogbox", "xtol": TOLERANCE, "ftol": least_gain, "max_nfev": ITERATIONS}
-    found = least_squares(residual, begin, jac=slopes, bounds=box, **options)
+    options = {"method": "dogbox", "xtol": TOLERANCE, "ftol": LEAST_GAIN, "max_nfev": ITERATIONS}
+    found = least_squares(residual, at, jac=slopes, bounds=box, **options)
     values = values_at(found.x)
     return Moved(
         values=values,

@@ -80,6 +80,7 @@ class Record:
     settings: Mapping[str, Any] = field(default_factory=lambda: MappingProxyType({}))
     # How the drive took its command between the rows: SMOOTH, STRAIGHT, HELD; empty: as it meets them best
     between: str = ""
+    early_s: Floats | None = field(default=None, repr=False)  # a step of it came before each row; NaN: none
 
     def drive(self, design: Design) -> Design:
         """The design as it was set for this record."""
@@ -121,12 +122,13 @@ class Record:
     def slice(self, start: int, stop: int) -> Record:
         """Rows ``start:stop``."""
         cut = {name: values[start:stop] for name, values in self.signals.items()}
-        left_out = None if self.left_out is None else self.left_out[start:stop]
+        parts = {"left_out": self.left_out, "early_s": self.early_s}
+        cut_rows: Any = {name: None if rows is None else rows[start:stop] for name, rows in parts.items()}
         return replace(
             self,
             time_s=self.time_s[start:stop],
             signals=MappingProxyType(cut),
-            left_out=left_out,
+            **cut_rows,
             first_row=self.first_row + start,
         )
 
