@@ -13,7 +13,7 @@ from actuator_lti.design.checks import contradictions
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design, Requirement, Temperature, Tolerance
 from actuator_lti.design.tolerances import drawn, together
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, instance_of
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
 from analyses.corners.asked import Asked
@@ -90,6 +90,7 @@ def corners(design: AnyDesign, asked: Asked | None = None, *, progress: Progress
     """
     design = as_design(design)
     asked = Asked.of(design) if asked is None else asked
+    instance_of("asked", asked, Asked)
     kept = tuple(one for one in design.requirements if one.quantity not in ANALYSIS_QUANTITIES)
     made = []
     for name, words, there in _made(design, asked):

@@ -10,7 +10,7 @@ import numpy as np
 from actuator_lti.asked.verdict import Tally, Verdict
 from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, instance_of
 from actuator_lti.types import Floats
 from analyses.duty.asked import Asked
 from analyses.specification.requirements import RequirementVerdict, judged_by, tally
@@ -105,6 +105,7 @@ def duty(design: AnyDesign, asked: Asked | None = None) -> Duty:
     if design.controller.position is None:
         raise InputError("duty: needs a drive with a position loop")
     asked = Asked.of(design) if asked is None else asked
+    instance_of("asked", asked, Asked)
     free = replace(design, limits=replace(design.limits, peak_time_s=None))
     run, ticks = _moving(free, asked)
     current, still = run.current_A[-ticks:], np.zeros(1)

@@ -20,7 +20,7 @@ from actuator_lti.design.model import Design, Requirement, Waiver
 from actuator_lti.design.suspicions import beyond_profile
 from actuator_lti.drive.operating import IN_MOTION, turned
 from actuator_lti.drive.profile import command_mean
-from actuator_lti.errors import InputError
+from actuator_lti.errors import InputError, instance_of
 from actuator_lti.loops import assemble_loops
 from actuator_lti.types import Progress
 from analyses.linear.loop_figures import HELD, LoopFigures, all_loop_figures
@@ -42,7 +42,7 @@ def evaluate_requirements(
     design = as_design(design)
     if figures is None:
         figures = all_loop_figures(assemble_loops(design))
-
+    instance_of("figures", figures, Mapping)
     analysed = [one for one in design.requirements if one.quantity in ANALYSIS_QUANTITIES]
     own = tuple(one for one in analysed if not QUANTITIES[one.quantity].cornered)
     alone = replace(design, requirements=own)  # what else is required changes no figure

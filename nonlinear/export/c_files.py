@@ -3,6 +3,7 @@
 import re
 
 from actuator_lti.compiled.kinds import c_float
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.errors import InputError
@@ -33,7 +34,7 @@ def spare_parameters(p: Floats) -> int:
     return SPARE_LEVELS * modes * (1 + elastic.STEP_SIZE)
 
 
-def c_export(design: Design, *, single_precision: bool = False, prefix: str = "drive_") -> dict[str, str]:
+def c_export(design: AnyDesign, *, single_precision: bool = False, prefix: str = "drive_") -> dict[str, str]:
     """Files of an export, by name.
 
     ``single_precision``: ``float`` in place of ``double``.
@@ -44,6 +45,7 @@ def c_export(design: Design, *, single_precision: bool = False, prefix: str = "d
     elastic drive train (its events are located to the rounding of double precision); for a prefix that no
     name in C begins with.
     """
+    design = as_design(design)
     refuse_prefix(prefix)
     if single_precision:
         _refuse_single(design)

@@ -7,7 +7,7 @@ from functools import partial
 from actuator_lti.compiled.kinds import c_float
 from actuator_lti.compiled.program import Program
 from actuator_lti.compiled.structs import Member, Struct, struct_text
-from actuator_lti.design.model import Design
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.writing import design_hash
 from actuator_lti.start.extras import package_version
 from nonlinear._kernels import layout as at
@@ -21,7 +21,7 @@ _LIBRARY = re.compile(r"\b(sqrt|floor|fabs|exp|log|sin|cos|tan)\(")
 
 
 def controller_export(
-    design: Design, *, single_precision: bool = True, prefix: str = "drive_", vectors: bool = True
+    design: AnyDesign, *, single_precision: bool = True, prefix: str = "drive_", vectors: bool = True
 ) -> dict[str, str]:
     """Files of the controller of a design, by name.
 
@@ -32,6 +32,7 @@ def controller_export(
 
     Raises `InputError`: for a prefix that no name in C begins with.
     """
+    design = as_design(design)
     refuse_prefix(prefix)
     ours = controller_of(design, prefix, single_precision=single_precision)
     source = _source(ours.program, prefix)

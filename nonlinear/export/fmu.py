@@ -10,6 +10,7 @@ from typing import Literal
 
 from actuator_lti.compiled.compiler import compile_files
 from actuator_lti.compiled.kinds import c_float
+from actuator_lti.design.loader import AnyDesign, as_design
 from actuator_lti.design.model import Design
 from actuator_lti.errors import InputError
 from nonlinear.export import variables as of
@@ -29,7 +30,7 @@ PLATFORMS = (*_BUILDS,)
 
 
 def fmu_bytes(
-    design: Design,
+    design: AnyDesign,
     version: Version = 2,
     platforms: Sequence[str] = PLATFORMS,
     *,
@@ -47,6 +48,7 @@ def fmu_bytes(
 
     Raises `InputError`: for an unknown version or platform, or without a compiler.
     """
+    design = as_design(design)
     refuse_unknown(version, platforms)
     trace = trace_keys(design)
     variables = of.variables_of(design, trace)

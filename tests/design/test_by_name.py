@@ -2,6 +2,7 @@
 
 import pickle
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -45,6 +46,7 @@ from analyses.monte_carlo import monte_carlo
 from analyses.specification import specification
 from analyses.stiffness import stiffness
 from nonlinear import Drive, Probe, commands, simulate
+from nonlinear.export import c_export, controller_export, fmu_bytes
 from reports import report
 from tests.refusals import refused
 
@@ -77,7 +79,7 @@ def test_anything_else_is_refused_in_one_line(given: object) -> None:
     analyses.evaluate_requirements, friction_effects, analyses.large_signals, analyses.sawtooth,
     specification, stiffness, analyses.survey_loops, analyses.tune, analyses.validate,
     lambda name: monte_carlo(name, "nowhere"), lambda name: analyses.amplitude_map(name, None),
-    corners, duty, failures, limit_cycles, margins,
+    corners, duty, failures, limit_cycles, margins, c_export, controller_export, fmu_bytes,
 ])  # fmt: skip
 def test_every_analysis_of_a_design_takes_its_name(ask) -> None:
     refused(ask, "ilr33-ambre", words='nearest known: "ilr33-amber"')
@@ -142,6 +144,8 @@ BAD = {
     "counts": lambda: analyses.large_signals(DESIGN, counts=5),
     "loops": lambda: analyses.large_signals(DESIGN, 5),
     "findings": lambda: analyses.validate(DESIGN, 5),
+    "figures": lambda: analyses.evaluate_requirements(DESIGN, 5),
+    **{f"asked of {each.__name__}": partial(each, DESIGN, 5) for each in (corners, duty, failures, margins)},
     "values": lambda: with_values(DESIGN, "x"),
     "overrides": lambda: with_overrides(DESIGN, [1, 2]),
     "overridden": lambda: with_overrides("ilr33-amber", {}),
