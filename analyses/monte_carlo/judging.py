@@ -48,10 +48,14 @@ def drive_column(quantity: str, load_Nm: float | None) -> str:
     return f"drive.{quantity}@{load_Nm or 0.0:g}"
 
 
+def behind_mean(design: Design, loop: str, quantity: str) -> bool:
+    """Whether many designs have a figure of the response behind the profile's mean, not to the command."""
+    return loop == "position" and QUANTITIES[quantity].of_response and command_mean(design) is not None
+
+
 def loop_column(design: Design, loop: str, quantity: str) -> str:
     """Name of the column of a loop's figure; behind the profile's mean a response is not the command's."""
-    unlike = loop == "position" and QUANTITIES[quantity].of_response and command_mean(design)
-    return f"{loop}.{quantity}" + ("_behind_mean" if unlike else "")
+    return f"{loop}.{quantity}" + "_behind_mean" * behind_mean(design, loop, quantity)
 
 
 def loop_columns(

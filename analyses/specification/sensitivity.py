@@ -13,7 +13,7 @@ from actuator_lti.asked.quantities import LOOP_QUANTITIES, drive_cases
 from actuator_lti.batch import Population, drive_figures, linear_figures, variable_paths
 from actuator_lti.design import parameter_value, tolerances
 from actuator_lti.design.model import Design
-from actuator_lti.drive.profile import command_mean
+from analyses.monte_carlo.judging import behind_mean
 from analyses.studies.sampling import Factor
 
 STEP = 1e-3
@@ -104,7 +104,7 @@ def population_figures(
     columns = {}
     for loop in linear.loops:
         for name, quantity in LOOP_QUANTITIES.items():
-            unlike = loop == "position" and quantity.of_response and command_mean(design)
+            unlike = behind_mean(design, loop, name)
             if (time_figures or not quantity.timed) and not unlike:  # stairs of samples have no slope
                 values = linear.quantity(name, loop)
                 sized = np.abs(values) if quantity.absolute else values
